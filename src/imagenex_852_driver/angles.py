@@ -1,0 +1,22 @@
+"""Head positions (0.15 deg each, clockwise, 1400 ahead) to angles of the `sonar` frame and back."""
+
+import math
+
+AHEAD = 1400
+
+_RADIANS_PER_POSITION = math.radians(0.15)
+
+
+def head_angle(head_position: int, inverted: bool = False) -> float:
+    """Return the angle of the beam about +z from +x, counter-clockwise radians in [-pi, pi] (REP-103).
+
+    `inverted` is a head mounted upside down: what it counts clockwise turns counter-clockwise then.
+    """
+    clockwise = (head_position - AHEAD) * _RADIANS_PER_POSITION
+    return math.remainder(clockwise if inverted else -clockwise, 2 * math.pi)
+
+
+def head_position(angle: float, inverted: bool = False) -> int:
+    """Return the position, of those within half a turn of straight ahead, that is nearest to `angle`."""
+    wrapped = math.remainder(angle, 2 * math.pi)
+    return AHEAD + round((wrapped if inverted else -wrapped) / _RADIANS_PER_POSITION)

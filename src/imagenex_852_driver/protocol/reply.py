@@ -1,0 +1,137 @@
+"""The head's reply: 12 bytes of header, 0, 252 or 500 echo strengths, one terminator (thesis 4.1.4)."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID, require
+
+HEADER_LENGTH = 12
+TERMINATOR = 0xFC
+SWITCHES_ACCEPTED = 0x40
+OVERRUN = 0x80
+
+_CLOCKWISE_BIT = 0x40
+
+
+class ReplyKind(Enum):
+    """The three replies by their leading letters."""
+
+    IMX = b"IMX"
+    IGX = b"IGX"
+    IPX = b"IPX"
+
+    @property
+    def echo_count(self) -> int:
+        """Number of echo strengths in a reply of this kind."""
+        return _ECHO_COUNTS[self]
+
+    @property
+    def length(self) -> int:
+        """Number of bytes of the whole reply."""
+        return HEADER_LENGTH + self.echo_count + 1
+
+
+_ECHO_COUNTS = {ReplyKind.IMX: 252, ReplyKind.IGX: 500, ReplyKind.IPX: 0}
+
+
+@dataclass(frozen=True)
+class Reply:
+    """One reply, in the head's own units.
+
+    `head_position` counts 0.15 deg, clockwise, 1400 is straight ahead; `clockwise` is the direction of the
+    step; `echoes` holds one strength (0 to 255) per range bin, nearest first; `profile_range_cm` is an echo
+    sounder's depth.
+    Raises FrameError for a value the wire cannot carry.
+    """
+
+    kind: ReplyKind
+    max_range: int
+    echoes: bytes
+    head_id: int = SONAR_HEAD_ID
+    status: int = SWITCHES_ACCEPTED | 1
+    head_position: int = 1400
+    clockwise: bool = True
+    profile_range_cm: int = 0
+
+    def __post_init__(self) -> None:
+        require("head_id", self.head_id, HEAD_IDS)
+        require("max_range", self.max_range, RANGES)
+        require("status", self.status, range(0x100))
+        require("head_position", self.head_position, range(1 << 13))
+        require("profile_range_cm", self.profile_range_cm, range(1 << 14))
+        require(f"number of echoes of an {self.kind.name}", len(self.echoes), (self.kind.echo_count,))
+
+    @property
+    def switches_accepted(self) -> bool:
+        """Whether the head took the settings of the command it answers."""
+        return bool(self.status & SWITCHES_ACCEPTED)
+
+    @property
+    def overrun(self) -> bool:
+        """Whether the head lost characters of the command."""
+        return bool(self.status & OVERRUN)
+
+    @property
+    def range_resolution(self) -> float:
+        """Length of one range bin in metres; 0 when there are no echoes."""
+        return self.max_range / len(self.echoes) if self.echoes else 0.0
+
+    def encode(self) -> bytes:
+        """Return the bytes of the reply as the head sends them."""
+        position_high = (self.head_position >> 8) << 1 | (self.head_position >> 7) & 1
+        direction = _CLOCKWISE_BIT if self.clockwise else 0
+        header = bytes(
+            [
+                *self.kind.value,
+                self.head_id,
+                self.status,
+                self.head_position & 0x7F,
+                direction | position_high,
+                self.max_range,
+                *_packed(self.profile_range_cm),
+                *_packed(len(self.echoes)),
+            ]
+        )
+        return header + bytes(self.echoes) + bytes([TERMINATOR])
+
+    @classmethod
+    def decode(cls, frame: bytes) -> "Reply":
+        """Read one whole reply; raise FrameError when it is not exactly that."""
+        kind = check_header(frame)
+        require("length of the reply", len(frame), (kind.length,))
+        require("terminator of the reply", frame[-1], (TERMINATOR,))
+        low, high = frame[5], frame[6]
+        return cls(
+            kind=kind,
+            head_id=frame[3],
+            status=frame[4],
+            head_position=(high & 0x3E) >> 1 << 8 | (high & 1) << 7 | low & 0x7F,
+            clockwise=bool(high & _CLOCKWISE_BIT),
+            max_range=frame[7],
+            profile_range_cm=_unpacked(frame[8], frame[9]),
+            echoes=bytes(frame[HEADER_LENGTH:-1]),
+        )
+
+
+def check_header(data: bytes) -> ReplyKind:
+    """Return the kind of reply that the first 12 bytes of `data` announce.
+
+    Raises FrameError when they contradict themselves, so that chance bytes practically never pass: letters,
+    head identification, range and data count must all hold.
+    """
+    require("length of the reply header", len(data) >= HEADER_LENGTH, (True,))
+    require("letters of the reply", bytes(data[:3]), tuple(kind.value for kind in ReplyKind))
+    kind = ReplyKind(bytes(data[:3]))
+    require("head_id", data[3], HEAD_IDS)
+    require("max_range", data[7], RANGES)
+    require(f"data count of an {kind.name}", _unpacked(data[10], data[11]), (kind.echo_count,))
+    return kind
+
+
+def _packed(value: int) -> bytes:
+    """Split 14 bits into two bytes of which the low one has 7 bits, so that no bit 7 is ever set."""
+    return bytes([value & 0x7F, (value >> 8) << 1 | (value >> 7) & 1])
+
+
+def _unpacked(low: int, high: int) -> int:
+    return (high & 0x7E) >> 1 << 8 | (high & 1) << 7 | low & 0x7F

@@ -1,0 +1,141 @@
+"""Finds replies in a stream of bytes, however it is cut up and whatever lies between them."""
+
+import re
+from dataclasses import dataclass
+from typing import List, NamedTuple, Optional
+
+from imagenex_852_driver.protocol.errors import HEAD_IDS, FrameError
+from imagenex_852_driver.protocol.reply import HEADER_LENGTH, Reply, ReplyKind, check_header
+
+_LETTERS = re.compile(b"I[MGP]X")
+_UNFINISHED_LETTERS = re.compile(b"I[MGP]?\\Z")
+_STATUS = 4
+
+
+class ParsedReply(NamedTuple):
+    """A reply and the position of its first byte in the stream, counted from the last `reset`."""
+
+    offset: int
+    reply: Reply
+
+
+@dataclass(frozen=True)
+class ParserCounts:
+    """What the parser met so far: whole replies, broken ones and bytes that belonged to no reply."""
+
+    replies: int = 0
+    corrupt: int = 0
+    incomplete: int = 0
+    skipped_bytes: int = 0
+
+
+class ReplyParser:
+    """Incremental parser of replies.
+
+    *Corrupt* is a reply of which all bytes came and do not hold together; *incomplete* one that ended early:
+    the next one began inside it, or `reset` was called. Every skipped byte is looked at again, so a whole
+    reply is never lost to the garbage before it. The price: a reply whose echoes spell a whole reply header
+    counts as incomplete.
+    """
+
+    def __init__(self) -> None:
+        self._buffer = bytearray()
+        self._offset = 0
+        self._replies = 0
+        self._corrupt = 0
+        self._incomplete = 0
+        self._skipped_bytes = 0
+
+    @property
+    def counts(self) -> ParserCounts:
+        """The counts so far, not touched by `reset`."""
+        return ParserCounts(self._replies, self._corrupt, self._incomplete, self._skipped_bytes)
+
+    @property
+    def pending(self) -> bool:
+        """Whether the bytes held back may be the beginning of a reply."""
+        return bool(self._buffer)
+
+    def feed(self, data: bytes) -> List[ParsedReply]:
+        """Take the next bytes of the stream and return the replies they complete; never raises."""
+        self._buffer += data
+        found = []
+        while self._skip_to_letters():
+            kind = self._announced()
+            if kind is None:
+                self._corrupt += 1
+                self._skip(1)
+                continue
+            inner = self._inner_header(kind.length)
+            if inner is not None:
+                self._incomplete += 1
+                self._skip(inner)
+            elif len(self._buffer) < kind.length:
+                break
+            else:
+                found.extend(self._take(kind))
+        return found
+
+    def reset(self) -> None:
+        """Give up waiting for the rest of a reply and count positions from zero again."""
+        if _LETTERS.match(self._buffer):
+            self._incomplete += 1
+        self._skip(len(self._buffer))
+        self._offset = 0
+
+    def _announced(self) -> Optional[ReplyKind]:
+        """Return the kind of the reply at the front, None when its header is corrupt."""
+        if len(self._buffer) >= HEADER_LENGTH and not _is_header(self._buffer):
+            return None
+        return ReplyKind(bytes(self._buffer[:3]))
+
+    def _take(self, kind: ReplyKind) -> List[ParsedReply]:
+        try:
+            parsed = ParsedReply(self._offset, Reply.decode(bytes(self._buffer[: kind.length])))
+        except FrameError:
+            self._corrupt += 1
+            self._skip(1)
+            return []
+        self._replies += 1
+        self._drop(kind.length)
+        return [parsed]
+
+    def _inner_header(self, length: int) -> Optional[int]:
+        """Return where another reply begins inside the one at the front: its own end was lost then."""
+        for match in _LETTERS.finditer(self._buffer, 1, length):
+            header = self._buffer[match.start() : min(match.start() + HEADER_LENGTH, length)]
+            if _is_header(header) or self._is_cut_header(header, length):
+                return match.start()
+        return None
+
+    def _is_cut_header(self, header: bytes, length: int) -> bool:
+        """Tell whether the last bytes of a whole reply look like a header that goes on behind it.
+
+        The status byte of the next reply can pass for the terminator of this one.
+        """
+        return len(self._buffer) >= length and _STATUS < len(header) < HEADER_LENGTH and header[3] in HEAD_IDS
+
+    def _skip_to_letters(self) -> bool:
+        match = _LETTERS.search(self._buffer)
+        if match:
+            self._skip(match.start())
+            return True
+        unfinished = _UNFINISHED_LETTERS.search(self._buffer)
+        self._skip(unfinished.start() if unfinished else len(self._buffer))
+        return False
+
+    def _skip(self, count: int) -> None:
+        self._skipped_bytes += count
+        self._drop(count)
+
+    def _drop(self, count: int) -> None:
+        del self._buffer[:count]
+        self._offset += count
+
+
+def _is_header(data: bytes) -> bool:
+    try:
+        check_header(data)
+    except FrameError:
+        return False
+    return True

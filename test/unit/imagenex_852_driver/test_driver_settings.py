@@ -1,0 +1,95 @@
+import pytest
+from driver_strategies import REPEATABLE
+from hypothesis import given
+from hypothesis import strategies as st
+
+from imagenex_852_driver.settings import Direction, HeadSettings
+from node_support.parameters import ParameterError
+
+
+def test_the_defaults_are_a_full_turn_in_steps_of_three_degrees():
+    command = HeadSettings().command()
+    assert (command.sector_width_deg, command.step_size_deg, command.train_angle_deg) == (360, 3, 0)
+
+
+def test_every_setting_reaches_the_command():
+    settings = HeadSettings(
+        max_range=50,
+        direction=Direction.COUNTERCLOCKWISE,
+        start_gain_db=12,
+        absorption_db_per_m=0.35,
+        train_angle_deg=90,
+        sector_width_deg=60,
+        step_size_deg=6,
+        pulse_length_us=42,
+        data_points=250,
+        switch_delay_ms=8,
+        frequency_khz=850,
+        head_id=0x11,
+    )
+    expected = "fe441132004000000c00236414022a0000000019000000000401fd"
+    assert settings.command().encode() == bytes.fromhex(expected)
+
+
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [
+        ("max_range", 15),
+        ("start_gain_db", 41),
+        ("train_angle_deg", 10),
+        ("sector_width_deg", 100),
+        ("step_size_deg", 2),
+        ("data_points", 300),
+        ("switch_delay_ms", 3),
+        ("frequency_khz", 700),
+        ("pulse_length_us", 0),
+        ("absorption_db_per_m", 2.6),
+        ("direction", "left"),
+        ("head_id", 0x16),
+    ],
+)
+def test_a_value_that_is_not_allowed_is_named(name, value):
+    with pytest.raises(ParameterError, match=f"{name} = "):
+        HeadSettings.from_mapping({name: value})
+
+
+@pytest.mark.parametrize(
+    ("name", "value"), [("pulse_length_us", 253), ("switch_delay_ms", 506), ("absorption_db_per_m", 2.53)]
+)
+def test_a_value_that_would_end_the_command_is_named(name, value):
+    with pytest.raises(ParameterError, match=f"{name} = {value}.*253"):
+        HeadSettings(**{name: value})
+
+
+def test_a_sector_beyond_the_stops_of_the_head_is_refused():
+    with pytest.raises(ParameterError, match=r"train_angle_deg = 60 .*240 deg"):
+        HeadSettings(train_angle_deg=60, sector_width_deg=360)
+
+
+def test_a_sector_that_ends_at_the_stop_is_accepted():
+    assert HeadSettings(train_angle_deg=-30, sector_width_deg=360).train_angle_deg == -30
+
+
+def test_a_sector_narrower_than_a_step_is_refused():
+    with pytest.raises(ParameterError, match="narrower"):
+        HeadSettings(sector_width_deg=3, step_size_deg=6)
+
+
+@REPEATABLE
+@given(
+    st.integers(0, 255), st.floats(0, 2.55), st.integers(0, 510), st.integers(-210, 210), st.integers(0, 360)
+)
+def test_settings_that_exist_never_put_the_terminator_inside_a_command(
+    pulse, absorption, delay, train, sector
+):
+    try:
+        settings = HeadSettings(
+            pulse_length_us=pulse,
+            absorption_db_per_m=absorption,
+            switch_delay_ms=delay,
+            train_angle_deg=train,
+            sector_width_deg=sector,
+        )
+    except ParameterError:
+        return
+    assert settings.command().encode().index(0xFD) == 26
