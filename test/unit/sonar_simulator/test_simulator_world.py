@@ -1,0 +1,53 @@
+import numpy as np
+import pytest
+
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.world import Shape, World
+
+FLOOR = Shape("floor", "box", pose_matrix((0, 0, -6)), (122.0, 52.0, 1.0))
+WALL = Shape("wall", "box", pose_matrix((60.5, 0, -2.5)), (1.0, 52.0, 6.0))
+
+
+def test_the_outline_of_a_wall_is_its_closed_rectangle():
+    (outline,) = World.from_shapes("w", [WALL]).outlines()
+    assert outline.shape == (5, 2)
+    np.testing.assert_array_equal(outline[0], outline[-1])
+    assert {tuple(corner) for corner in outline} == {(60, -26), (60, 26), (61, -26), (61, 26)}
+
+
+def test_the_outline_of_a_buoy_is_a_circle():
+    (outline,) = World.from_shapes(
+        "w", [Shape("b", "cylinder", pose_matrix((3, 4, 0)), (0.5, 5.0))]
+    ).outlines()
+    np.testing.assert_allclose(np.hypot(outline[:, 0] - 3, outline[:, 1] - 4), 0.5)
+
+
+def test_a_lying_pipe_is_as_long_as_it_is_from_above():
+    pipe = Shape("p", "cylinder", pose_matrix((0, 0, 0), (0, np.pi / 2, 0)), (0.25, 8.0))
+    (outline,) = World.from_shapes("w", [pipe]).outlines()
+    np.testing.assert_allclose(np.ptp(outline, axis=0), (8.0, 0.5))
+
+
+def test_the_floor_has_no_outline():
+    assert World.from_shapes("w", [FLOOR]).outlines() == []
+
+
+def test_joined_faces_point_to_the_vertices_of_their_own_shape():
+    world = World.from_shapes("w", [FLOOR, WALL])
+    last = world.vertices[world.faces[len(world.faces) // 2 :]]
+    assert last[..., 0].min() == 60.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "size", "volume"),
+    [
+        ("box", (2.0, 3.0, 4.0), 24.0),
+        ("cylinder", (0.5, 4.0), np.pi),
+        ("sphere", (1.0,), 4.0 * np.pi / 3.0),
+    ],
+)
+def test_a_primitive_is_closed_and_holds_its_volume(kind, size, volume):
+    vertices, faces = Shape("s", kind, pose_matrix((1, 2, 3), (0.1, 0.2, 0.3)), size).triangles()
+    a, b, c = (vertices[faces[:, corner]] - (1, 2, 3) for corner in range(3))
+    # A closed surface seen from inside: the cones over its faces fill it, whichever way the faces are wound.
+    assert np.abs(np.einsum("ij,ij->i", a, np.cross(b, c))).sum() / 6.0 == pytest.approx(volume, rel=0.01)
