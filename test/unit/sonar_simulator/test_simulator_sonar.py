@@ -1,0 +1,130 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonar_simulator.beam_pattern import BeamPattern
+from sonar_simulator.echo_model import make_echo_model
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.ray_caster import RayCaster
+from sonar_simulator.sdf import load_sdf
+from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_simulator.world import Shape, World
+
+PATTERN = BeamPattern(math.radians(22.0), math.radians(2.5), 50, 10)
+HEAD = SonarHead(120, 16.0)
+TURN = np.array([HEAD.angle(beam) for beam in range(120)])
+BASIN = load_sdf(Path(__file__).resolve().parents[3] / "worlds" / "basin.sdf").world
+WALLS = World.from_shapes("walls", [shape for shape in BASIN.shapes if "wall" in shape.name])
+
+
+def _sonar(world, seed=0, pattern=PATTERN, **values):
+    return Sonar(
+        RayCaster(world), pattern, make_echo_model("laser_cone", values), np.random.default_rng(seed)
+    )
+
+
+def _repeated(pose, count=120):
+    return np.repeat(pose[np.newaxis], count, axis=0)
+
+
+def test_rays_stay_inside_the_opening():
+    rays = PATTERN.directions(np.zeros(20), np.random.default_rng(0))
+    assert rays.shape == (20, 500, 3)
+    np.testing.assert_allclose(np.linalg.norm(rays, axis=-1), 1.0)
+    assert np.abs(np.arcsin(rays[..., 2])).max() <= math.radians(11.0) + 1e-12
+    assert np.abs(np.arctan2(rays[..., 1], rays[..., 0])).max() <= math.radians(1.25) + 1e-12
+
+
+def test_every_stratum_holds_one_ray():
+    rays = PATTERN.directions(np.zeros(1), np.random.default_rng(0))[0]
+    row = np.floor((np.degrees(np.arcsin(rays[:, 2])) / 22.0 + 0.5) * 50)
+    column = np.floor((np.degrees(np.arctan2(rays[:, 1], rays[:, 0])) / 2.5 + 0.5) * 10)
+    assert len(set(zip(row, column))) == 500
+
+
+def test_every_beam_has_a_jitter_of_its_own():
+    first, second = PATTERN.directions(np.zeros(2), np.random.default_rng(0))
+    assert not (first[:, 2] == second[:, 2]).any()
+
+
+def test_rays_turn_counter_clockwise_with_the_head():
+    (rays,) = PATTERN.directions(np.array([math.pi / 2]), np.random.default_rng(0))
+    np.testing.assert_allclose(rays.mean(axis=0)[:2], (0.0, 1.0), atol=0.01)
+
+
+def test_the_head_starts_ahead_and_steps_3_degrees_counter_clockwise():
+    assert [math.degrees(HEAD.angle(beam)) for beam in (0, 1, 119, 120)] == pytest.approx([0, 3, -3, 0])
+
+
+def test_head_angles_are_above_minus_pi_and_up_to_pi():
+    assert TURN.min() > -math.pi
+    assert TURN.max() == TURN[60] == math.pi
+
+
+def test_a_turn_takes_16_s():
+    assert [HEAD.time(beam) for beam in (0, 1, 120)] == pytest.approx([0.0, 16.0 / 120, 16.0])
+
+
+def test_the_first_echo_of_every_beam_is_the_nearest_wall():
+    sonar = _sonar(WALLS, spread=0.0, noise_echoes=0)
+    place = np.array([30.0, 5.0, -2.0])
+    first = np.argmax(sonar.pings(_repeated(pose_matrix(place)), TURN) > 0, axis=1)
+    earliest = [_wall_bin(place, angle, math.radians(1.25)) for angle in TURN]
+    # The outermost column of rays lies somewhere in the last 0.25 degrees of the opening.
+    latest = [_wall_bin(place, angle, math.radians(1.0)) + 1 for angle in TURN]
+    in_range = np.array(latest) < 500
+    assert in_range.sum() > 80
+    assert np.all((first >= earliest) & (first <= latest) | ~in_range)
+
+
+def _wall_bin(place, angle, half_width):
+    """Return the bin of the wall point nearest to `place` within +-half_width of the head's angle."""
+    bearings = angle + np.linspace(-half_width, half_width, 2001)
+    with np.errstate(divide="ignore"):
+        along_x = np.where(np.cos(bearings) > 0, 60.0 - place[0], 60.0 + place[0]) / np.abs(np.cos(bearings))
+        along_y = np.where(np.sin(bearings) > 0, 25.0 - place[1], 25.0 + place[1]) / np.abs(np.sin(bearings))
+    return math.ceil(np.minimum(along_x, along_y).min() * 10.0) - 1
+
+
+def test_the_first_echo_of_the_floor_is_where_the_beams_lower_edge_meets_it():
+    floor = World.from_shapes("floor", [shape for shape in BASIN.shapes if "floor" in shape.name])
+    sonar = _sonar(floor, pattern=BeamPattern(math.radians(22.0), 0.04, 500, 10), spread=0.0, noise_echoes=0)
+    first = np.argmax(sonar.pings(_repeated(pose_matrix((0, 0, -2))), TURN) > 0, axis=1)
+    expected = 3.5 / math.sin(math.radians(11.0)) * 10.0
+    assert np.all((first >= math.ceil(expected) - 1) & (first <= expected + 1.0))
+
+
+def test_a_tilted_sonar_looks_along_its_own_plane():
+    world = World.from_shapes("w", [Shape("b", "box", pose_matrix((0, 0, -10)), (50.0, 50.0, 1.0))])
+    sonar = _sonar(world, spread=0.0, noise_echoes=0)
+    down = pose_matrix((0, 0, 0), (0.0, math.pi / 2, 0.0))
+    assert np.argmax(sonar.ping(down, 0.0) > 0) == pytest.approx(95, abs=1)
+    assert not sonar.ping(pose_matrix((0, 0, 0)), 0.0).any()
+
+
+def test_every_wall_within_range_of_a_scan_is_seen_without_a_hole():
+    strengths = _sonar(BASIN).pings(_repeated(pose_matrix((0, 0, -2))), TURN)
+    facing = np.abs(np.sin(TURN)) > 25.0 / 45.0
+    for beam in np.flatnonzero(facing):
+        wall = int(250.0 / abs(math.sin(TURN[beam])))
+        assert strengths[beam, wall - 15 : wall + 15].max() > 90
+
+
+def test_the_same_seed_gives_the_same_bytes():
+    poses = _repeated(pose_matrix((0, 0, -2)))
+    assert _sonar(BASIN, 3).pings(poses, TURN).tobytes() == _sonar(BASIN, 3).pings(poses, TURN).tobytes()
+
+
+def test_a_single_ping_is_a_batch_of_one():
+    pose = pose_matrix((0, 0, -2))
+    np.testing.assert_array_equal(
+        _sonar(BASIN).ping(pose, 0.3), _sonar(BASIN).pings(pose[np.newaxis], np.array([0.3]))[0]
+    )
+
+
+def test_parameters_give_pattern_and_range_resolution():
+    assert SonarParameters().pattern() == PATTERN
+    assert _sonar(WALLS).range_resolution == 0.1
+    assert _sonar(WALLS).max_range == 50.0
