@@ -1,0 +1,74 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonar_simulator.odometry import Odometry, OdometryParameters
+from sonar_simulator.script_file import load_script
+from sonar_simulator.sdf import load_sdf
+from sonar_simulator.vehicle import ScriptError
+
+ROOT = Path(__file__).resolve().parents[3]
+TOUR = load_script(ROOT / "yaml" / "basin_tour.yaml")
+THESIS = load_script(ROOT / "yaml" / "thesis_moves.yaml")
+
+
+def _whole_still_turns(script):
+    """Return the numbers of the head's 16 s turns in which the vehicle never moves."""
+    turns = range(int(script.duration // 16.0))
+    return [
+        turn for turn in turns if all(script.is_still(time) for time in 16.0 * turn + np.linspace(0, 16, 121))
+    ]
+
+
+def test_the_tour_holds_twelve_still_scans():
+    assert _whole_still_turns(TOUR) == [3 * scan for scan in range(12)]
+
+
+def test_the_tour_keeps_2_m_away_from_everything_at_its_depth():
+    times = np.arange(0.0, TOUR.duration, 0.2)
+    path = np.array([TOUR.pose(time)[:2, 3] for time in times])
+    for outline in load_sdf(ROOT / "worlds" / "basin.sdf").world.outlines():
+        assert min(_distance_to_polyline(point, outline) for point in path) > 2.0
+
+
+def _distance_to_polyline(point, outline):
+    start, along = outline[:-1], np.diff(outline, axis=0)
+    share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
+    return np.linalg.norm(start + share[:, np.newaxis] * along - point, axis=1).min()
+
+
+def test_the_tour_brings_every_part_of_every_wall_within_40_m_of_a_still_scan():
+    stops = np.array([TOUR.pose(48.0 * scan)[:2, 3] for scan in range(12)])
+    around = np.arange(-60.0, 60.1, 1.0)
+    across = np.arange(-25.0, 25.1, 1.0)
+    walls = [(x, y) for x in around for y in (-25, 25)] + [(x, y) for y in across for x in (-60, 60)]
+    assert max(np.linalg.norm(stops - wall, axis=1).min() for wall in walls) < 40.0
+
+
+def test_the_thesis_moves_are_4_3_and_minus_8_m_of_odometry():
+    assert _whole_still_turns(THESIS) == [0, 2, 4, 6]
+    odometry = Odometry(OdometryParameters(scale_error=0.3), THESIS.pose(0.0))
+    stops = [odometry.pose(THESIS.pose(32.0 * scan))[:2, 3] for scan in range(4)]
+    np.testing.assert_allclose(stops, [(0, 0), (4, 0), (4, 3), (-4, 3)], atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("moves: [", "not yaml"),
+        ("- wait: 1", "must hold the keys start and moves"),
+        ("moves: [{wait: 1}]\nspeed: 2", "must hold the keys start and moves"),
+        ("moves: [{wait: x}]", "entry 1: wait = 'x'"),
+    ],
+)
+def test_a_bad_file_is_refused_with_its_path(tmp_path, text, reason):
+    path = tmp_path / "odd.yaml"
+    path.write_text(text)
+    with pytest.raises(ScriptError, match=rf"odd\.yaml: .*{reason}"):
+        load_script(path)
+
+
+def test_a_missing_file_is_refused_with_its_path(tmp_path):
+    with pytest.raises(ScriptError, match=r"none\.yaml: No such file"):
+        load_script(tmp_path / "none.yaml")
