@@ -1,0 +1,33 @@
+"""How long a ping takes on the wire and in the water; driver and emulated head must agree on it."""
+
+from dataclasses import dataclass
+
+from imagenex_852_driver.protocol import SwitchCommand
+from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
+
+_BITS_PER_BYTE = 10
+
+
+@dataclass(frozen=True)
+class LineTiming:
+    """Baud rate (8N1) and speed of sound; all results are seconds after the command's first bit."""
+
+    baud_rate: int = 115200
+    speed_of_sound: float = 1500.0
+
+    def transmission(self, byte_count: int) -> float:
+        """Return the time that `byte_count` bytes take on the line."""
+        return byte_count * _BITS_PER_BYTE / self.baud_rate
+
+    def ping_leaves(self) -> float:
+        """Return when the head transmits: it acts on the last byte of the command."""
+        return self.transmission(COMMAND_LENGTH)
+
+    def reply_begins(self, command: SwitchCommand) -> float:
+        """Return when the reply can leave the head: after the farthest echo and the switch delay."""
+        travel = 2 * command.max_range / self.speed_of_sound
+        return self.ping_leaves() + travel + command.switch_delay_ms / 1000
+
+    def reply_ends(self, command: SwitchCommand) -> float:
+        """Return when the last byte of the reply can have come."""
+        return self.reply_begins(command) + self.transmission(command.reply_kind.length)

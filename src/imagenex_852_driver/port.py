@@ -1,0 +1,83 @@
+"""Opening a serial port and saying in one line what is wrong with it."""
+
+import errno
+import grp
+import os
+import termios
+from contextlib import contextmanager
+from typing import Iterator
+
+import serial
+
+# A read returns after this time at the latest, so that a stop is noticed.
+READ_TIMEOUT = 0.05
+WRITE_TIMEOUT = 0.5
+
+_REMOTE = ("socket://", "rfc2217://", "loop://")
+_USUAL_GROUP = "dialout"
+
+
+class PortError(Exception):
+    """The port cannot be used; the text is one line for the user."""
+
+
+class PortUnavailableError(PortError):
+    """The port is not there or was lost; it may come back."""
+
+
+class PortBusyError(PortError):
+    """Another program holds the port."""
+
+
+class PortPermissionError(PortError):
+    """The user may not open the port."""
+
+
+class PortNameError(PortError):
+    """Nothing can be opened by that name, now or later."""
+
+
+def open_port(name: str, baud_rate: int) -> serial.SerialBase:
+    """Open a device or pyserial URL, 8N1; a local device exclusively.
+
+    Raises PortUnavailableError, PortBusyError, PortPermissionError or PortNameError.
+    """
+    local = not name.startswith(_REMOTE)
+    # pyserial's remote ports refuse a write timeout.
+    options = {"exclusive": True, "write_timeout": WRITE_TIMEOUT} if local else {}
+    try:
+        return serial.serial_for_url(name, baudrate=baud_rate, timeout=READ_TIMEOUT, **options)
+    except (OSError, termios.error) as error:
+        raise _explained(name, error) from error
+    except ValueError as error:
+        raise PortNameError(f"port {name}: {error}") from error
+
+
+@contextmanager
+def port_losses(name: str) -> Iterator[None]:
+    """Turn every way in which pyserial reports a lost port into PortUnavailableError."""
+    try:
+        yield
+    except (OSError, termios.error) as error:
+        raise PortUnavailableError(f"port {name} is lost: {error}") from error
+
+
+def _explained(name: str, error: Exception) -> PortError:
+    number = getattr(error, "errno", None)
+    if number in (errno.EWOULDBLOCK, errno.EBUSY):
+        return PortBusyError(f"port {name} is in use by another program: is a second driver running?")
+    if number in (errno.EACCES, errno.EPERM):
+        group = _group_of(name)
+        return PortPermissionError(
+            f"no permission to open port {name}: join the group {group} "
+            f"(sudo adduser $USER {group}) and log in again"
+        )
+    return PortUnavailableError(f"port {name} cannot be opened: {error}")
+
+
+def _group_of(name: str) -> str:
+    try:
+        group = grp.getgrgid(os.stat(name).st_gid).gr_name
+    except (OSError, KeyError):
+        return _USUAL_GROUP
+    return group if group != "root" else _USUAL_GROUP

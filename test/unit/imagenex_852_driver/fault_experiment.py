@@ -1,0 +1,111 @@
+"""Drives an emulated head with every fault at a given rate and settles the accounts.
+
+Command line: python3 fault_experiment.py [replies wanted] [rate of each fault]
+"""
+
+import sys
+import tempfile
+import threading
+import time
+from dataclasses import dataclass
+from typing import List
+
+from imagenex_852_driver.connection import ConnectionParameters
+from imagenex_852_driver.device import SonarDevice
+from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FaultRates, PtyServer
+from imagenex_852_driver.scanner import Scanner
+from imagenex_852_driver.settings import HeadSettings
+from imagenex_852_driver.stats import DeviceStats
+
+GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
+WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
+# Ten times the speed of wire and water.
+FAST_LINE = {"baud_rate": 1152000, "speed_of_sound": 15000.0}
+
+
+class NumberedEchoes(EchoSource):
+    """Writes the number of the ping into the first echoes."""
+
+    def __init__(self):
+        self.count = 0
+
+    def echoes(self, ping):
+        self.count += 1
+        return (self.count - 1).to_bytes(4, "big") + bytes(ping.bin_count - 4)
+
+
+class RecordingInjector(FaultInjector):
+    """Remembers the fault of every ping, and stops the driver after a number of commands."""
+
+    def __init__(self, rates, seed, commands, stop):
+        super().__init__(rates, seed)
+        self.of_pings: List[Fault] = []
+        self._left = commands
+        self._stop = stop
+
+    def next(self):
+        self._left -= 1
+        if self._left < 0:
+            self._stop.set()
+            self.counts[Fault.DROPPED] += 1
+            self.of_pings.append(Fault.DROPPED)
+            return Fault.DROPPED
+        fault = super().next()
+        if fault not in WITHOUT_PING:
+            self.of_pings.append(fault)
+        return fault
+
+
+@dataclass(frozen=True)
+class Account:
+    """What the head did and what the driver made of it."""
+
+    expected: List[int]
+    delivered: List[int]
+    faults: dict
+    stats: DeviceStats
+    seconds: float
+
+
+def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -> Account:
+    """Let the head see `commands` commands outside of silences; return the account."""
+    stop = threading.Event()
+    lasting = {"lateness": 1.5 * reply_margin, "silence_duration": 0.2, "absence_duration": 0.05}
+    names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
+    rates = FaultRates(**dict.fromkeys(names, rate), **lasting)
+    faults = RecordingInjector(rates, seed, commands, stop)
+    delivered: List[int] = []
+    with tempfile.TemporaryDirectory() as directory:
+        connection = ConnectionParameters(
+            port=f"{directory}/sonar",
+            reply_margin=reply_margin,
+            late_window=reply_margin,
+            byte_gap=reply_margin / 2,
+            back_off_first=0.05,
+            **FAST_LINE,
+        )
+        head = EmulatedHead(NumberedEchoes(), faults, connection.timing())
+        device = SonarDevice(connection, stop)
+        scanner = Scanner(
+            device,
+            HeadSettings(max_range=50),
+            lambda ping: delivered.append(int.from_bytes(ping.reply.echoes[:4], "big")),
+        )
+        begin = time.monotonic()
+        with PtyServer(head, connection.port):
+            scanner.connect()
+            scanner.run()
+        seconds = time.monotonic() - begin
+    expected = [number for number, fault in enumerate(faults.of_pings) if fault in GOOD]
+    return Account(expected, delivered, dict(faults.counts), device.stats, seconds)
+
+
+if __name__ == "__main__":
+    account = run(
+        int(sys.argv[1]) if len(sys.argv) > 1 else 10000, float(sys.argv[2]) if len(sys.argv) > 2 else 0.05
+    )
+    print({fault.value: count for fault, count in account.faults.items()})
+    print(account.stats)
+    print(f"{len(account.expected)} good replies sent, {len(account.delivered)} delivered,", end=" ")
+    print("the same in order" if account.expected == account.delivered else "NOT the same", end=", ")
+    print(f"{account.seconds:.0f} s")

@@ -1,0 +1,171 @@
+import threading
+import time
+
+import pytest
+from driver_line import served
+
+from imagenex_852_driver.connection import ConnectionParameters
+from imagenex_852_driver.device import SonarDevice
+from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates
+from imagenex_852_driver.port import PortUnavailableError
+from imagenex_852_driver.protocol import ReplyKind, SwitchCommand
+
+COMMAND = SwitchCommand(max_range=50)
+
+
+class FixedStatusHead(EmulatedHead):
+    """Answers every command with one reply, whatever was asked."""
+
+    def __init__(self, reply):
+        super().__init__()
+        self._reply = reply
+
+    def _ping(self, command, time, overrun):
+        return self._reply
+
+
+@pytest.fixture
+def line(tmp_path):
+    faults = FaultInjector(FaultRates(lateness=0.3, silence_duration=0.3))
+    timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
+    with served(tmp_path, EmulatedHead(faults=faults, timing=timing)) as (_, connection):
+        device = SonarDevice(connection, clock=lambda: 1000.0)
+        device.open()
+        yield device, faults
+        device.close()
+
+
+def test_a_ping_brings_the_reply_to_its_command(line):
+    ping = line[0].ping(COMMAND)
+    assert (ping.command, ping.reply.kind, ping.reply.max_range) == (COMMAND, ReplyKind.IGX, 50)
+    assert line[0].stats.replies == 1
+
+
+def test_the_stamp_is_when_the_last_byte_of_the_command_left(line):
+    assert line[0].ping(COMMAND).stamp == pytest.approx(1000.0 + 27 * 10 / 1152000)
+
+
+def test_the_next_command_may_ask_for_something_else(line):
+    line[0].ping(COMMAND)
+    assert line[0].ping(SwitchCommand(max_range=20, data_points=250)).reply.kind is ReplyKind.IMX
+
+
+@pytest.mark.parametrize("fault", [Fault.DROPPED, Fault.LATE, Fault.SILENCE])
+def test_a_reply_that_does_not_come_in_time_is_a_timeout(line, fault):
+    device, faults = line
+    faults.order(fault)
+    assert device.ping(COMMAND) is None
+    assert (device.stats.timeouts, device.stats.bad_frames) == (1, 0)
+
+
+def test_a_timeout_is_the_last_error(line):
+    device, faults = line
+    faults.order(Fault.DROPPED)
+    device.ping(COMMAND)
+    assert "no reply within" in device.stats.last_error
+
+
+@pytest.mark.parametrize("fault", [Fault.GARBLED, Fault.TRUNCATED])
+def test_a_spoilt_reply_is_a_bad_frame(line, fault):
+    device, faults = line
+    faults.order(fault)
+    assert device.ping(COMMAND) is None
+    assert (device.stats.timeouts, device.stats.bad_frames) == (0, 1)
+    assert "bad reply" in device.stats.last_error
+
+
+@pytest.mark.parametrize("fault", [Fault.DROPPED, Fault.LATE, Fault.GARBLED, Fault.TRUNCATED, Fault.DOUBLED])
+def test_the_ping_after_a_fault_gets_its_own_reply(line, fault):
+    device, faults = line
+    faults.order(fault)
+    device.ping(COMMAND)
+    # Every ping steps by 20 positions, so the position tells which ping was answered.
+    assert device.ping(COMMAND).reply.head_position == 1420
+
+
+@pytest.mark.parametrize("fault", [Fault.LATE, Fault.DOUBLED])
+def test_a_reply_that_nobody_waits_for_is_counted(line, fault):
+    device, faults = line
+    faults.order(fault)
+    device.ping(COMMAND)
+    device.ping(COMMAND)
+    assert device.stats.unexpected_replies == 1
+
+
+def test_an_overrun_is_counted_and_its_reply_delivered(line):
+    device, faults = line
+    faults.order(Fault.OVERRUN)
+    assert device.ping(COMMAND).reply.overrun
+    assert device.stats.overruns == 1
+
+
+@pytest.mark.parametrize(
+    ("asked", "complaint"),
+    [
+        (SwitchCommand(max_range=20), "range 50 instead of 20"),
+        (SwitchCommand(max_range=50, head_id=0x12), "head identification 16 instead of 18"),
+    ],
+)
+def test_an_answer_to_another_question_is_a_bad_frame(tmp_path, asked, complaint):
+    with served(tmp_path) as (_, connection):
+        reply = _any_reply(connection)
+    head = FixedStatusHead(reply)
+    head._head_id = asked.head_id
+    with served(tmp_path, head) as (_, connection):
+        device = SonarDevice(connection)
+        device.open()
+        assert device.ping(asked) is None
+        device.close()
+    assert complaint in device.stats.last_error
+
+
+def _any_reply(connection):
+    device = SonarDevice(connection)
+    device.open()
+    reply = device.ping(COMMAND).reply
+    device.close()
+    return reply
+
+
+def test_every_ping_ends_in_exactly_one_count(line):
+    device, faults = line
+    for fault in (Fault.DROPPED, Fault.GARBLED, Fault.DOUBLED, Fault.NONE):
+        faults.order(fault)
+    for _ in range(4):
+        device.ping(COMMAND)
+    stats = device.stats
+    assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.interrupted == 4
+
+
+def test_a_stop_interrupts_a_ping_at_once(line):
+    device, faults = line
+    faults.order(Fault.SILENCE)
+    threading.Timer(0.05, device.stop.set).start()
+    begin = time.monotonic()
+    assert device.ping(SwitchCommand(max_range=50, switch_delay_ms=510)) is None
+    assert time.monotonic() - begin < 0.3
+    assert device.stats.interrupted == 1
+
+
+def test_a_port_that_goes_away_is_reported_and_closed(tmp_path):
+    with served(tmp_path) as (server, connection):
+        device = SonarDevice(connection)
+        device.open()
+        server.disappear()
+        with pytest.raises(PortUnavailableError, match=r"sonar is lost"):
+            device.ping(COMMAND)
+    assert not device.stats.connected
+
+
+def test_pinging_without_a_port_is_refused(tmp_path):
+    device = SonarDevice(ConnectionParameters(port=str(tmp_path / "none")))
+    with pytest.raises(PortUnavailableError, match="not open"):
+        device.ping(COMMAND)
+
+
+def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
+    device = SonarDevice(ConnectionParameters(port="loop://", reply_margin=0.05, byte_gap=0.02))
+    device.open()
+    assert device.ping(SwitchCommand(max_range=5)) is None
+    assert device.stats.replies == 0
+    device.close()

@@ -1,0 +1,117 @@
+import time
+
+import pytest
+from driver_line import Run, served
+from fault_experiment import run
+
+from imagenex_852_driver.device import SonarDevice
+from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates
+from imagenex_852_driver.port import PortBusyError
+from imagenex_852_driver.scanner import Scanner
+from imagenex_852_driver.settings import Direction, HeadSettings
+
+
+def positions(pings):
+    return [ping.reply.head_position for ping in pings]
+
+
+def test_pings_are_delivered_one_after_the_other(tmp_path):
+    with served(tmp_path) as (_, connection), Run(connection) as scan:
+        assert scan.wait_for_more(5)
+    assert positions(scan.pings)[:5] == [1400, 1420, 1440, 1460, 1480]
+
+
+def test_new_settings_take_effect_at_the_next_ping(tmp_path):
+    with served(tmp_path) as (_, connection), Run(connection) as scan:
+        assert scan.wait_for_more(2)
+        scan.scanner.settings = HeadSettings(max_range=20, direction=Direction.COUNTERCLOCKWISE)
+        before = len(scan.pings)
+        assert scan.wait_for_more(4)
+    assert [ping.reply.max_range for ping in scan.pings[before + 1 : before + 3]] == [20, 20]
+    assert positions(scan.pings)[before + 2] < positions(scan.pings)[before + 1]
+
+
+def test_the_scan_goes_on_in_its_sector_after_the_port_was_away(tmp_path):
+    sector = HeadSettings(max_range=50, train_angle_deg=0, sector_width_deg=12)
+    with served(tmp_path) as (server, connection), Run(connection, sector) as scan:
+        assert scan.wait_for_more(3)
+        server.disappear()
+        server.reappear()
+        assert scan.wait_for_more(12)
+    assert set(positions(scan.pings)) == {1360, 1380, 1400, 1420, 1440}
+    assert scan.device.stats.connections == 2
+
+
+def test_the_scan_goes_on_after_the_head_rebooted(tmp_path):
+    sector = HeadSettings(max_range=50, train_angle_deg=30, sector_width_deg=6)
+    with served(tmp_path) as (server, connection):
+        head = server._head = EmulatedHead(timing=connection.timing())
+        with Run(connection, sector) as scan:
+            assert scan.wait_for_more(15)
+            head.reboot()
+            before = len(scan.pings)
+            assert scan.wait_for_more(20)
+    assert 1400 in positions(scan.pings[before:])
+    assert set(positions(scan.pings[-4:])) == {1580, 1600, 1620}
+
+
+def test_scanning_resumes_within_two_seconds_however_long_the_port_was_away(tmp_path):
+    with served(tmp_path, back_off_longest=1.0) as (server, connection), Run(connection) as scan:
+        assert scan.wait_for_more(1)
+        # The wait between attempts has grown to its longest by then.
+        scan.scanner._back_off = connection.back_off_longest
+        server.disappear()
+        time.sleep(0.5)
+        server.reappear()
+        assert scan.wait_for_more(1, timeout=2.0)
+
+
+def test_a_port_that_appears_after_the_driver_is_found(tmp_path):
+    with served(tmp_path) as (server, connection):
+        server.disappear()
+        with Run(connection) as scan:
+            assert "cannot be opened" in scan.device.stats.last_error
+            server.reappear()
+            assert scan.wait_for_more(1)
+
+
+def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(tmp_path):
+    faults = FaultInjector(FaultRates(silence_duration=0.8))
+    with served(tmp_path, reopen_after=0.3) as (server, connection):
+        server._head = EmulatedHead(faults=faults, timing=connection.timing())
+        with Run(connection) as scan:
+            assert scan.wait_for_more(1)
+            faults.order(Fault.SILENCE)
+            assert scan.wait_for_more(3)
+    assert scan.device.stats.connections > 1
+
+
+def test_a_second_scanner_on_the_port_does_not_start(tmp_path):
+    with served(tmp_path) as (_, connection), Run(connection):
+        second = Scanner(SonarDevice(connection), HeadSettings(), print)
+        with pytest.raises(PortBusyError):
+            second.connect()
+
+
+@pytest.mark.parametrize("gone", [False, True])
+def test_a_stop_ends_the_scan_at_once(tmp_path, gone):
+    with served(tmp_path) as (server, connection), Run(connection) as scan:
+        assert scan.wait_for_more(1)
+        if gone:
+            server.disappear()
+        begin = time.monotonic()
+        assert scan.stop()
+        assert time.monotonic() - begin < 0.5
+
+
+def test_with_every_fault_each_good_reply_is_delivered_once_and_in_order():
+    account = run(commands=80, rate=0.04, seed=1, reply_margin=0.15)
+    assert account.delivered == account.expected
+
+
+def test_with_every_fault_each_bad_reply_is_counted():
+    account = run(commands=60, rate=0.05, seed=2, reply_margin=0.15)
+    faults, stats = account.faults, account.stats
+    assert stats.bad_frames == faults.get(Fault.GARBLED, 0) + faults.get(Fault.TRUNCATED, 0)
+    assert stats.unexpected_replies == faults.get(Fault.LATE, 0) + faults.get(Fault.DOUBLED, 0)
+    assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.interrupted
