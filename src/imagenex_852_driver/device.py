@@ -110,13 +110,16 @@ class SonarDevice:
         return self._judge(wait, stamp)
 
     def _collect(self, wait: ReplyWait) -> None:
-        """Read until the wait is over; what came before a reply was possible answers an earlier command."""
-        self.stop.wait(max(0.0, wait.earliest - time.monotonic()))
+        self.stop.wait(max(0.0, wait.early_look - time.monotonic()))
         for data in self._waiting():
-            wait.take_early(len(data), self._parser.feed(data))
-        while not self.stop.is_set() and not wait.over(time.monotonic(), self._parser.pending):
-            data = self._port.read(wait.missing_bytes or max(1, self._port.in_waiting))
-            wait.take(len(data), self._parser.feed(data), time.monotonic())
+            wait.take(data, self._parser.feed(data), time.monotonic())
+        while wait.reply is None and not self.stop.is_set():
+            # Taken before the read: what came during a stall of this process is read before it is given up.
+            now = time.monotonic()
+            data = self._port.read(self._port.in_waiting if wait.expired(now) else wait.missing_bytes or 1)
+            wait.take(data, self._parser.feed(data), time.monotonic())
+            if wait.over(now, self._parser.pending):
+                break
 
     def _judge(self, wait: ReplyWait, stamp: float) -> Optional[Ping]:
         if wait.reply is not None:

@@ -5,15 +5,18 @@ from typing import List, Optional
 from imagenex_852_driver.connection import ConnectionParameters
 from imagenex_852_driver.protocol import ParsedReply, Reply, SwitchCommand
 
-# Share of the travel time of sound before which no reply can begin, whatever the true speed of sound is.
-_SURELY_TOO_EARLY = 0.7
+# Shares of the time until the reply: when to look for bytes that come too early, and until when they surely
+# do, whatever the true speed of sound is.
+_EARLY_LOOK = 0.7
+_SURELY_TOO_EARLY = 0.9
 
 
 class ReplyWait:
     """Judges what comes after one command, without reading or waiting itself.
 
     All times are of one monotonic clock. The protocol has no sequence numbers: a reply that began before
-    sound can have come back answers an earlier command.
+    sound can have come back answers an earlier command. A byte counts as early only when it was read early,
+    so that a stall of the driver never costs a good reply.
     """
 
     def __init__(self, command: SwitchCommand, connection: ConnectionParameters, start: float) -> None:
@@ -23,7 +26,8 @@ class ReplyWait:
         self.reply: Optional[Reply] = None
         self.unexpected_replies = 0
         self.patience = begins + connection.reply_margin
-        self.earliest = start + leaves + _SURELY_TOO_EARLY * (begins - leaves)
+        self.early_look = start + leaves + _EARLY_LOOK * (begins - leaves)
+        self._earliest = start + leaves + _SURELY_TOO_EARLY * (begins - leaves)
         self._length = command.reply_kind.length
         self._byte_gap = connection.byte_gap
         self._deadline = start + self.patience
@@ -50,25 +54,25 @@ class ReplyWait:
         """Number of bytes that a whole answer still needs; 0 when enough came to make one."""
         return max(0, self._length - self.answer_bytes)
 
-    def take_early(self, byte_count: int, replies: List[ParsedReply]) -> None:
-        """Take note of bytes that came before `earliest`."""
-        self._received += byte_count
-        self._early_bytes = self._received
-        self._sort(replies)
-
-    def take(self, byte_count: int, replies: List[ParsedReply], now: float) -> None:
-        """Take note of bytes read until `now`; none is fine."""
-        self._received += byte_count
-        if byte_count:
+    def take(self, data: bytes, replies: List[ParsedReply], now: float) -> None:
+        """Take note of bytes, possibly none, that had been read by `now`, and of replies they completed."""
+        self._received += len(data)
+        if now < self._earliest:
+            self._early_bytes = self._received
+        elif data:
             self._last_byte = now
         self._sort(replies)
 
+    def expired(self, now: float) -> bool:
+        """Tell whether the answer should have begun by now."""
+        return not self.answered and now >= self._deadline
+
     def over(self, now: float, pending: bool) -> bool:
         """Tell whether waiting is useless; `pending` is whether a reply may have begun."""
-        if self.reply is not None:
+        if self.reply is not None or self.expired(now):
             return True
         if not self.answered:
-            return now >= self._deadline
+            return False
         complete = self.missing_bytes == 0 and not pending
         return complete or now - self._last_byte >= self._byte_gap or now >= self._last_deadline
 

@@ -19,6 +19,8 @@ from imagenex_852_driver.stats import DeviceStats
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
 WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
+# Beyond the longest wait for a reply.
+LATENESS = 0.12
 # Ten times the speed of wire and water.
 FAST_LINE = {"baud_rate": 1152000, "speed_of_sound": 15000.0}
 
@@ -70,7 +72,7 @@ class Account:
 def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -> Account:
     """Let the head see `commands` commands outside of silences; return the account."""
     stop = threading.Event()
-    lasting = {"lateness": 1.5 * reply_margin, "silence_duration": 0.2, "absence_duration": 0.05}
+    lasting = {"lateness": reply_margin + LATENESS, "silence_duration": 0.2, "absence_duration": 0.05}
     names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
     rates = FaultRates(**dict.fromkeys(names, rate), **lasting)
     faults = RecordingInjector(rates, seed, commands, stop)
@@ -79,7 +81,7 @@ def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -
         connection = ConnectionParameters(
             port=f"{directory}/sonar",
             reply_margin=reply_margin,
-            late_window=reply_margin,
+            late_window=2 * LATENESS,
             byte_gap=reply_margin / 2,
             back_off_first=0.05,
             **FAST_LINE,
