@@ -13,9 +13,9 @@ from imagenex_852_driver.settings import HeadSettings
 FAST = {
     "baud_rate": 1152000,
     "speed_of_sound": 15000.0,
-    "reply_margin": 0.2,
+    "reply_margin": 0.1,
     "late_window": 0.2,
-    "byte_gap": 0.1,
+    "byte_gap": 0.06,
     "back_off_first": 0.02,
 }
 PATIENCE = 5.0

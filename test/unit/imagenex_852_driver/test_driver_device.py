@@ -26,7 +26,7 @@ class FixedStatusHead(EmulatedHead):
 
 @pytest.fixture
 def line(tmp_path):
-    faults = FaultInjector(FaultRates(lateness=0.3, silence_duration=0.3))
+    faults = FaultInjector(FaultRates(lateness=0.2, silence_duration=0.3))
     timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
     with served(tmp_path, EmulatedHead(faults=faults, timing=timing)) as (_, connection):
         device = SonarDevice(connection, clock=lambda: 1000.0)

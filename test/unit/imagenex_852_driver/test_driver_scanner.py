@@ -105,12 +105,12 @@ def test_a_stop_ends_the_scan_at_once(tmp_path, gone):
 
 
 def test_with_every_fault_each_good_reply_is_delivered_once_and_in_order():
-    account = run(commands=80, rate=0.04, seed=1, reply_margin=0.15)
+    account = run(commands=60, rate=0.04, seed=1, reply_margin=0.1)
     assert account.delivered == account.expected
 
 
 def test_with_every_fault_each_bad_reply_is_counted():
-    account = run(commands=60, rate=0.05, seed=2, reply_margin=0.15)
+    account = run(commands=50, rate=0.05, seed=2, reply_margin=0.1)
     faults, stats = account.faults, account.stats
     assert stats.bad_frames == faults.get(Fault.GARBLED, 0) + faults.get(Fault.TRUNCATED, 0)
     assert stats.unexpected_replies == faults.get(Fault.LATE, 0) + faults.get(Fault.DOUBLED, 0)
