@@ -1,0 +1,11 @@
+"""Installed by catkin (catkin_python_setup); not meant to be run by hand."""
+
+from catkin_pkg.python_setup import generate_distutils_setup
+from setuptools import setup
+
+setup(
+    **generate_distutils_setup(
+        packages=["node_support", "sonar_processing", "mlsm_manager", "sonar_simulator"],
+        package_dir={"": "src"},
+    )
+)
