@@ -1,0 +1,125 @@
+"""Counters, rates and problems of one stage, as /diagnostics shows them. Free of ROS and safe to use from any thread."""
+
+import threading
+import time
+from contextlib import contextmanager
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Callable, Dict, Iterator
+
+WARNING_PERIOD = 10.0
+
+
+class Level(IntEnum):
+    """Levels of diagnostic_msgs/DiagnosticStatus."""
+
+    OK = 0
+    WARN = 1
+    ERROR = 2
+
+
+@dataclass(frozen=True)
+class HealthReport:
+    """One stage's state: a level, one line in words and the counters behind it."""
+
+    level: Level
+    text: str
+    values: Dict[str, str]
+
+
+class _Problem:
+    def __init__(self) -> None:
+        self.total = 0
+        self.unreported = 0
+        self.last_report = float("-inf")
+        self.last_seen = float("-inf")
+        self.detail = ""
+
+
+class Health:
+    """Collects what a stage did and what went wrong, and warns once in a while instead of at every message."""
+
+    def __init__(
+        self, name: str, warn: Callable[[str], None], clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """`warn` receives one line at most every `WARNING_PERIOD` seconds for each kind of problem."""
+        self.name = name
+        self._warn = warn
+        self._clock = clock
+        self._lock = threading.Lock()
+        self._counts: Dict[str, int] = {}
+        self._reported_counts: Dict[str, int] = {}
+        self._last_report = clock()
+        self._problems: Dict[str, _Problem] = {}
+        self._values: Dict[str, str] = {}
+        self._processing = [0, 0.0, 0.0]
+
+    def count(self, what: str, number: int = 1) -> None:
+        """Add to a counter; its total and its rate are reported."""
+        with self._lock:
+            self._counts[what] = self._counts.get(what, 0) + number
+
+    def show(self, what: str, value: str) -> None:
+        """Report a value as it is."""
+        with self._lock:
+            self._values[what] = value
+
+    def problem(self, kind: str, detail: str, number: int = 1) -> None:
+        """Count `number` problems of a kind and warn with the newest detail, unless that was said lately."""
+        with self._lock:
+            problem = self._problems.setdefault(kind, _Problem())
+            problem.total += number
+            problem.unreported += number
+            problem.last_seen = self._clock()
+            problem.detail = detail
+            if problem.last_seen - problem.last_report < WARNING_PERIOD:
+                return
+            line = f"{self.name}: {problem.unreported} {kind} ({problem.total} in all): {detail}"
+            problem.last_report = problem.last_seen
+            problem.unreported = 0
+        self._warn(line)
+
+    @contextmanager
+    def timed(self) -> Iterator[None]:
+        """Measure the processing time of one message."""
+        start = time.perf_counter()
+        try:
+            yield
+        finally:
+            seconds = time.perf_counter() - start
+            with self._lock:
+                count, total, longest = self._processing
+                self._processing = [count + 1, total + seconds, max(longest, seconds)]
+
+    def report(self) -> HealthReport:
+        """Return the state since the start, with rates since the previous report."""
+        with self._lock:
+            now = self._clock()
+            values = self._counter_values(max(now - self._last_report, 1e-9))
+            self._last_report = now
+            values.update(self._values)
+            values.update(self._processing_values())
+            values.update({kind: str(problem.total) for kind, problem in self._problems.items()})
+            recent = [
+                f"{problem.total} {kind}: {problem.detail}"
+                for kind, problem in self._problems.items()
+                if now - problem.last_seen < WARNING_PERIOD
+            ]
+        return HealthReport(Level.WARN if recent else Level.OK, "; ".join(recent) or "running", values)
+
+    def _counter_values(self, seconds: float) -> Dict[str, str]:
+        values = {}
+        for what, total in self._counts.items():
+            values[what] = str(total)
+            values[f"{what} per second"] = f"{(total - self._reported_counts.get(what, 0)) / seconds:.2f}"
+        self._reported_counts = dict(self._counts)
+        return values
+
+    def _processing_values(self) -> Dict[str, str]:
+        count, total, longest = self._processing
+        if not count:
+            return {}
+        return {
+            "processing time mean [ms]": f"{1e3 * total / count:.3f}",
+            "processing time longest [ms]": f"{1e3 * longest:.3f}",
+        }

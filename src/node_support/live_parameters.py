@@ -1,0 +1,55 @@
+"""Parameters of a running stage: read and validated at start-up, changed through dynamic_reconfigure."""
+
+import importlib
+from typing import Callable, Type
+
+import rospy
+from dynamic_reconfigure.server import Server
+
+from node_support.health import Health
+from node_support.parameters import ParameterError, ParameterSet
+
+
+class _RefusingServer(Server):
+    """Leaves values as they were sent, so that a value out of range is refused and not bent into it."""
+
+    def _clamp(self, config: dict) -> None:
+        pass
+
+
+class LiveParameters:
+    """Holds the current, always valid `ParameterSet` of one stage."""
+
+    def __init__(
+        self,
+        parameters: Type[ParameterSet],
+        namespace: str,
+        config_name: str,
+        health: Health,
+        on_change: Callable[[ParameterSet], None],
+    ) -> None:
+        """Read `namespace` ("~", or a resolved name) and serve `config_name` (the name of the .cfg file).
+
+        `on_change` is called with the first values and with every accepted change. Raises ParameterError when the
+        parameter server holds an unknown key or a value that is not allowed.
+        """
+        self.current = parameters.from_mapping(rospy.get_param(namespace, {}) or {})
+        self._on_change = on_change
+        self._health = health
+        on_change(self.current)
+        module = importlib.import_module(f"underwater_map_construction.cfg.{config_name}Config")
+        self._server = _RefusingServer(module, self._request, "" if namespace == "~" else namespace)
+
+    def _request(self, config: dict, _level: int) -> dict:
+        changes = {field.name: config[field.name] for field in self.current.tunable_fields()}
+        try:
+            wanted = self.current.changed(changes)
+        except ParameterError as error:
+            self._health.problem("changes of parameters refused", str(error))
+            wanted = self.current
+        if wanted != self.current:
+            self.current = wanted
+            self._on_change(wanted)
+            rospy.loginfo("%s: %s", self._health.name, wanted)
+        config.update({key: value for key, value in wanted.to_mapping().items() if key in changes})
+        return config

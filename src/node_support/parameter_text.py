@@ -1,0 +1,53 @@
+"""Writes what a `ParameterSet` says of itself: the commented default yaml and the table for the documentation."""
+
+import dataclasses
+from enum import Enum
+from typing import List, Type
+
+from node_support.parameters import ParameterSet, describe
+
+_YAML_TYPES = {float: "float", int: "int", bool: "bool", str: "string"}
+
+
+def default_yaml(node: str, parameters: Type[ParameterSet]) -> str:
+    """Return the text of yaml/<node>_default.yaml: every key with its meaning, what is allowed, and its default."""
+    lines = [f"# Defaults of {node}. Keys marked * can be changed while it runs (dynamic_reconfigure)."]
+    for field in dataclasses.fields(parameters):
+        described = describe(field)
+        mark = " *" if described.tunable else ""
+        thesis = f"; thesis: {described.thesis_name}" if described.thesis_name else ""
+        lines += ["", f"# {described.text}{mark}", f"#   {described.allowed(field.type)}{thesis}"]
+        lines.append(f"{field.name}: {_yaml_value(field.default)}")
+    return "\n".join(lines) + "\n"
+
+
+def markdown_table(parameters: Type[ParameterSet]) -> str:
+    """Return the parameter table of a node: name, type, default, what is allowed, unit, thesis name, meaning."""
+    rows = [
+        "| parameter | type | default | allowed | unit | thesis | meaning |",
+        "| --- | --- | --- | --- | --- | --- | --- |",
+    ]
+    for field in dataclasses.fields(parameters):
+        described = describe(field)
+        kind = "string" if issubclass(field.type, Enum) else _YAML_TYPES[field.type]
+        allowed = described.allowed(field.type)
+        unit = described.unit
+        if unit and allowed.endswith(f" {unit}"):
+            allowed = allowed[: -len(unit) - 1]
+        star = " *" if described.tunable else ""
+        cells: List[str] = [
+            f"`{field.name}`{star}", kind, f"`{_yaml_value(field.default)}`", allowed, unit, described.thesis_name,
+            described.text,
+        ]  # fmt: skip
+        rows.append("| " + " | ".join(cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
+def _yaml_value(value: object) -> str:
+    if isinstance(value, Enum):
+        return f'"{value.value}"'
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        return f'"{value}"'
+    return repr(value)

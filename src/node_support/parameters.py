@@ -1,0 +1,151 @@
+"""Parameters as frozen dataclasses that validate themselves, the one place where a value is judged.
+
+A stage declares its parameters once::
+
+    @dataclass(frozen=True)
+    class RadiusParameters(ParameterSet):
+        radius: float = parameter(1.0, "neighbourhood of a point", unit="m", low=0.0, high=100.0)
+
+From that declaration come the start-up check, the refusal at run time and the dynamic_reconfigure description.
+"""
+
+import dataclasses
+import math
+from enum import Enum
+from typing import Any, Dict, Mapping, Optional, Tuple, Type, TypeVar
+
+_METADATA_KEY = "parameter"
+Self = TypeVar("Self", bound="ParameterSet")
+
+
+class ParameterError(ValueError):
+    """A parameter is unknown or its value is not allowed; the text names key, value and what is allowed."""
+
+
+@dataclasses.dataclass(frozen=True)
+class Description:
+    """What is known of one parameter besides its name, type and default."""
+
+    text: str
+    unit: str = ""
+    low: Optional[float] = None
+    high: Optional[float] = None
+    thesis_name: str = ""
+    tunable: bool = True
+
+    def allowed(self, kind: type) -> str:
+        """Return in words which values a parameter of type `kind` takes."""
+        if issubclass(kind, Enum):
+            return "one of " + ", ".join(member.value for member in kind)
+        if kind is bool:
+            return "true or false"
+        if kind is str:
+            return "a text that is not empty"
+        number = "an integer" if kind is int else "a number"
+        bounds = [
+            f"{word} {bound:g}"
+            for word, bound in (("from", self.low), ("to", self.high))
+            if bound is not None
+        ]
+        unit = f" {self.unit}" if self.unit else ""
+        return " ".join([number, *bounds]) + unit
+
+
+def parameter(
+    default: Any,
+    text: str,
+    *,
+    unit: str = "",
+    low: Optional[float] = None,
+    high: Optional[float] = None,
+    thesis_name: str = "",
+    tunable: bool = True,
+) -> Any:
+    """Declare one field of a `ParameterSet`.
+
+    `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
+    the others only at start-up; `thesis_name` is the parameter's name in the 2015 package.
+    """
+    description = Description(text, unit, low, high, thesis_name, tunable)
+    return dataclasses.field(default=default, metadata={_METADATA_KEY: description})
+
+
+def describe(field: dataclasses.Field) -> Description:
+    """Return the description that `parameter` left in a dataclass field."""
+    return field.metadata[_METADATA_KEY]
+
+
+@dataclasses.dataclass(frozen=True)
+class ParameterSet:
+    """Base of all parameter dataclasses: every instance that exists holds allowed values only."""
+
+    def __post_init__(self) -> None:
+        for field in dataclasses.fields(self):
+            object.__setattr__(self, field.name, _validated(field, getattr(self, field.name)))
+        self.check()
+
+    def check(self) -> None:
+        """Raise ParameterError when values that are allowed one by one do not fit together."""
+
+    @classmethod
+    def from_mapping(cls: Type[Self], values: Mapping[str, Any]) -> Self:
+        """Build from plain values (yaml, parameter server); keys that are left out keep their defaults.
+
+        Raises ParameterError for an unknown key or a value that is not allowed.
+        """
+        known = [field.name for field in dataclasses.fields(cls)]
+        for key in values:
+            if key not in known:
+                raise ParameterError(
+                    f"{key} = {values[key]!r}: no such parameter; there are {', '.join(known)}"
+                )
+        return cls(**values)
+
+    def changed(self: Self, changes: Mapping[str, Any]) -> Self:
+        """Return a copy with `changes` applied and everything validated again."""
+        return type(self).from_mapping({**self.to_mapping(), **changes})
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return plain values (enumerations by value), as yaml and the parameter server hold them."""
+        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
+        return {key: value.value if isinstance(value, Enum) else value for key, value in values.items()}
+
+    @classmethod
+    def tunable_fields(cls) -> Tuple[dataclasses.Field, ...]:
+        """Return the fields that may change while the node runs."""
+        return tuple(field for field in dataclasses.fields(cls) if describe(field).tunable)
+
+
+def _validated(field: dataclasses.Field, value: Any) -> Any:
+    description = describe(field)
+    try:
+        typed = _converted(field.type, value)
+    except (TypeError, ValueError):
+        typed = None
+    if typed is None or not _in_range(typed, description) or typed == "":
+        raise ParameterError(f"{field.name} = {_plain(value)!r}: must be {description.allowed(field.type)}")
+    return typed
+
+
+def _converted(kind: type, value: Any) -> Any:
+    if issubclass(kind, Enum):
+        return kind(value)
+    if kind is float and isinstance(value, (int, float)) and not isinstance(value, bool):
+        return float(value)
+    if type(value) is kind:
+        return value
+    raise TypeError(value)
+
+
+def _in_range(value: Any, description: Description) -> bool:
+    if isinstance(value, (str, bool, Enum)):
+        return True
+    if not math.isfinite(value):
+        return False
+    return (description.low is None or value >= description.low) and (
+        description.high is None or value <= description.high
+    )
+
+
+def _plain(value: Any) -> Any:
+    return value.value if isinstance(value, Enum) else value
