@@ -1,0 +1,57 @@
+"""The cloud that travels from stage to stage."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from node_support.refused_input import RefusedInput
+
+
+@dataclass(frozen=True)
+class IntensityCloud:
+    """Points with echo strength and time. Raises RefusedInput when points and stamps do not belong together.
+
+    points: (n, 4) float32, x y z [m] in `frame_id`, echo strength; removed points of an organised cloud are NaN.
+    time_stamps: (n,) float64, seconds at which each point's beam was taken, negative while the vehicle was still,
+        positive while it was moving (thesis 4.5.1).
+    stamp_ns: stamp of the newest beam, nanoseconds.
+    height: rows (beams) of an organised cloud, 1 otherwise.
+    """
+
+    points: np.ndarray
+    time_stamps: np.ndarray
+    stamp_ns: int
+    frame_id: str
+    height: int = 1
+
+    def __post_init__(self) -> None:
+        points, stamps = len(self.points), len(self.time_stamps)
+        if points != stamps:
+            raise RefusedInput(
+                "clouds refused", f"{points} points but {stamps} time stamps; check the publisher"
+            )
+        if self.height < 1 or points % self.height:
+            raise RefusedInput("clouds refused", f"{points} points do not fill {self.height} rows")
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def is_organized(self) -> bool:
+        """Whether rows are beams and columns are bins."""
+        return self.height > 1
+
+    @property
+    def valid(self) -> np.ndarray:
+        """(n,) bool: points whose coordinates, strength and stamp are all finite."""
+        return np.isfinite(self.points).all(axis=1) & np.isfinite(self.time_stamps)
+
+    def select(self, keep: np.ndarray) -> "IntensityCloud":
+        """Return the cloud with the points where `keep` (n,) bool holds, stamps staying with their points.
+
+        An organised cloud keeps its shape: the other points become NaN.
+        """
+        if self.is_organized:
+            points = np.where(keep[:, np.newaxis], self.points, np.float32(np.nan))
+            return replace(self, points=points)
+        return replace(self, points=self.points[keep], time_stamps=self.time_stamps[keep])

@@ -1,0 +1,37 @@
+"""The executables of this package."""
+
+from node_support.node import DiagnosticsPublisher, run
+from sonar_processing.host import ProcessingHost
+from sonar_processing.sonar_to_cloud import SonarToCloud
+from sonar_processing.stage_runner import StageRunner
+
+
+def run_sonar_to_cloud() -> None:
+    """Run sonar_to_cloud as a node of its own."""
+
+    def construct() -> tuple:
+        node = SonarToCloud()
+        return node, DiagnosticsPublisher([node.health])
+
+    run("sonar_to_cloud", construct)
+
+
+def run_stage(name: str) -> None:
+    """Run one stage of the table as a node of its own."""
+
+    def construct() -> tuple:
+        runner = StageRunner(name, "~")
+        runner.subscribe()
+        return runner, DiagnosticsPublisher([runner.health])
+
+    run(name, construct)
+
+
+def run_host() -> None:
+    """Run sonar_to_cloud and the chain in one process."""
+
+    def construct() -> tuple:
+        host = ProcessingHost()
+        return host, DiagnosticsPublisher(host.healths)
+
+    run("sonar_processing", construct)

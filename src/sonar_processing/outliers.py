@@ -1,0 +1,96 @@
+"""Removes points that stand alone, with the semantics of the Point Cloud Library (thesis 6.5.4)."""
+
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from node_support.parameters import ParameterSet, parameter
+from sonar_processing.cloud import IntensityCloud
+
+
+class OutlierMode(Enum):
+    """Which rule removes points."""
+
+    STATISTICAL = "STATISTICAL"
+    RADIUS = "RADIUS"
+    NONE = "NONE"
+
+
+@dataclass(frozen=True)
+class OutlierRemoverParameters(ParameterSet):
+    """Parameters of outlier_remover."""
+
+    mode: OutlierMode = parameter(OutlierMode.STATISTICAL, "which rule removes points", thesis_name="mode")
+    mean_k: int = parameter(20, "STATISTICAL: nearest neighbours looked at", low=1, high=1000)
+    stddev_multiplier: float = parameter(
+        1.0, "STATISTICAL: standard deviations above the mean distance that are kept", low=0.0, high=100.0
+    )
+    min_radius: float = parameter(
+        1.0, "RADIUS: neighbourhood of a point", unit="m", low=0.001, high=1000.0, thesis_name="minRadius"
+    )
+    min_neighbors: int = parameter(
+        20, "RADIUS: a point with fewer neighbours goes", low=1, high=10000, thesis_name="minNeighbors"
+    )
+
+
+class OutlierRemover:
+    """Applies the configured rule to the finite points of a cloud."""
+
+    def __init__(self, parameters: OutlierRemoverParameters) -> None:
+        self.parameters = parameters
+
+    def __call__(self, cloud: IntensityCloud) -> IntensityCloud:
+        """Return the cloud without its outliers."""
+        parameters = self.parameters
+        if parameters.mode is OutlierMode.NONE:
+            return cloud
+        keep = cloud.valid
+        points = cloud.points[keep, :3]
+        if parameters.mode is OutlierMode.STATISTICAL:
+            keep[keep] = statistical_inliers(points, parameters.mean_k, parameters.stddev_multiplier)
+        else:
+            keep[keep] = radius_inliers(points, parameters.min_radius, parameters.min_neighbors)
+        return cloud.select(keep)
+
+
+def statistical_inliers(points: np.ndarray, mean_k: int, stddev_multiplier: float) -> np.ndarray:
+    """Return (n,) bool: whose mean distance to the `mean_k` nearest others is not above mean + multiplier * sd.
+
+    points: (n, 3), finite. The standard deviation is the sample's (n - 1), as in pcl::StatisticalOutlierRemoval. With
+    fewer than `mean_k` others, all others count; fewer than three points have no outlier.
+    """
+    if len(points) < 3:
+        return np.ones(len(points), dtype=bool)
+    neighbors = min(mean_k, len(points) - 1)
+    distances, _ = cKDTree(points).query(points, k=neighbors + 1)
+    mean_distances = distances[:, 1:].mean(axis=1)
+    return mean_distances <= mean_distances.mean() + stddev_multiplier * mean_distances.std(ddof=1)
+
+
+def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.ndarray:
+    """Return (n,) bool: which points have at least `min_neighbors` others within `radius` [m], border included.
+
+    points: (n, 3), finite. pcl::RadiusOutlierRemoval counts the point itself and keeps more than `min_neighbors`; it
+    compares squared distances computed in float32, so that points on the border are decided in float32 here too.
+    """
+    if len(points) == 0:
+        return np.ones(0, dtype=bool)
+    points = np.ascontiguousarray(points, dtype=np.float32)
+    tree = cKDTree(points)
+    slack = 1e-5 * radius + 1e-6
+    surely = tree.query_ball_point(points, max(radius - slack, 0.0), return_length=True) > min_neighbors
+    possibly = tree.query_ball_point(points, radius + slack, return_length=True) > min_neighbors
+    for index in np.flatnonzero(possibly & ~surely):
+        near = points[tree.query_ball_point(points[index], radius + slack)]
+        surely[index] = (
+            np.count_nonzero(_squared_distances(near, points[index]) <= radius * radius) > min_neighbors
+        )
+    return surely
+
+
+def _squared_distances(points: np.ndarray, center: np.ndarray) -> np.ndarray:
+    difference = points - center
+    squares = difference * difference
+    return (squares[:, 0] + squares[:, 1]) + squares[:, 2]

@@ -1,0 +1,73 @@
+"""The ROS side of a filter stage: parameters, topics and health around a callable from cloud to cloud."""
+
+from typing import Optional
+
+import numpy as np
+import rospy
+
+from node_support.live_parameters import LiveParameters
+from node_support.node import guarded, make_health
+from node_support.parameters import ParameterSet
+from node_support.refused_input import RefusedInput
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud_publisher import CloudPublisher
+from sonar_processing.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.stages import STAGES
+
+CLOUD_BUFFER_BYTES = 2**24
+
+
+class StageRunner:
+    """Runs one stage of the table, as a node of its own (`subscribe`) or called by the process that hosts it."""
+
+    def __init__(self, name: str, namespace: str) -> None:
+        """Raises ParameterError for a bad parameter in `namespace`."""
+        self.health = make_health(name)
+        self._type = STAGES[name]
+        self._live = LiveParameters(
+            self._type.parameters, namespace, self._type.config_name, self.health, self._use_parameters
+        )
+        self._publisher = CloudPublisher(self._type.output_topic)
+
+    def _use_parameters(self, parameters: ParameterSet) -> None:
+        self._stage = self._type.build(parameters)
+
+    def subscribe(self) -> None:
+        """Take clouds from the stage's input topic."""
+
+        def take(message: StampedIntensityCloudArrays) -> None:
+            self.process(cloud_from_message(message))
+
+        subscribe_to_clouds(self._type.input_topic, guarded(self.health, take))
+
+    def process(self, cloud: IntensityCloud) -> Optional[IntensityCloud]:
+        """Run the stage, publish its result and return it; None when it could not be used (counted)."""
+        self.health.count("clouds in")
+        self.health.count("points in", len(cloud))
+        try:
+            with self.health.timed():
+                result = self._stage(cloud)
+        except RefusedInput as refused:
+            self.health.problem(refused.kind, str(refused))
+            return None
+        invalid = len(cloud) - int(np.count_nonzero(cloud.valid))
+        if invalid and not cloud.is_organized:
+            self.health.problem(
+                "points that are not finite", f"{invalid} of {len(cloud)} in this cloud", invalid
+            )
+        self.health.count("clouds out")
+        self.health.count("points out", int(np.count_nonzero(result.valid)))
+        self._publisher.publish(result)
+        return result
+
+
+def subscribe_to_clouds(topic: str, callback: object) -> rospy.Subscriber:
+    """Subscribe to StampedIntensityCloud, with a buffer that holds whole clouds."""
+    return rospy.Subscriber(
+        topic,
+        StampedIntensityCloudArrays,
+        callback,
+        queue_size=10,
+        buff_size=CLOUD_BUFFER_BYTES,
+        tcp_nodelay=True,
+    )

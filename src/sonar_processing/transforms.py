@@ -1,0 +1,25 @@
+"""Transforms as 4 x 4 matrices."""
+
+import numpy as np
+from geometry_msgs.msg import Transform
+
+from node_support.refused_input import RefusedInput
+
+
+def matrix_from_message(transform: Transform) -> np.ndarray:
+    """Return the (4, 4) matrix of a transform; raises RefusedInput when it is not finite or no rotation."""
+    rotation, shift = transform.rotation, transform.translation
+    quaternion = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
+    translation = np.array([shift.x, shift.y, shift.z])
+    norm = np.linalg.norm(quaternion)
+    if not (np.isfinite(translation).all() and 0.5 < norm < 2.0):
+        raise RefusedInput("transforms refused", f"translation {translation}, quaternion {quaternion}")
+    x, y, z, w = quaternion / norm
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, 3] = translation
+    return matrix
