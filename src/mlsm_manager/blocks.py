@@ -1,0 +1,87 @@
+"""Blocks of a Multi Level Surface Map as arrays (thesis 6.2.1)."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+MEAN = slice(0, 4)
+SQUARES = slice(4, 8)
+COUNT = 8
+BOTTOM = 9
+TOP = 10
+ROW_WIDTH = 11
+
+
+class BlockType(IntEnum):
+    """Kind of surface. FREE (thesis 6.2.1) is part of the map's vocabulary; inserting points never makes one."""
+
+    HORIZONTAL = 0
+    VERTICAL = 1
+    FREE = 2
+
+
+@dataclass(frozen=True)
+class Blocks:
+    """A snapshot of a map's blocks, in the map's frame.
+
+    rows: (n, 11) float64: mean x y z [m] and strength, their sums of squared deviations, number of points,
+        bottom and top [m].
+    resolution: side of a cell, m.
+    """
+
+    rows: np.ndarray
+    resolution: float
+
+    def __len__(self) -> int:
+        return len(self.rows)
+
+    @property
+    def mean(self) -> np.ndarray:
+        """(n, 4) mean x y z [m] and strength."""
+        return self.rows[:, MEAN]
+
+    @property
+    def variance(self) -> np.ndarray:
+        """(n, 4) variance of x y z [m^2] and strength, of the population (equation 6.6 intends this one)."""
+        return self.rows[:, SQUARES] / self.rows[:, COUNT, np.newaxis]
+
+    @property
+    def count(self) -> np.ndarray:
+        """(n,) number of points."""
+        return self.rows[:, COUNT].astype(np.int64)
+
+    @property
+    def bottom(self) -> np.ndarray:
+        """(n,) z of the lowest point, m."""
+        return self.rows[:, BOTTOM]
+
+    @property
+    def height(self) -> np.ndarray:
+        """(n,) z of the highest point, m; the thesis calls it height."""
+        return self.rows[:, TOP]
+
+    @property
+    def depth(self) -> np.ndarray:
+        """(n,) from the lowest to the highest point, m."""
+        return self.height - self.bottom
+
+    @property
+    def type(self) -> np.ndarray:
+        """(n,) BlockType values; VERTICAL from a depth of one cell on, which does not depend on the order of points."""
+        return np.where(self.depth >= self.resolution, BlockType.VERTICAL, BlockType.HORIZONTAL)
+
+    @property
+    def cells(self) -> np.ndarray:
+        """(n, 2) int64 indices of each block's cell; cell i spans i to i + 1 times the resolution."""
+        return cells_of(self.mean, self.resolution)
+
+    @property
+    def centers(self) -> np.ndarray:
+        """(n, 2) x y of each block's cell centre, m."""
+        return (self.cells + 0.5) * self.resolution
+
+
+def cells_of(points: np.ndarray, resolution: float) -> np.ndarray:
+    """Return (n, 2) int64 cell indices of points (n, >= 2), floor(x / r), floor(y / r) as in thesis 6.5.6."""
+    return np.floor(points[:, :2] / resolution).astype(np.int64)

@@ -1,0 +1,56 @@
+"""Parameters of mlsm_core."""
+
+from dataclasses import dataclass
+
+from node_support.parameters import ParameterError, ParameterSet, parameter
+
+MAX_PREALLOCATED_CELLS = 16_000_000
+
+
+@dataclass(frozen=True)
+class MlsmCoreParameters(ParameterSet):
+    """The map's grid, its frames and how often it is shown."""
+
+    resolution: float = parameter(
+        0.5, "side of a cell", unit="m", low=0.01, high=100.0, tunable=False, thesis_name="resolution"
+    )
+    size_x_meters: float = parameter(
+        120.0, "extent to reserve memory for; the map grows as it must", unit="m", low=0.0, high=100000.0,
+        tunable=False, thesis_name="sizeXMeters",
+    )  # fmt: skip
+    size_y_meters: float = parameter(
+        50.0, "extent to reserve memory for; the map grows as it must", unit="m", low=0.0, high=100000.0,
+        tunable=False, thesis_name="sizeYMeters",
+    )  # fmt: skip
+    map_limit: float = parameter(
+        10000.0, "points farther than this from the map's origin are left out", unit="m", low=1.0, high=1e6,
+        tunable=False,
+    )  # fmt: skip
+    map_frame: str = parameter("map", "frame of the map", tunable=False)
+    odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
+    transform_rate: float = parameter(
+        20.0, "how often map -> odom is sent", unit="1/s", low=0.1, high=1000.0, tunable=False
+    )
+    transform_tolerance: float = parameter(
+        0.1, "how far into the future map -> odom is stamped", unit="s", low=0.0, high=10.0
+    )
+    map_period: float = parameter(
+        1.0, "a changed map is published at most this often, in wall time", unit="s", low=0.05, high=3600.0,
+        tunable=False,
+    )  # fmt: skip
+    save_folder: str = parameter("~/.ros/maps", "the only folder that save_map writes to", tunable=False)
+
+    def check(self) -> None:
+        """Refuse an extent that cannot be reserved, and a map that would correct itself."""
+        if self.expected_blocks > MAX_PREALLOCATED_CELLS:
+            raise ParameterError(
+                f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
+                f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
+            )
+        if self.map_frame == self.odom_frame:
+            raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
+
+    @property
+    def expected_blocks(self) -> int:
+        """Cells of the reserved extent."""
+        return int(self.size_x_meters / self.resolution) * int(self.size_y_meters / self.resolution)

@@ -1,0 +1,38 @@
+"""Sends map -> odom at a steady rate (REP-105)."""
+
+from typing import Callable
+
+import rospy
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+
+from mlsm_manager.core_parameters import MlsmCoreParameters
+from node_support.health import Health
+from node_support.node import guarded
+
+
+class MapTransform:
+    """The correction that tf knows as map -> odom; the identity until something corrects it."""
+
+    def __init__(self, parameters: Callable[[], MlsmCoreParameters], health: Health) -> None:
+        """`parameters` returns those in force, for the tolerance may change while the node runs."""
+        self._parameters = parameters
+        self._health = health
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._last_stamp = rospy.Time(0)
+        period = rospy.Duration(1.0 / parameters().transform_rate)
+        self._timer = rospy.Timer(period, guarded(health, self._send), reset=True)
+
+    def _send(self, _event: object) -> None:
+        parameters = self._parameters()
+        stamp = rospy.Time.now() + rospy.Duration(parameters.transform_tolerance)
+        if stamp == self._last_stamp:
+            return
+        self._last_stamp = stamp
+        message = TransformStamped()
+        message.header.stamp = stamp
+        message.header.frame_id = parameters.map_frame
+        message.child_frame_id = parameters.odom_frame
+        message.transform.rotation.w = 1.0
+        self._broadcaster.sendTransform(message)
+        self._health.count("transforms sent")
