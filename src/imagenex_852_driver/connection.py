@@ -10,9 +10,7 @@ from node_support.parameters import ParameterError, ParameterSet, parameter
 class ConnectionParameters(ParameterSet):
     """Where the head is connected and how long to wait for it."""
 
-    port: str = parameter(
-        "/dev/ttyUSB0", "device or pyserial URL (socket://, rfc2217://, loop://)", tunable=False
-    )
+    port: str = parameter("/dev/ttyUSB0", "device or pyserial URL (socket://, rfc2217://, loop://)", tunable=False)
     baud_rate: int = parameter(115200, "speed of the line, 8N1", unit="bit/s", low=1200, tunable=False)
     speed_of_sound: float = parameter(1500.0, "what the head assumes", unit="m/s", low=1000.0, tunable=False)
     reply_margin: float = parameter(
@@ -31,9 +29,7 @@ class ConnectionParameters(ParameterSet):
         high=1.0,
         tunable=False,
     )
-    byte_gap: float = parameter(
-        0.1, "silence within a reply that ends it", unit="s", low=0.01, high=1.0, tunable=False
-    )
+    byte_gap: float = parameter(0.1, "silence within a reply that ends it", unit="s", low=0.01, high=1.0, tunable=False)
     back_off_first: float = parameter(
         0.1, "wait before the first attempt to reopen the port", unit="s", low=0.01, high=1.0, tunable=False
     )
@@ -53,8 +49,7 @@ class ConnectionParameters(ParameterSet):
         """Raise ParameterError when the waits would shrink instead of grow."""
         if self.back_off_first > self.back_off_longest:
             raise ParameterError(
-                f"back_off_first = {self.back_off_first}: "
-                f"longer than back_off_longest = {self.back_off_longest}"
+                f"back_off_first = {self.back_off_first}: longer than back_off_longest = {self.back_off_longest}"
             )
 
     def timing(self) -> LineTiming:

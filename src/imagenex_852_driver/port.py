@@ -69,8 +69,7 @@ def _explained(name: str, error: Exception) -> PortError:
     if number in (errno.EACCES, errno.EPERM):
         group = _group_of(name)
         return PortPermissionError(
-            f"no permission to open port {name}: join the group {group} "
-            f"(sudo adduser $USER {group}) and log in again"
+            f"no permission to open port {name}: join the group {group} (sudo adduser $USER {group}) and log in again"
         )
     return PortUnavailableError(f"port {name} cannot be opened: {error}")
 

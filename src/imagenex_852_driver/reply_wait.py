@@ -31,9 +31,7 @@ class ReplyWait:
         self._length = command.reply_kind.length
         self._byte_gap = connection.byte_gap
         self._deadline = start + self.patience
-        self._last_deadline = (
-            start + timing.reply_ends(command) + connection.reply_margin + connection.byte_gap
-        )
+        self._last_deadline = start + timing.reply_ends(command) + connection.reply_margin + connection.byte_gap
         self._last_byte = float("inf")
         self._early_bytes = 0
         self._unexpected_bytes = 0

@@ -47,9 +47,7 @@ class HeadSettings(ParameterSet):
     pulse_length_us: int = parameter(
         100, "length of the pulse, not 253", unit="us", low=1, high=255, thesis_name="Pulse length"
     )
-    data_points: int = parameter(
-        500, "echoes per beam: 250 or 500", low=250, high=500, thesis_name="Data points"
-    )
+    data_points: int = parameter(500, "echoes per beam: 250 or 500", low=250, high=500, thesis_name="Data points")
     switch_delay_ms: int = parameter(
         0,
         "pause before the reply, steps of 2, not 506",
@@ -110,8 +108,7 @@ class HeadSettings(ParameterSet):
             )
         if 0 < self.sector_width_deg < self.step_size_deg:
             raise ParameterError(
-                f"sector_width_deg = {self.sector_width_deg}: "
-                f"narrower than step_size_deg = {self.step_size_deg}"
+                f"sector_width_deg = {self.sector_width_deg}: narrower than step_size_deg = {self.step_size_deg}"
             )
 
     def _require_one_of(self, name: str, allowed: tuple) -> None:

@@ -60,7 +60,5 @@ class CellIndex:
         self.heads[self.slots(keys)] = heads
 
     def _first_slots(self, keys: np.ndarray) -> np.ndarray:
-        mixed = (keys >> 32).astype(np.uint64) * _MULTIPLIER_X + (keys & 0xFFFFFFFF).astype(
-            np.uint64
-        ) * _MULTIPLIER_Y
+        mixed = (keys >> 32).astype(np.uint64) * _MULTIPLIER_X + (keys & 0xFFFFFFFF).astype(np.uint64) * _MULTIPLIER_Y
         return (mixed >> self._shift).astype(np.int64)

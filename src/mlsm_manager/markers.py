@@ -45,9 +45,7 @@ class BlockMarkers:
         lists = box_lists(blocks) if len(blocks) else []
         now = {(boxes.type, boxes.power) for boxes in lists}
         packed = [_packed_boxes(boxes, header) for boxes in lists]
-        packed += [
-            _serialized(_marker(kind, power, header, Marker.DELETE)) for kind, power in self._shown - now
-        ]
+        packed += [_serialized(_marker(kind, power, header, Marker.DELETE)) for kind, power in self._shown - now]
         self._shown = now
         return PackedMarkerArray(struct.pack("<I", len(packed)) + b"".join(packed))
 

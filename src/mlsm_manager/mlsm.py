@@ -63,9 +63,7 @@ class MultiLevelSurfaceMap:
         keep = finite & inside
         kept = points if keep.all() else points[keep]
         if len(kept):
-            self._insert_groups(
-                group_points(kept, cell_keys(cells_of(kept, self.resolution)), self.resolution)
-            )
+            self._insert_groups(group_points(kept, cell_keys(cells_of(kept, self.resolution)), self.resolution))
         not_finite = len(points) - int(np.count_nonzero(finite))
         return InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
 

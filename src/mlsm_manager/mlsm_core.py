@@ -70,9 +70,7 @@ class MlsmCore:
         self.health.count("points inserted", report.inserted)
         self.health.show("blocks", str(blocks))
         if report.not_finite:
-            self.health.problem(
-                "points that are not finite", f"{report.not_finite} in a cloud", report.not_finite
-            )
+            self.health.problem("points that are not finite", f"{report.not_finite} in a cloud", report.not_finite)
         if report.outside:
             limit = self._live.current.map_limit
             self.health.problem(

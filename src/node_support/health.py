@@ -39,9 +39,7 @@ class _Problem:
 class Health:
     """Collects what a stage did and what went wrong, and warns once in a while instead of at every message."""
 
-    def __init__(
-        self, name: str, warn: Callable[[str], None], clock: Callable[[], float] = time.monotonic
-    ) -> None:
+    def __init__(self, name: str, warn: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
         """`warn` receives one line at most every `WARNING_PERIOD` seconds for each kind of problem."""
         self.name = name
         self._warn = warn

@@ -42,11 +42,7 @@ class Description:
         if kind is str:
             return "a text that is not empty"
         number = "an integer" if kind is int else "a number"
-        bounds = [
-            f"{word} {bound:g}"
-            for word, bound in (("from", self.low), ("to", self.high))
-            if bound is not None
-        ]
+        bounds = [f"{word} {bound:g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None]
         unit = f" {self.unit}" if self.unit else ""
         return " ".join([number, *bounds]) + unit
 
@@ -96,9 +92,7 @@ class ParameterSet:
         known = [field.name for field in dataclasses.fields(cls)]
         for key in values:
             if key not in known:
-                raise ParameterError(
-                    f"{key} = {values[key]!r}: no such parameter; there are {', '.join(known)}"
-                )
+                raise ParameterError(f"{key} = {values[key]!r}: no such parameter; there are {', '.join(known)}")
         return cls(**values)
 
     def changed(self: Self, changes: Mapping[str, Any]) -> Self:

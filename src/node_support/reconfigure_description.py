@@ -19,9 +19,7 @@ def generator(parameters: Type[ParameterSet]) -> ParameterGenerator:
         text = f"{described.text} [{described.unit}]" if described.unit else described.text
         if issubclass(field.type, Enum):
             choices = [result.const(m.name, str_t, m.value, m.name.lower()) for m in field.type]
-            result.add(
-                field.name, str_t, 0, text, field.default.value, edit_method=result.enum(choices, text)
-            )
+            result.add(field.name, str_t, 0, text, field.default.value, edit_method=result.enum(choices, text))
         else:
             result.add(field.name, _TYPES[field.type], 0, text, field.default, described.low, described.high)
     return result

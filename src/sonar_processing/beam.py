@@ -32,9 +32,7 @@ class Beam:
         if not 1 <= bins <= MAX_BINS:
             raise RefusedInput("beams refused", f"{bins} bins, must be 1 to {MAX_BINS}; check the driver")
         if not (math.isfinite(self.range_resolution) and self.range_resolution > 0.0):
-            raise RefusedInput(
-                "beams refused", f"range_resolution {self.range_resolution}, must be above 0 m"
-            )
+            raise RefusedInput("beams refused", f"range_resolution {self.range_resolution}, must be above 0 m")
         if not (math.isfinite(self.angle) and math.isfinite(self.sensor_angle)):
             raise RefusedInput("beams refused", f"head at {self.angle} rad, servo at {self.sensor_angle} rad")
         if not self.frame_id:

@@ -27,9 +27,7 @@ class IntensityCloud:
     def __post_init__(self) -> None:
         points, stamps = len(self.points), len(self.time_stamps)
         if points != stamps:
-            raise RefusedInput(
-                "clouds refused", f"{points} points but {stamps} time stamps; check the publisher"
-            )
+            raise RefusedInput("clouds refused", f"{points} points but {stamps} time stamps; check the publisher")
         if self.height < 1 or points % self.height:
             raise RefusedInput("clouds refused", f"{points} points do not fill {self.height} rows")
 

@@ -84,9 +84,7 @@ def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.
     possibly = tree.query_ball_point(points, radius + slack, return_length=True) > min_neighbors
     for index in np.flatnonzero(possibly & ~surely):
         near = points[tree.query_ball_point(points[index], radius + slack)]
-        surely[index] = (
-            np.count_nonzero(_squared_distances(near, points[index]) <= radius * radius) > min_neighbors
-        )
+        surely[index] = np.count_nonzero(_squared_distances(near, points[index]) <= radius * radius) > min_neighbors
     return surely
 
 

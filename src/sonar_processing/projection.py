@@ -7,9 +7,7 @@ import numpy as np
 from sonar_processing.beam import Beam
 
 
-def project_beam(
-    beam: Beam, T_target_sonar: np.ndarray, dispersed_points: int, beam_width: float
-) -> np.ndarray:
+def project_beam(beam: Beam, T_target_sonar: np.ndarray, dispersed_points: int, beam_width: float) -> np.ndarray:
     """Return (dispersed_points * bins, 4) float32: x y z [m] in the target frame and echo strength.
 
     Every bin is drawn as `dispersed_points` points side by side across the horizontal `beam_width` [rad]; one point

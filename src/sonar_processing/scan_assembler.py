@@ -44,12 +44,8 @@ class SonarToCloudParameters(ParameterSet):
     )
     scan_size: int = parameter(120, "beams that make a scan", low=1, high=3600, thesis_name="scanSize")
     end_at_full_turn: bool = parameter(True, "end a scan when the head passes its start again")
-    target_frame: str = parameter(
-        "odom", "frame the clouds are placed in", tunable=False, thesis_name="targetFrame"
-    )
-    min_range: float = parameter(
-        0.5, "bins nearer than this are ringing of the head", unit="m", low=0.0, high=100.0
-    )
+    target_frame: str = parameter("odom", "frame the clouds are placed in", tunable=False, thesis_name="targetFrame")
+    min_range: float = parameter(0.5, "bins nearer than this are ringing of the head", unit="m", low=0.0, high=100.0)
     height_limit: float = parameter(
         100.0, "points higher than this in the target frame are removed", unit="m", low=-12000.0, high=12000.0
     )

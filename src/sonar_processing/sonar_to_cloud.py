@@ -23,9 +23,7 @@ _BEAM_BUFFER_BYTES = 2**20
 class SonarToCloud:
     """Subscribes to beams, publishes scans and hands them to `deliver` where stages share the process."""
 
-    def __init__(
-        self, namespace: str = "~", deliver: Optional[Callable[[IntensityCloud], None]] = None
-    ) -> None:
+    def __init__(self, namespace: str = "~", deliver: Optional[Callable[[IntensityCloud], None]] = None) -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health("sonar_to_cloud")
         self._deliver = deliver

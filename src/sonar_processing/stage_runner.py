@@ -52,9 +52,7 @@ class StageRunner:
             return None
         invalid = len(cloud) - int(np.count_nonzero(cloud.valid))
         if invalid and not cloud.is_organized:
-            self.health.problem(
-                "points that are not finite", f"{invalid} of {len(cloud)} in this cloud", invalid
-            )
+            self.health.problem("points that are not finite", f"{invalid} of {len(cloud)} in this cloud", invalid)
         self.health.count("clouds out")
         self.health.count("points out", int(np.count_nonzero(result.valid)))
         self._publisher.publish(result)

@@ -114,9 +114,7 @@ class TransformFilter(message_filters.SimpleFilter):
 
     def _drop(self, beam: Beam) -> None:
         _, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))
-        self._health.problem(
-            "beams without transform", f"from {beam.frame_id} to {self._target_frame}: {reason}"
-        )
+        self._health.problem("beams without transform", f"from {beam.frame_id} to {self._target_frame}: {reason}")
 
     def _can_place(self, beam: Beam) -> bool:
         return bool(self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))[0])

@@ -14,21 +14,15 @@ class LaserConeParameters(ParameterSet):
 
     bins: int = parameter(500, "bins of a beam", low=1, high=4096, thesis_name="binCount", tunable=False)
     max_range: float = parameter(50.0, "range of the last bin's far end", unit="m", low=0.1, high=1000.0)
-    spread: float = parameter(
-        1.0, "standard deviation of an echo about its contact", unit="m", low=0.0, high=100.0
-    )
+    spread: float = parameter(1.0, "standard deviation of an echo about its contact", unit="m", low=0.0, high=100.0)
     echo_strength: int = parameter(15, "strength that one echo adds to its bin", low=0, high=255)
     saturation: int = parameter(127, "greatest strength of a bin", low=1, high=255)
-    noise_echoes: int = parameter(
-        15, "noise echoes written into each beam that hits something", low=0, high=10000
-    )
+    noise_echoes: int = parameter(15, "noise echoes written into each beam that hits something", low=0, high=10000)
     noise_range_sd: float = parameter(
         4.0, "standard deviation of noise echoes about the nearest contact", unit="m", low=0.0, high=1000.0
     )
     noise_strength_mean: float = parameter(53.0, "mean strength of a noise echo", low=0.0, high=255.0)
-    noise_strength_sd: float = parameter(
-        20.0, "standard deviation of a noise echo's strength", low=0.0, high=255.0
-    )
+    noise_strength_sd: float = parameter(20.0, "standard deviation of a noise echo's strength", low=0.0, high=255.0)
 
 
 class LaserCone:

@@ -16,9 +16,7 @@ class SonarParameters(ParameterSet):
     """The head's timing and the shape of its beam."""
 
     beams_per_turn: int = parameter(120, "beams in a full turn", low=1, high=3600, tunable=False)
-    seconds_per_turn: float = parameter(
-        16.0, "time of a full turn", unit="s", low=0.01, high=3600.0, tunable=False
-    )
+    seconds_per_turn: float = parameter(16.0, "time of a full turn", unit="s", low=0.01, high=3600.0, tunable=False)
     vertical_opening_deg: float = parameter(22.0, "height of the beam", unit="deg", low=0.0, high=179.0)
     horizontal_opening_deg: float = parameter(2.5, "width of the beam", unit="deg", low=0.0, high=360.0)
     ray_rows: int = parameter(50, "rays over the height of a beam", low=1, high=1000)
@@ -52,9 +50,7 @@ class SonarHead:
 class Sonar:
     """Hears a world. Same seed and calls, same bytes; a batch draws its random numbers in another order."""
 
-    def __init__(
-        self, caster: RayCaster, pattern: BeamPattern, model: EchoModel, rng: np.random.Generator
-    ) -> None:
+    def __init__(self, caster: RayCaster, pattern: BeamPattern, model: EchoModel, rng: np.random.Generator) -> None:
         self._caster = caster
         self._pattern = pattern
         self._model = model

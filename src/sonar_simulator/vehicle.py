@@ -94,9 +94,7 @@ class VehicleScript:
         if not isinstance(moves, list) or not moves:
             raise ScriptError(f"moves = {moves!r}: must be a list with at least one entry")
         beginning = _entry(Start, {} if start is None else start, "start")
-        entries = [
-            _entry(_kind_of(values), values, f"entry {number}") for number, values in enumerate(moves, 1)
-        ]
+        entries = [_entry(_kind_of(values), values, f"entry {number}") for number, values in enumerate(moves, 1)]
         return cls(entries, beginning.pose())
 
     @property

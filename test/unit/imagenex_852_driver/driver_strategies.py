@@ -50,12 +50,8 @@ def garbage(draw):
     pieces = st.one_of(
         st.binary(max_size=40),
         st.sampled_from((b"I", b"IG", b"IGX", b"IMX", b"IPX\x10", b"\xfc", b"\xfe\x44", b"\xfd")),
-        replies()
-        .map(Reply.encode)
-        .flatmap(lambda frame: st.integers(0, len(frame) - 1).map(lambda end: frame[:end])),
-        replies()
-        .map(Reply.encode)
-        .flatmap(lambda frame: st.integers(1, len(frame)).map(lambda start: frame[start:])),
+        replies().map(Reply.encode).flatmap(lambda frame: st.integers(0, len(frame) - 1).map(lambda end: frame[:end])),
+        replies().map(Reply.encode).flatmap(lambda frame: st.integers(1, len(frame)).map(lambda start: frame[start:])),
     )
     return b"".join(draw(st.lists(pieces, max_size=4)))
 

@@ -103,9 +103,7 @@ def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -
 
 
 if __name__ == "__main__":
-    account = run(
-        int(sys.argv[1]) if len(sys.argv) > 1 else 10000, float(sys.argv[2]) if len(sys.argv) > 2 else 0.05
-    )
+    account = run(int(sys.argv[1]) if len(sys.argv) > 1 else 10000, float(sys.argv[2]) if len(sys.argv) > 2 else 0.05)
     print({fault.value: count for fault, count in account.faults.items()})
     print(account.stats)
     print(f"{len(account.expected)} good replies sent, {len(account.delivered)} delivered,", end=" ")

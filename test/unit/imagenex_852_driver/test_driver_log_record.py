@@ -34,9 +34,7 @@ def test_every_ping_round_trips(ping):
     assert decode_record(ping.encode()) == ping
 
 
-@pytest.mark.parametrize(
-    ("kind", "length"), [(ReplyKind.IPX, 128), (ReplyKind.IMX, 384), (ReplyKind.IGX, 640)]
-)
+@pytest.mark.parametrize(("kind", "length"), [(ReplyKind.IPX, 128), (ReplyKind.IMX, 384), (ReplyKind.IGX, 640)])
 def test_records_have_the_lengths_of_the_maker(kind, length):
     assert len(LoggedPing(Reply(kind, 20, bytes(kind.echo_count))).encode()) == length
 
@@ -56,9 +54,7 @@ def test_a_depth_in_feet_is_read_in_metres():
     assert decode_record(bytes(record)).depth == pytest.approx(3.048)
 
 
-@pytest.mark.parametrize(
-    "text", [b"31-Feb-2019", b"27-Xyz-2019", b"99-Jun-2019", b"27-Jun-0001", b"\xff" * 11]
-)
+@pytest.mark.parametrize("text", [b"31-Feb-2019", b"27-Xyz-2019", b"99-Jun-2019", b"27-Jun-0001", b"\xff" * 11])
 def test_a_broken_date_leaves_the_ping_readable_and_without_a_stamp(text):
     record = bytearray(LoggedPing(REPLY, stamp=1.0).encode())
     record[8:19] = text

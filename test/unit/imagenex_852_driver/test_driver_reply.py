@@ -16,9 +16,7 @@ def test_every_valid_reply_round_trips(reply):
     assert Reply.decode(reply.encode()) == reply
 
 
-@pytest.mark.parametrize(
-    ("kind", "length"), [(ReplyKind.IMX, 265), (ReplyKind.IGX, 513), (ReplyKind.IPX, 13)]
-)
+@pytest.mark.parametrize(("kind", "length"), [(ReplyKind.IMX, 265), (ReplyKind.IGX, 513), (ReplyKind.IPX, 13)])
 def test_replies_have_the_lengths_of_the_thesis(kind, length):
     assert len(Reply(kind, 20, bytes(kind.echo_count)).encode()) == length
 

@@ -76,12 +76,8 @@ def test_a_sector_narrower_than_a_step_is_refused():
 
 
 @REPEATABLE
-@given(
-    st.integers(0, 255), st.floats(0, 2.55), st.integers(0, 510), st.integers(-210, 210), st.integers(0, 360)
-)
-def test_settings_that_exist_never_put_the_terminator_inside_a_command(
-    pulse, absorption, delay, train, sector
-):
+@given(st.integers(0, 255), st.floats(0, 2.55), st.integers(0, 510), st.integers(-210, 210), st.integers(0, 360))
+def test_settings_that_exist_never_put_the_terminator_inside_a_command(pulse, absorption, delay, train, sector):
     try:
         settings = HeadSettings(
             pulse_length_us=pulse,

@@ -56,9 +56,7 @@ def test_collisions_are_taken_before_visuals(load):
 
 
 def test_a_link_without_collision_is_seen_by_its_visuals(load):
-    assert [shape.kind for shape in load(_model(f'<visual name="v">{BALL}</visual>')).world.shapes] == [
-        "sphere"
-    ]
+    assert [shape.kind for shape in load(_model(f'<visual name="v">{BALL}</visual>')).world.shapes] == ["sphere"]
 
 
 @pytest.mark.parametrize("geometry", ["plane", "mesh", "heightmap", "unheard_of"])
@@ -73,9 +71,7 @@ def test_unsupported_geometry_is_one_warning_and_the_rest_loads(load, geometry):
 
 
 def test_an_include_is_one_warning_that_names_its_uri(load):
-    loaded = load(
-        "<include><uri>model://ship</uri></include>" + _model(f'<collision name="c">{BOX}</collision>')
-    )
+    loaded = load("<include><uri>model://ship</uri></include>" + _model(f'<collision name="c">{BOX}</collision>'))
     (warning,) = loaded.warnings
     assert "model://ship" in warning
 

@@ -20,9 +20,7 @@ WALLS = World.from_shapes("walls", [shape for shape in BASIN.shapes if "wall" in
 
 
 def _sonar(world, seed=0, pattern=PATTERN, **values):
-    return Sonar(
-        RayCaster(world), pattern, make_echo_model("laser_cone", values), np.random.default_rng(seed)
-    )
+    return Sonar(RayCaster(world), pattern, make_echo_model("laser_cone", values), np.random.default_rng(seed))
 
 
 def _repeated(pose, count=120):

@@ -113,9 +113,7 @@ def test_odometry_agrees_with_the_world_at_the_start():
 
 
 def test_odometry_gives_velocities_off_by_its_error_and_true_turn_rates():
-    twist = Odometry(OdometryParameters(scale_error=0.25), START).twist(
-        np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.2])
-    )
+    twist = Odometry(OdometryParameters(scale_error=0.25), START).twist(np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.2]))
     np.testing.assert_allclose(twist, [0.8, 0.4, 0.0, 0.0, 0.0, 0.2])
 
 

@@ -16,9 +16,7 @@ def test_the_outline_of_a_wall_is_its_closed_rectangle():
 
 
 def test_the_outline_of_a_buoy_is_a_circle():
-    (outline,) = World.from_shapes(
-        "w", [Shape("b", "cylinder", pose_matrix((3, 4, 0)), (0.5, 5.0))]
-    ).outlines()
+    (outline,) = World.from_shapes("w", [Shape("b", "cylinder", pose_matrix((3, 4, 0)), (0.5, 5.0))]).outlines()
     np.testing.assert_allclose(np.hypot(outline[:, 0] - 3, outline[:, 1] - 4), 0.5)
 
 
