@@ -54,7 +54,8 @@ def group_points(points: np.ndarray, cell: np.ndarray, resolution: float) -> Int
     ends = np.append(starts[1:], len(points)) - 1
     count = (ends - starts + 1).astype(np.float64)
     group = np.cumsum(is_start) - 1
-    mean = _sums(points, group, len(starts)) / count[:, np.newaxis]
+    # From one of the points on: a plain sum rounds, and the mean of points on a border would leave their cell.
+    mean = points[starts] + _sums(points - points[starts][group], group, len(starts)) / count[:, np.newaxis]
     squares = _sums((points - mean[group]) ** 2, group, len(starts))
     new = np.full(len(starts), -1, dtype=np.int64)
     return Intervals(cell[starts], z[starts], z[ends], count, mean, squares, new)
@@ -86,7 +87,9 @@ def merge(intervals: Intervals, starts: np.ndarray) -> Intervals:
     group[starts[1:]] = 1
     group = np.cumsum(group)
     count = np.add.reduceat(intervals.count, starts)
-    mean = _sums(intervals.mean * intervals.count[:, np.newaxis], group, len(starts)) / count[:, np.newaxis]
+    first = intervals.mean[starts]
+    offsets = (intervals.mean - first[group]) * intervals.count[:, np.newaxis]
+    mean = first + _sums(offsets, group, len(starts)) / count[:, np.newaxis]
     shift = intervals.mean - mean[group]
     squares = _sums(intervals.squares + shift**2 * intervals.count[:, np.newaxis], group, len(starts))
     return Intervals(

@@ -1,4 +1,4 @@
-"""Counters, rates and problems of one stage, as /diagnostics shows them. Free of ROS and safe to use from any thread."""
+"""Counters, rates and problems of one stage, as /diagnostics shows them. Free of ROS, safe to use from any thread."""
 
 import threading
 import time

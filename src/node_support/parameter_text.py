@@ -12,13 +12,19 @@ _YAML_TYPES = {float: "float", int: "int", bool: "bool", str: "string"}
 def default_yaml(node: str, parameters: Type[ParameterSet]) -> str:
     """Return the text of yaml/<node>_default.yaml: every key with its meaning, what is allowed, and its default."""
     lines = [f"# Defaults of {node}. Keys marked * can be changed while it runs (dynamic_reconfigure)."]
+    return "\n".join(lines + yaml_keys(parameters, live=True)) + "\n"
+
+
+def yaml_keys(parameters: Type[ParameterSet], live: bool) -> List[str]:
+    """Return the lines of all keys; `live` marks those that dynamic_reconfigure may change."""
+    lines: List[str] = []
     for field in dataclasses.fields(parameters):
         described = describe(field)
-        mark = " *" if described.tunable else ""
+        mark = " *" if described.tunable and live else ""
         thesis = f"; thesis: {described.thesis_name}" if described.thesis_name else ""
         lines += ["", f"# {described.text}{mark}", f"#   {described.allowed(field.type)}{thesis}"]
         lines.append(f"{field.name}: {_yaml_value(field.default)}")
-    return "\n".join(lines) + "\n"
+    return lines
 
 
 def markdown_table(parameters: Type[ParameterSet]) -> str:

@@ -66,7 +66,9 @@ def statistical_inliers(points: np.ndarray, mean_k: int, stddev_multiplier: floa
     neighbors = min(mean_k, len(points) - 1)
     distances, _ = cKDTree(points).query(points, k=neighbors + 1)
     mean_distances = distances[:, 1:].mean(axis=1)
-    return mean_distances <= mean_distances.mean() + stddev_multiplier * mean_distances.std(ddof=1)
+    # Above the smallest, for the mean of equal numbers may round to less than each of them.
+    excess = mean_distances - mean_distances.min()
+    return excess <= excess.mean() + stddev_multiplier * excess.std(ddof=1)
 
 
 def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.ndarray:

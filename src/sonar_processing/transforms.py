@@ -1,7 +1,8 @@
 """Transforms as 4 x 4 matrices."""
 
 import numpy as np
-from geometry_msgs.msg import Transform
+from geometry_msgs.msg import Pose, Transform
+from scipy.spatial.transform import Rotation
 
 from node_support.refused_input import RefusedInput
 
@@ -23,3 +24,12 @@ def matrix_from_message(transform: Transform) -> np.ndarray:
     ]
     matrix[:3, 3] = translation
     return matrix
+
+
+def pose_from_matrix(matrix: np.ndarray) -> Pose:
+    """Return the pose message of a (4, 4) matrix."""
+    pose = Pose()
+    pose.position.x, pose.position.y, pose.position.z = matrix[:3, 3]
+    quaternion = Rotation.from_matrix(matrix[:3, :3]).as_quat()
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = quaternion
+    return pose

@@ -1,0 +1,14 @@
+"""The executables of this package."""
+
+from node_support.node import DiagnosticsPublisher, run
+from sonar_simulator.simulator_node import Simulator
+
+
+def run_simulator() -> None:
+    """Run the simulator."""
+
+    def construct() -> tuple:
+        simulator = Simulator()
+        return simulator, DiagnosticsPublisher([simulator.health])
+
+    run("sonar_simulator", construct)
