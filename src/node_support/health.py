@@ -57,6 +57,11 @@ class Health:
         with self._lock:
             self._counts[what] = self._counts.get(what, 0) + number
 
+    def total(self, what: str, total: int) -> None:
+        """Set a counter that is kept elsewhere; its total and its rate are reported."""
+        with self._lock:
+            self._counts[what] = total
+
     def show(self, what: str, value: str) -> None:
         """Report a value as it is."""
         with self._lock:

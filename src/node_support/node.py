@@ -16,12 +16,19 @@ from node_support.refused_input import RefusedInput
 DIAGNOSTICS_PERIOD = 1.0
 
 
+class StartError(Exception):
+    """The node cannot start for a reason that the user must cure; the text is one line for the user."""
+
+
 def run(name: str, construct: Callable[[], Any]) -> None:
-    """Initialise the node, construct it and spin until Ctrl-C; bad parameters end it with one line and status 1."""
+    """Initialise the node, construct it and spin until Ctrl-C.
+
+    ParameterError and StartError end it with one line and status 1.
+    """
     rospy.init_node(name)
     try:
         node = construct()
-    except ParameterError as error:
+    except (ParameterError, StartError) as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(1)
     except rospy.ROSInterruptException:

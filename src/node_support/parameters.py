@@ -32,6 +32,7 @@ class Description:
     high: Optional[float] = None
     thesis_name: str = ""
     tunable: bool = True
+    may_be_empty: bool = False
 
     def allowed(self, kind: type) -> str:
         """Return in words which values a parameter of type `kind` takes."""
@@ -40,7 +41,7 @@ class Description:
         if kind is bool:
             return "true or false"
         if kind is str:
-            return "a text that is not empty"
+            return "a text" if self.may_be_empty else "a text that is not empty"
         number = "an integer" if kind is int else "a number"
         bounds = [f"{word} {bound:g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None]
         unit = f" {self.unit}" if self.unit else ""
@@ -56,13 +57,15 @@ def parameter(
     high: Optional[float] = None,
     thesis_name: str = "",
     tunable: bool = True,
+    may_be_empty: bool = False,
 ) -> Any:
     """Declare one field of a `ParameterSet`.
 
     `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
-    the others only at start-up; `thesis_name` is the parameter's name in the 2015 package.
+    the others only at start-up; `may_be_empty` allows an empty text; `thesis_name` is the parameter's name in the
+    2015 package.
     """
-    description = Description(text, unit, low, high, thesis_name, tunable)
+    description = Description(text, unit, low, high, thesis_name, tunable, may_be_empty)
     return dataclasses.field(default=default, metadata={_METADATA_KEY: description})
 
 
@@ -116,7 +119,8 @@ def _validated(field: dataclasses.Field, value: Any) -> Any:
         typed = _converted(field.type, value)
     except (TypeError, ValueError):
         typed = None
-    if typed is None or not _in_range(typed, description) or typed == "":
+    missing = typed is None or (typed == "" and not description.may_be_empty)
+    if missing or not _in_range(typed, description):
         raise ParameterError(f"{field.name} = {_plain(value)!r}: must be {description.allowed(field.type)}")
     return typed
 
