@@ -5,7 +5,15 @@ from setuptools import setup
 
 setup(
     **generate_distutils_setup(
-        packages=["node_support", "sonar_processing", "mlsm_manager", "sonar_simulator"],
+        packages=[
+            "node_support",
+            "imagenex_852_driver",
+            "imagenex_852_driver.emulator",
+            "imagenex_852_driver.protocol",
+            "sonar_processing",
+            "mlsm_manager",
+            "sonar_simulator",
+        ],
         package_dir={"": "src"},
     )
 )
