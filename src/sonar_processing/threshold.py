@@ -23,7 +23,7 @@ class ThresholdMode(Enum):
 class ThresholderParameters(ParameterSet):
     """Parameters of thresholder."""
 
-    mode: ThresholdMode = parameter(ThresholdMode.OTSU, "how the threshold is chosen", thesis_name="mode")
+    mode: ThresholdMode = parameter(ThresholdMode.OTSU_PROPORTIONAL, "how the threshold is chosen", thesis_name="mode")
     fixed_threshold: float = parameter(
         66.0,
         "threshold of mode FIXED",
@@ -33,7 +33,7 @@ class ThresholderParameters(ParameterSet):
         thesis_name="fixedThresholdValue",
     )
     otsu_multiplier: float = parameter(
-        1.2,
+        1.4,
         "factor on Otsu's threshold in OTSU+PROPORTIONAL",
         low=0.0,
         high=10.0,

@@ -22,7 +22,8 @@ from sonar_simulator.ray_caster import RayCaster
 from sonar_simulator.script_file import load_script
 from sonar_simulator.sdf import WorldError, load_sdf
 from sonar_simulator.simulation import Simulation, SimulatorParameters
-from sonar_simulator.simulator_publisher import BASE_FRAME, SONAR_FRAME, SimulatorPublisher
+from sonar_simulator.simulator_messages import BASE_FRAME, SONAR_FRAME
+from sonar_simulator.simulator_publisher import SimulatorPublisher
 from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle import ScriptError
 
@@ -47,7 +48,7 @@ class Simulator:
         rng = np.random.default_rng(self._parameters.seed)
         self._script = _loaded(load_script, self._parameters.script)
         self._sonar = Sonar(RayCaster(self._load_world()), self._sonar_parameters.pattern(), model, rng)
-        self._publisher = SimulatorPublisher(self._sonar.max_range, self._sonar.range_resolution)
+        self._publisher = SimulatorPublisher(self._sonar.max_range)
         self._start_time = START_TIME
         threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
 

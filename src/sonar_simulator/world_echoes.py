@@ -1,0 +1,54 @@
+"""Echoes of a world file for an emulated head, which asks for one ping at a time (thesis 6.4)."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from sonar_simulator.beam_pattern import BeamPattern
+from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.ray_caster import RayCaster
+from sonar_simulator.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world import World
+
+_FULL_STRENGTH_DB = 20.0
+
+
+class PingCommand(Protocol):
+    """What of a head's command changes its echoes: reach in m, gain in dB."""
+
+    max_range: int
+    start_gain_db: int
+
+
+class PingRequest(Protocol):
+    """One ping of an emulated head: angle in rad, counter-clockwise, number of bins, and the command."""
+
+    angle: float
+    bin_count: int
+    command: PingCommand
+
+
+class WorldEchoes:
+    """Answers pings with what a head that stands still hears of a world; the gain scales the strengths."""
+
+    def __init__(self, world: World, T_world_sonar: np.ndarray, seed: int) -> None:
+        """Raises RuntimeError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
+        self._caster = RayCaster(world)
+        self._pose = T_world_sonar
+        self._pattern: BeamPattern = SonarParameters().pattern()
+        self._rng = np.random.default_rng(seed)
+
+    def echoes(self, ping: PingRequest) -> bytes:
+        """Return `ping.bin_count` echo strengths (0 to 255), nearest bin first."""
+        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.command.max_range))
+        sonar = Sonar(self._caster, self._pattern, model, self._rng)
+        factor = 10 ** ((ping.command.start_gain_db - _FULL_STRENGTH_DB) / 20)
+        strengths = sonar.ping(self._pose, ping.angle) * factor
+        return np.minimum(np.rint(strengths), 255).astype(np.uint8).tobytes()
+
+
+def sonar_pose(x: float, y: float, z: float, yaw_deg: float) -> np.ndarray:
+    """Return the (4, 4) pose of a head that stands upright in the world; m, degrees counter-clockwise."""
+    return pose_matrix((x, y, z), (0.0, 0.0, math.radians(yaw_deg)))
