@@ -1,0 +1,99 @@
+"""The batch-wise map against the point-by-point rule of thesis 6.2 and 6.5.6."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from literal_mlsm import LiteralMap
+from map_comparison import assert_follows_the_literal_rule, batch_map, partition
+
+RESOLUTIONS = st.sampled_from([0.1, 0.25, 0.3, 0.5, 1.0])
+BATCHES = st.integers(1, 6)
+STRENGTH = st.integers(0, 127)
+
+
+def _coordinates(values):
+    return st.lists(st.tuples(values, values, values, STRENGTH), max_size=40)
+
+
+def _on_lattice(points, spacing):
+    return [(x * spacing, y * spacing, z * spacing, strength) for x, y, z, strength in points]
+
+
+@given(_coordinates(st.floats(-1.5, 1.5)), RESOLUTIONS, BATCHES)
+def test_random_points(points, resolution, batches):
+    assert_follows_the_literal_rule(points, resolution, batches)
+
+
+@given(_coordinates(st.floats(-1.5, 1.5, width=32)), RESOLUTIONS, BATCHES)
+def test_points_of_single_precision(points, resolution, batches):
+    assert_follows_the_literal_rule(np.array(points, dtype=np.float32).reshape(-1, 4), resolution, batches)
+
+
+@pytest.mark.parametrize("fraction", [1.0, 0.5, 1.0 / 3.0])
+@given(_coordinates(st.integers(-3, 3)), RESOLUTIONS, BATCHES)
+def test_lattices_whose_gaps_are_the_resolution_or_a_part_of_it(fraction, points, resolution, batches):
+    assert_follows_the_literal_rule(_on_lattice(points, resolution * fraction), resolution, batches)
+
+
+@given(st.lists(st.integers(-12, 12), max_size=60), RESOLUTIONS, BATCHES)
+def test_one_crowded_column(levels, resolution, batches):
+    points = [(0.0, 0.0, level * resolution * 0.5, index) for index, level in enumerate(levels)]
+    assert_follows_the_literal_rule(points, resolution, batches)
+
+
+@given(st.lists(st.integers(-12, 12), max_size=30), st.integers(2, 5), RESOLUTIONS, BATCHES)
+def test_duplicates(levels, copies, resolution, batches):
+    points = [(0.0, 0.0, level * resolution * 0.5, 1.0) for level in levels] * copies
+    assert_follows_the_literal_rule(points, resolution, batches)
+
+
+@given(_coordinates(st.floats(-1.5, 1.5)), st.sampled_from([-9000.0, 9000.0]), BATCHES)
+def test_cells_far_from_the_origin(points, shift, batches):
+    moved = [(x + shift, y - shift, z, strength) for x, y, z, strength in points]
+    assert_follows_the_literal_rule(moved, 0.5, batches)
+
+
+@pytest.mark.parametrize("batches", [1, 7, 4000])
+def test_a_scan_of_many_points(batches):
+    rng = np.random.default_rng(0)
+    points = np.column_stack([rng.normal(0.0, 2.0, (4000, 2)), rng.normal(0.0, 4.0, 4000), rng.uniform(0, 127, 4000)])
+    assert_follows_the_literal_rule(points, 0.5, batches)
+
+
+@given(st.data(), _coordinates(st.integers(-2, 2)), RESOLUTIONS)
+def test_the_order_of_the_points_changes_nothing(data, points, resolution):
+    lattice = _on_lattice(points, resolution * 0.5)
+    shuffled = data.draw(st.permutations(lattice))
+    maps = [batch_map(np.array(order).reshape(-1, 4), resolution, 3) for order in (lattice, shuffled)]
+    assert partition(maps[0]) == partition(maps[1])
+
+
+def test_a_gap_of_exactly_the_resolution_separates():
+    assert batch_map(np.array([[0, 0, 0.0, 1], [0, 0, 0.5, 1]]), 0.5).count.tolist() == [1, 1]
+
+
+def test_a_gap_of_a_little_less_than_the_resolution_joins():
+    below = np.nextafter(0.5, 0.0)
+    assert batch_map(np.array([[0, 0, 0.0, 1], [0, 0, below, 1]]), 0.5).count.tolist() == [2]
+
+
+def test_a_point_within_reach_of_two_stored_blocks_fuses_them():
+    blocks = batch_map(np.array([[0, 0, 0.0, 1], [0, 0, 0.8, 1], [0, 0, 0.4, 4]]), 0.5, 3)
+    assert partition(blocks) == [((0, 0), 0.0, 0.8, 3, 1)]
+    np.testing.assert_allclose(blocks.mean, [[0.0, 0.0, 0.4, 2.0]])
+
+
+def test_a_point_between_bottom_and_top_belongs_though_both_are_far():
+    column = [[0, 0, 0.4 * step, 1] for step in range(6)]
+    blocks = batch_map(np.array([*column, [0, 0, 1.0, 1]]), 0.5, 7)
+    assert partition(blocks) == [((0, 0), 0.0, 2.0, 7, 1)]
+
+
+def test_the_variance_is_the_populations_and_not_that_of_equation_6_6():
+    points = np.array([[0.0, 0.1, 0.2, 10.0], [0.2, 0.3, 0.4, 30.0]])
+    literal = LiteralMap(0.5)
+    literal.insert(points)
+    ((_, block),) = literal.sorted_blocks()
+    np.testing.assert_allclose(batch_map(points, 0.5, 2).variance, [points.var(axis=0)])
+    np.testing.assert_allclose(block.variance, points.var(axis=0) / 2.0)

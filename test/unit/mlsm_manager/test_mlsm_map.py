@@ -1,0 +1,171 @@
+"""What the map promises besides the rule by which points make blocks."""
+
+import numpy as np
+import pytest
+from map_comparison import partition
+
+from mlsm_manager.blocks import BlockType, cells_of
+from mlsm_manager.mlsm import InsertReport, MultiLevelSurfaceMap
+
+
+def _map_of(points, resolution=0.5, **options):
+    mlsm = MultiLevelSurfaceMap(resolution, **options)
+    mlsm.insert(np.array(points, dtype=np.float64).reshape(-1, 4))
+    return mlsm
+
+
+def _grid(side, z):
+    x, y = np.divmod(np.arange(side * side), side)
+    return np.column_stack([x + 0.25, y + 0.25, np.full(x.size, z), np.ones(x.size)])
+
+
+def test_a_cell_holds_its_lower_border_and_not_its_upper():
+    blocks = _map_of([[0.5, 1.0, 0, 1], [np.nextafter(0.5, 0), np.nextafter(1.0, 0), 0, 1]]).blocks
+    assert sorted(blocks.cells.tolist()) == [[0, 1], [1, 2]]
+
+
+def test_negative_coordinates_round_down():
+    assert _map_of([[-0.1, -0.6, 0, 1]]).blocks.cells.tolist() == [[-1, -2]]
+
+
+def test_the_four_cells_around_the_origin_are_four():
+    assert len(_map_of([[x, y, 0, 1] for x in (-0.1, 0.1) for y in (-0.1, 0.1)])) == 4
+
+
+@pytest.mark.parametrize("resolution", [0.1, 0.3, 0.7])
+@pytest.mark.parametrize("batches", [1, 7])
+def test_points_on_a_border_stay_in_their_cell_when_their_mean_is_taken(resolution, batches):
+    borders = np.arange(-40, 41) * resolution
+    points = np.column_stack([borders, borders, np.zeros(81), np.ones(81)])
+    mlsm = MultiLevelSurfaceMap(resolution)
+    for batch in np.array_split(np.tile(points, (7, 1)), batches):
+        mlsm.insert(batch)
+    expected = {tuple(cell) for cell in cells_of(points, resolution).tolist()}
+    assert {tuple(cell) for cell in mlsm.blocks.cells.tolist()} == expected
+
+
+def test_a_cells_centre_lies_half_a_cell_from_its_borders():
+    assert _map_of([[-0.1, 0.7, 0, 1]]).blocks.centers.tolist() == [[-0.25, 0.75]]
+
+
+def test_one_point_makes_a_flat_horizontal_block_without_variance():
+    blocks = _map_of([[0.1, 0.2, -3.0, 40.0]]).blocks
+    assert partition(blocks) == [((0, 0), -3.0, -3.0, 1, BlockType.HORIZONTAL)]
+    assert blocks.mean.tolist() == [[0.1, 0.2, -3.0, 40.0]]
+    assert blocks.variance.tolist() == [[0.0, 0.0, 0.0, 0.0]]
+
+
+def test_a_block_as_deep_as_a_cell_is_vertical():
+    assert _map_of([[0, 0, z, 1] for z in (0.0, 0.25, 0.5)]).blocks.type.tolist() == [BlockType.VERTICAL]
+
+
+def test_a_block_less_deep_than_a_cell_is_horizontal():
+    assert _map_of([[0, 0, z, 1] for z in (0.0, 0.25, 0.49)]).blocks.type.tolist() == [BlockType.HORIZONTAL]
+
+
+def test_an_empty_array_changes_nothing():
+    mlsm = _map_of([[0, 0, 0, 1]])
+    assert mlsm.insert(np.empty((0, 4), dtype=np.float32)) == InsertReport(0, 0, 0)
+    assert len(mlsm) == 1
+
+
+def test_an_empty_map_has_no_blocks():
+    mlsm = MultiLevelSurfaceMap(0.5)
+    assert len(mlsm) == len(mlsm.blocks) == len(mlsm.blocks.cells) == len(mlsm.blocks.type) == 0
+
+
+@pytest.mark.parametrize("column", range(4))
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
+def test_a_point_that_is_not_finite_is_counted_and_left_out(column, value):
+    points = np.array([[0.1, 0.1, 0, 1], [0.1, 0.1, 0, 1]], dtype=np.float32)
+    points[1, column] = value
+    mlsm = MultiLevelSurfaceMap(0.5)
+    assert mlsm.insert(points) == InsertReport(inserted=1, not_finite=1, outside=0)
+    assert mlsm.blocks.count.tolist() == [1]
+
+
+@pytest.mark.parametrize("column", range(3))
+@pytest.mark.parametrize("value", [-100.5, 100.5, 1e6, -1e30])
+def test_a_point_beyond_the_limit_is_counted_and_left_out(column, value):
+    points = np.ones((2, 4))
+    points[1, column] = value
+    mlsm = MultiLevelSurfaceMap(0.5, limit=100.0)
+    assert mlsm.insert(points) == InsertReport(inserted=1, not_finite=0, outside=1)
+    assert len(mlsm) == 1
+
+
+def test_a_point_on_the_limit_is_inserted():
+    assert MultiLevelSurfaceMap(0.5, limit=100.0).insert(np.array([[100.0, -100, 100, 1]])).inserted == 1
+
+
+def test_a_cloud_of_refused_points_only_leaves_the_map_empty():
+    mlsm = MultiLevelSurfaceMap(0.5)
+    assert mlsm.insert(np.full((5, 4), np.nan)) == InsertReport(0, 5, 0)
+    assert len(mlsm) == 0
+
+
+def test_the_smallest_cells_reach_the_widest_limit():
+    corners = np.array([[x, y, 0.0, 1.0] for x in (-1e6, 1e6) for y in (-1e6, 1e6)])
+    blocks = _map_of(corners, resolution=0.01, limit=1e6).blocks
+    assert sorted(blocks.cells.tolist()) == [[x, y] for x in (-(10**8), 10**8) for y in (-(10**8), 10**8)]
+
+
+def test_the_map_grows_beyond_its_first_capacity_and_forgets_nothing():
+    points = _grid(120, 0.0)
+    mlsm = MultiLevelSurfaceMap(0.5)
+    for batch in np.array_split(points, 9):
+        mlsm.insert(batch)
+    mean = mlsm.blocks.mean
+    assert mean[np.lexsort((mean[:, 1], mean[:, 0]))].tolist() == points.tolist()
+
+
+def test_cells_found_before_growing_are_found_after():
+    mlsm = _map_of(_grid(120, 0.0))
+    mlsm.insert(_grid(120, 0.1))
+    assert mlsm.blocks.count.tolist() == [2] * 14400
+
+
+def test_a_cell_holds_thousands_of_blocks():
+    column = np.column_stack([np.zeros((3000, 2)), np.arange(3000.0), np.ones(3000)])
+    mlsm = _map_of(column)
+    mlsm.insert(column + [0.0, 0.0, 0.1, 0.0])
+    assert mlsm.blocks.count.tolist() == [2] * 3000
+
+
+def test_rows_freed_by_fusing_are_used_again():
+    mlsm = MultiLevelSurfaceMap(0.5, expected_blocks=1024)
+    before = mlsm.nbytes
+    for shift in (0.0, 100.0):
+        for z in (0.0, 0.8, 0.4):
+            mlsm.insert(_grid(17, z) + [shift, 0.0, 0.0, 0.0])
+    assert mlsm.blocks.count.tolist() == [3] * (2 * 289)
+    assert mlsm.nbytes == before
+
+
+def test_an_expected_size_is_reserved_at_once():
+    mlsm = MultiLevelSurfaceMap(0.5, expected_blocks=14400)
+    before = mlsm.nbytes
+    mlsm.insert(_grid(120, 0.0))
+    assert mlsm.nbytes == before
+
+
+def test_a_full_map_takes_at_most_120_bytes_per_block():
+    mlsm = MultiLevelSurfaceMap(0.5)
+    x, y = np.divmod(np.arange(2**17), 512)
+    for batch in np.array_split(np.column_stack([x, y, np.zeros(2**17), np.ones(2**17)]), 16):
+        mlsm.insert(batch)
+    assert len(mlsm) == 2**17
+    assert mlsm.nbytes / len(mlsm) <= 120.0
+
+
+def test_a_snapshot_does_not_change_with_the_map():
+    mlsm = _map_of([[0, 0, 0, 1]])
+    blocks = mlsm.blocks
+    mlsm.insert(np.array([[0, 0, 0.1, 1]]))
+    assert blocks.count.tolist() == [1]
+
+
+def test_the_points_given_are_not_written_to():
+    points = np.array([[0.3, 0.3, 0.2, 1.0], [0.1, 0.1, 0.1, np.nan]])
+    points.setflags(write=False)
+    assert MultiLevelSurfaceMap(0.5).insert(points).inserted == 1
