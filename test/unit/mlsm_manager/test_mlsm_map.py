@@ -14,9 +14,9 @@ def _map_of(points, resolution=0.5, **options):
     return mlsm
 
 
-def _grid(side, z):
+def _grid(side, z, place=0.0):
     x, y = np.divmod(np.arange(side * side), side)
-    return np.column_stack([x + 0.25, y + 0.25, np.full(x.size, z), np.ones(x.size)])
+    return np.column_stack([place + x + 0.25, y + 0.25, np.full(x.size, z), np.ones(x.size)])
 
 
 def test_a_cell_holds_its_lower_border_and_not_its_upper():
@@ -128,16 +128,17 @@ def test_cells_found_before_growing_are_found_after():
 def test_a_cell_holds_thousands_of_blocks():
     column = np.column_stack([np.zeros((3000, 2)), np.arange(3000.0), np.ones(3000)])
     mlsm = _map_of(column)
-    mlsm.insert(column + [0.0, 0.0, 0.1, 0.0])
+    column[:, 2] += 0.1
+    mlsm.insert(column)
     assert mlsm.blocks.count.tolist() == [2] * 3000
 
 
 def test_rows_freed_by_fusing_are_used_again():
     mlsm = MultiLevelSurfaceMap(0.5, expected_blocks=1024)
     before = mlsm.nbytes
-    for shift in (0.0, 100.0):
+    for place in (0.0, 100.0):
         for z in (0.0, 0.8, 0.4):
-            mlsm.insert(_grid(17, z) + [shift, 0.0, 0.0, 0.0])
+            mlsm.insert(_grid(17, z, place))
     assert mlsm.blocks.count.tolist() == [3] * (2 * 289)
     assert mlsm.nbytes == before
 

@@ -1,0 +1,24 @@
+"""What mlsm_core's parameters allow together."""
+
+import pytest
+
+from mlsm_manager.core_parameters import MlsmCoreParameters
+from node_support.parameters import ParameterError
+
+
+def test_the_default_reserves_the_thesis_basin():
+    assert MlsmCoreParameters().expected_blocks == 240 * 100
+
+
+def test_an_extent_that_no_memory_holds_is_refused():
+    with pytest.raises(ParameterError, match=r"size_x_meters = 90000\.0.*at most 16000000 cells"):
+        MlsmCoreParameters(size_x_meters=90000.0, size_y_meters=90000.0)
+
+
+def test_an_extent_may_be_zero():
+    assert MlsmCoreParameters(size_x_meters=0, size_y_meters=0).expected_blocks == 0
+
+
+def test_map_and_odom_must_be_two_frames():
+    with pytest.raises(ParameterError, match=r"map_frame = 'odom': must differ from odom_frame"):
+        MlsmCoreParameters(map_frame="odom")

@@ -1,0 +1,117 @@
+"""Maps as PLY files."""
+
+import os
+import stat
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.storage import map_path, write_ply
+
+_NUMPY_TYPES = {"double": "<f8", "uint": "<u4", "uchar": "u1"}
+
+
+@pytest.fixture
+def blocks():
+    rng = np.random.default_rng(0)
+    mlsm = MultiLevelSurfaceMap(0.5)
+    mlsm.insert(np.column_stack([rng.uniform(-3, 3, (500, 3)), rng.uniform(0, 127, 500)]))
+    return mlsm.blocks
+
+
+def _read_ply(path):
+    """Return a PLY's header lines and its vertices, read by the header alone."""
+    header, data = path.read_bytes().split(b"end_header\n", 1)
+    lines = header.decode("ascii").splitlines()
+    properties = [line.split()[1:] for line in lines if line.startswith("property")]
+    vertices = np.frombuffer(data, dtype=[(name, _NUMPY_TYPES[kind]) for kind, name in properties])
+    return lines, vertices
+
+
+def test_every_block_is_a_vertex_with_all_it_holds(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    lines, vertices = _read_ply(tmp_path / "basin.ply")
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
+    assert f"element vertex {len(blocks)}" in lines
+    np.testing.assert_array_equal(np.column_stack([vertices[n] for n in ("x", "y", "z", "intensity")]), blocks.mean)
+    variances = [vertices[f"variance_{name}"] for name in ("x", "y", "z", "intensity")]
+    np.testing.assert_array_equal(np.column_stack(variances), blocks.variance)
+    np.testing.assert_array_equal(vertices["bottom"], blocks.bottom)
+    np.testing.assert_array_equal(vertices["height"], blocks.height)
+    np.testing.assert_array_equal(vertices["count"], blocks.count)
+    np.testing.assert_array_equal(vertices["type"], blocks.type)
+
+
+def test_the_resolution_is_in_the_comment(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    assert "comment multi level surface map, resolution 0.5 m" in _read_ply(tmp_path / "basin.ply")[0]
+
+
+def test_another_library_reads_the_points(tmp_path, blocks):
+    trimesh = pytest.importorskip("trimesh")
+    write_ply(tmp_path / "basin.ply", blocks)
+    np.testing.assert_allclose(trimesh.load(str(tmp_path / "basin.ply")).vertices, blocks.mean[:, :3], rtol=1e-6)
+
+
+def test_an_empty_map_is_a_file_without_vertices(tmp_path):
+    write_ply(tmp_path / "empty.ply", MultiLevelSurfaceMap(0.5).blocks)
+    assert len(_read_ply(tmp_path / "empty.ply")[1]) == 0
+
+
+def test_a_folder_that_is_not_there_is_made(tmp_path, blocks):
+    write_ply(tmp_path / "maps" / "today" / "basin.ply", blocks)
+    assert len(_read_ply(tmp_path / "maps" / "today" / "basin.ply")[1]) == len(blocks)
+
+
+def test_a_map_replaces_the_one_of_its_name(tmp_path, blocks):
+    path = tmp_path / "basin.ply"
+    path.write_text("old")
+    write_ply(path, blocks)
+    assert len(_read_ply(path)[1]) == len(blocks)
+
+
+def test_others_may_read_the_map(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    assert stat.S_IMODE((tmp_path / "basin.ply").stat().st_mode) == 0o644
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_failure_while_writing_leaves_the_old_map_and_nothing_else(tmp_path, blocks, monkeypatch, call):
+    path = tmp_path / "basin.ply"
+    path.write_text("old")
+
+    def full_disk(*_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, call, full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        write_ply(path, blocks)
+    assert path.read_text() == "old"
+    assert os.listdir(str(tmp_path)) == ["basin.ply"]
+
+
+def test_a_folder_that_is_a_file_is_an_error_of_the_system(tmp_path, blocks):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(OSError, match="file"):
+        write_ply(tmp_path / "file" / "basin.ply", blocks)
+
+
+@pytest.mark.parametrize(
+    "name", ["", ".", "..", "../basin", "a/b", "/etc/passwd", "a/..", "basin/", ".hidden", "a\0b", "~/../x"]
+)
+def test_a_name_that_would_leave_the_folder_is_refused(tmp_path, name):
+    with pytest.raises(ValueError, match="must be a plain file name"):
+        map_path(str(tmp_path), name)
+
+
+@pytest.mark.parametrize(
+    ("name", "file"), [("basin", "basin.ply"), ("basin.ply", "basin.ply"), ("a b", "a b.ply"), ("~", "~.ply")]
+)
+def test_a_plain_name_is_a_file_in_the_folder(tmp_path, name, file):
+    assert map_path(str(tmp_path), name) == tmp_path / file
+
+
+def test_a_tilde_in_the_folder_is_the_home():
+    assert map_path("~/maps", "basin") == Path.home() / "maps" / "basin.ply"
