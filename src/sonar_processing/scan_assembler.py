@@ -136,8 +136,9 @@ class ScanAssembler:
 
     def _projected(self, placed: PlacedBeam) -> _ProjectedBeam:
         parameters, beam = self.parameters, placed.beam
-        points = project_beam(beam, placed.T_target_sonar, parameters.dispersed_points, parameters.beam_width)
-        keep = np.tile(beam.ranges >= parameters.min_range, parameters.dispersed_points)
+        sides = 1 if parameters.mode.is_laser else parameters.dispersed_points
+        points = project_beam(beam, placed.T_target_sonar, sides, parameters.beam_width)
+        keep = np.tile(beam.ranges >= parameters.min_range, sides)
         keep &= points[:, 2] <= parameters.height_limit
         seconds = beam.stamp_ns * 1e-9
         signed_stamp = seconds if placed.is_moving else -seconds
