@@ -110,16 +110,19 @@ class SonarDevice:
         return self._judge(wait, stamp)
 
     def _collect(self, wait: ReplyWait) -> None:
-        self.stop.wait(max(0.0, wait.early_look - time.monotonic()))
-        for data in self._waiting():
-            wait.take(data, self._parser.feed(data), time.monotonic())
         while wait.reply is None and not self.stop.is_set():
             # Taken before the read: what came during a stall of this process is read before it is given up.
             now = time.monotonic()
-            data = self._port.read(self._port.in_waiting if wait.expired(now) else wait.missing_bytes or 1)
+            data = self._port.read(self._bytes_to_read(wait, now))
             wait.take(data, self._parser.feed(data), time.monotonic())
             if wait.over(now, self._parser.pending):
                 break
+
+    def _bytes_to_read(self, wait: ReplyWait, now: float) -> int:
+        """Return how many bytes to wait for: the first alone, so that it is known in time when it came early."""
+        if wait.answered:
+            return max(1, wait.missing_bytes)
+        return self._port.in_waiting if wait.expired(now) else max(1, self._port.in_waiting)
 
     def _judge(self, wait: ReplyWait, stamp: float) -> Optional[Ping]:
         if wait.reply is not None:

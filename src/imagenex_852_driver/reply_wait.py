@@ -5,9 +5,7 @@ from typing import List, Optional
 from imagenex_852_driver.connection import ConnectionParameters
 from imagenex_852_driver.protocol import ParsedReply, Reply, SwitchCommand
 
-# Shares of the time until the reply: when to look for bytes that come too early, and until when they surely
-# do, whatever the true speed of sound is.
-_EARLY_LOOK = 0.7
+# Share of the time until the reply within which bytes surely come too early, whatever the true speed of sound is.
 _SURELY_TOO_EARLY = 0.9
 
 
@@ -26,7 +24,6 @@ class ReplyWait:
         self.reply: Optional[Reply] = None
         self.unexpected_replies = 0
         self.patience = begins + connection.reply_margin
-        self.early_look = start + leaves + _EARLY_LOOK * (begins - leaves)
         self._earliest = start + leaves + _SURELY_TOO_EARLY * (begins - leaves)
         self._length = command.reply_kind.length
         self._byte_gap = connection.byte_gap
@@ -88,8 +85,10 @@ class ReplyWait:
 
     def _sort(self, replies: List[ParsedReply]) -> None:
         for offset, reply in replies:
-            if offset < self._early_bytes or self.reply is not None:
+            if offset < self._early_bytes:
                 self.unexpected_replies += 1
                 self._unexpected_bytes = max(self._unexpected_bytes, offset + reply.kind.length)
             else:
+                # Two at once were read after a stall; the earlier one is an old reply that the head sent twice.
+                self.unexpected_replies += int(self.reply is not None)
                 self.reply = reply

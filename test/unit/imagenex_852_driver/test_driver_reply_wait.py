@@ -40,6 +40,12 @@ def test_a_reply_that_was_read_late_because_the_driver_stalled_is_good(wait):
     assert wait.reply == REPLY
 
 
+def test_of_two_replies_that_a_stall_heaped_up_the_newer_is_the_answer(wait):
+    old = Reply(ReplyKind.IGX, 30, bytes(500), head_position=1380)
+    wait.take(bytes(1026), [ParsedReply(0, old), ParsedReply(513, REPLY)], BEGINS + 5.0)
+    assert (wait.reply, wait.unexpected_replies) == (REPLY, 1)
+
+
 def test_silence_ends_the_wait_after_the_margin(wait):
     assert not wait.over(BEGINS + 0.24, pending=False)
     assert wait.over(BEGINS + 0.26, pending=False)
