@@ -6,7 +6,7 @@ from enum import Enum
 from imagenex_852_driver.emulator import FaultRates
 from imagenex_852_driver.line_timing import LineTiming
 from imagenex_852_driver.protocol.errors import HEAD_IDS, SONAR_HEAD_ID
-from node_support.parameters import ParameterError, parameter
+from node_support.parameters import parameter
 
 
 class EchoSourceKind(Enum):
@@ -31,17 +31,11 @@ class EmulatorParameters(FaultRates):
         EchoSourceKind.PATTERN, "four walls of a square basin, or the simulator's ray caster", tunable=False
     )
     wall_distance: float = parameter(4.0, "pattern: way to each wall", unit="m", low=0.1, high=100.0, tunable=False)
-    world_file: str = parameter("", "world: path of the SDF file", tunable=False, may_be_empty=True)
+    world_file: str = parameter("worlds/basin.sdf", "world: SDF file; relative to the package's folder", tunable=False)
     x: float = parameter(0.0, "world: where the head is", unit="m", tunable=False)
     y: float = parameter(0.0, "world: where the head is", unit="m", tunable=False)
     z: float = parameter(-2.0, "world: where the head is", unit="m", tunable=False)
     yaw_deg: float = parameter(0.0, "world: where the head looks, counter-clockwise", unit="deg", tunable=False)
-
-    def check(self) -> None:
-        """Raise ParameterError when the shares of the faults are too many or the world has no file."""
-        super().check()
-        if self.echo_source is EchoSourceKind.WORLD and not self.world_file:
-            raise ParameterError("world_file = '': echo_source = 'world' needs the path of an SDF file")
 
     def timing(self) -> LineTiming:
         """Return the timing of pings on this line."""

@@ -5,10 +5,12 @@ from typing import Protocol
 
 import numpy as np
 
+from node_support.parameters import ParameterError
 from sonar_simulator.beam_pattern import BeamPattern
 from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.poses import pose_matrix
 from sonar_simulator.ray_caster import RayCaster
+from sonar_simulator.sdf import WorldError, load_sdf
 from sonar_simulator.sonar_head import Sonar, SonarParameters
 from sonar_simulator.world import World
 
@@ -30,6 +32,17 @@ class PingRequest(Protocol):
     command: PingCommand
 
 
+class HeadInWorld(Protocol):
+    """Which world, and where the head stands in it: m, degrees counter-clockwise."""
+
+    world_file: str
+    x: float
+    y: float
+    z: float
+    yaw_deg: float
+    seed: int
+
+
 class WorldEchoes:
     """Answers pings with what a head that stands still hears of a world; the gain scales the strengths."""
 
@@ -49,6 +62,12 @@ class WorldEchoes:
         return np.minimum(np.rint(strengths), 255).astype(np.uint8).tobytes()
 
 
-def sonar_pose(x: float, y: float, z: float, yaw_deg: float) -> np.ndarray:
-    """Return the (4, 4) pose of a head that stands upright in the world; m, degrees counter-clockwise."""
-    return pose_matrix((x, y, z), (0.0, 0.0, math.radians(yaw_deg)))
+def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
+    """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
+    try:
+        world = load_sdf(parameters.world_file).world
+    except WorldError as error:
+        raise ParameterError(f"world_file: {error}") from error
+    position = parameters.x, parameters.y, parameters.z
+    pose = pose_matrix(position, (0.0, 0.0, math.radians(parameters.yaw_deg)))
+    return WorldEchoes(world, pose, parameters.seed)
