@@ -1,0 +1,129 @@
+"""Which points each mode of the thresholder keeps."""
+
+import numpy as np
+import pytest
+from clouds import cloud_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sonar_processing.otsu import otsu_threshold
+from sonar_processing.threshold import Thresholder, ThresholderParameters, ThresholdMode
+
+STRENGTHS = st.lists(st.integers(0, 255), max_size=40)
+
+
+def _kept(strengths, **values):
+    return Thresholder(ThresholderParameters(**values))(cloud_of(strengths)).points[:, 3].tolist()
+
+
+def _threshold(strengths, **values):
+    return Thresholder(ThresholderParameters(**values)).threshold(np.array(strengths, dtype=np.float32))
+
+
+def test_fixed_keeps_what_is_above_the_value():
+    assert _kept([65, 66, 67, 200], mode="FIXED", fixed_threshold=66) == [67, 200]
+
+
+def test_proportional_weighs_the_strongest_and_the_weakest():
+    assert _threshold([10, 50, 110], mode="PROPORTIONAL", max_proportion=0.5, min_proportion=0.2) == pytest.approx(57)
+
+
+def test_otsu_takes_the_threshold_as_it_is():
+    assert _threshold([10, 20, 90, 95], mode="OTSU", otsu_multiplier=3) == otsu_threshold(np.array([10, 20, 90, 95]))
+
+
+def test_otsu_proportional_multiplies_it():
+    assert _threshold([10, 20, 90, 95], mode="OTSU+PROPORTIONAL", otsu_multiplier=1.5) == pytest.approx(
+        1.5 * otsu_threshold(np.array([10, 20, 90, 95]))
+    )
+
+
+def test_otsu_over_the_strengths_above_zero_does_not_see_the_zeros():
+    strengths = [0] * 100 + [10, 10, 20]
+    assert _threshold(strengths, mode="OTSU", otsu_nonzero=True) == 14.5
+    assert _threshold(strengths, mode="OTSU", otsu_nonzero=False) == otsu_threshold(np.array(strengths)) < 14.5
+
+
+@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
+def test_no_mode_goes_below_the_floor(mode):
+    assert _threshold([1, 2, 3], mode=mode, fixed_threshold=0.5, min_threshold=40) == 40
+
+
+@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
+def test_the_floor_does_not_lower_a_threshold(mode):
+    values = {"mode": mode, "fixed_threshold": 120.0}
+    assert _threshold([90, 90, 250], min_threshold=10, **values) == _threshold([90, 90, 250], **values) > 10
+
+
+@given(STRENGTHS, st.sampled_from(list(ThresholdMode)), st.floats(0, 255), st.booleans())
+def test_what_is_kept_lies_above_the_threshold_and_what_goes_does_not(strengths, mode, floor, nonzero):
+    thresholder = Thresholder(ThresholderParameters(mode=mode, min_threshold=floor, otsu_nonzero=nonzero))
+    cloud = cloud_of(strengths)
+    above = cloud.points[:, 3] > thresholder.threshold(cloud.points[:, 3]) if strengths else np.empty(0, dtype=bool)
+    np.testing.assert_array_equal(thresholder(cloud).points, cloud.points[above])
+
+
+@given(STRENGTHS)
+def test_stamps_go_with_their_points(strengths):
+    kept = Thresholder(ThresholderParameters())(cloud_of(strengths))
+    np.testing.assert_array_equal(kept.time_stamps, kept.points[:, 0] + 1.0)
+
+
+def test_the_last_point_above_and_nothing_removed_is_no_special_case():
+    assert _kept([70, 80, 90], mode="FIXED", fixed_threshold=66) == [70, 80, 90]
+
+
+def test_points_that_are_all_below_leave_an_empty_cloud():
+    kept = Thresholder(ThresholderParameters(mode="FIXED", fixed_threshold=255))(cloud_of([1, 2, 3]))
+    assert len(kept) == len(kept.time_stamps) == 0
+
+
+@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
+def test_an_empty_cloud_stays_empty(mode):
+    assert _kept([], mode=mode) == []
+
+
+@pytest.mark.parametrize("mode", ["OTSU", "OTSU+PROPORTIONAL"])
+def test_silence_has_no_echoes(mode):
+    assert _kept([0, 0, 0], mode=mode) == []
+
+
+@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
+def test_points_that_are_not_finite_are_removed_and_do_not_move_the_threshold(mode):
+    strengths = [5.0, 100.0, 200.0]
+    cloud = cloud_of([*strengths, np.nan, np.inf, 250.0])
+    cloud.points[5, 1] = np.nan
+    assert Thresholder(ThresholderParameters(mode=mode))(cloud).points[:, 3].tolist() == _kept(strengths, mode=mode)
+
+
+def test_points_with_a_stamp_that_is_not_finite_are_removed():
+    cloud = cloud_of([100, 200])
+    cloud.time_stamps[0] = np.nan
+    kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
+    assert kept.points[:, 3].tolist() == [200]
+
+
+def test_an_organised_cloud_keeps_its_shape_and_its_stamps():
+    cloud = cloud_of([10, 100, 20, 200, 30, 90], height=2)
+    kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
+    assert kept.height == 2
+    assert np.isnan(kept.points).all(axis=1).tolist() == [True, False, True, False, True, False]
+    assert kept.time_stamps.tolist() == cloud.time_stamps.tolist()
+
+
+def test_an_organised_cloud_without_a_finite_point_stays_so():
+    kept = Thresholder(ThresholderParameters())(cloud_of([np.nan] * 6, height=2))
+    assert np.isnan(kept.points).all()
+    assert (len(kept), kept.height) == (6, 2)
+
+
+def test_the_cloud_given_is_not_changed():
+    cloud = cloud_of([10, 100, 20, 200], height=2)
+    before = cloud.points.copy()
+    Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
+    np.testing.assert_array_equal(cloud.points, before)
+
+
+def test_header_and_frame_are_those_of_the_scan():
+    kept = Thresholder(ThresholderParameters())(cloud_of([1, 200]))
+    assert (kept.stamp_ns, kept.frame_id) == (5 * 10**9, "odom")
