@@ -71,7 +71,8 @@ def _explained(name: str, error: Exception) -> PortError:
         return PortPermissionError(
             f"no permission to open port {name}: join the group {group} (sudo adduser $USER {group}) and log in again"
         )
-    return PortUnavailableError(f"port {name} cannot be opened: {error}")
+    # pyserial's own text names the port, and the reason, twice.
+    return PortUnavailableError(f"port {name} cannot be opened: {os.strerror(number) if number else error}")
 
 
 def _group_of(name: str) -> str:

@@ -69,13 +69,17 @@ class Account:
     seconds: float
 
 
+def fault_rates(rate: float, reply_margin: float) -> FaultRates:
+    """Return `rate` for every fault; late replies come after the driver's wait, `reply_margin` s, is over."""
+    names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
+    lasting = {"lateness": reply_margin + LATENESS, "silence_duration": 0.2, "absence_duration": 0.05}
+    return FaultRates(**dict.fromkeys(names, rate), **lasting)
+
+
 def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -> Account:
     """Let the head see `commands` commands outside of silences; return the account."""
     stop = threading.Event()
-    lasting = {"lateness": reply_margin + LATENESS, "silence_duration": 0.2, "absence_duration": 0.05}
-    names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
-    rates = FaultRates(**dict.fromkeys(names, rate), **lasting)
-    faults = RecordingInjector(rates, seed, commands, stop)
+    faults = RecordingInjector(fault_rates(rate, reply_margin), seed, commands, stop)
     delivered: List[int] = []
     with tempfile.TemporaryDirectory() as directory:
         connection = ConnectionParameters(
