@@ -1,6 +1,7 @@
 """A map as a picture: top view, to scale."""
 
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import Sequence
 
@@ -13,6 +14,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.patches import Rectangle
 
 from mlsm_manager.blocks import Blocks, BlockType
+from node_support.files import write_whole
 
 _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
 _LINE_STYLES = ("-", "--", ":")
@@ -32,22 +34,26 @@ def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarr
     figure, axes = plt.subplots(figsize=(14, 8), dpi=110)
     for index, outline in enumerate(outlines):
         label = "walls as they are" if index == 0 else None
-        axes.plot(*np.asarray(outline).T, color="#2f6690", linewidth=1.2, label=label, zorder=1)
+        axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
     _draw_blocks(axes, blocks)
     for path, style in zip(paths, _LINE_STYLES):
-        axes.plot(*path.points.T, style, color=path.color, linewidth=1.6, label=path.label, zorder=4)
+        axes.plot(*path.points.T, style, color=path.color, linewidth=1.6, label=path.label, zorder=5)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
     axes.grid(True, color="#dddddd", linewidth=0.5, zorder=0)
     axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncol=5, frameon=False)
     axes.autoscale_view()
     figure.tight_layout()
-    figure.savefig(str(file))
+    picture = BytesIO()
+    figure.savefig(picture, format="png")
     plt.close(figure)
+    write_whole(file, picture.getvalue())
 
 
 def _draw_blocks(axes: plt.Axes, blocks: Blocks) -> None:
     for kind, color in _COLORS.items():
+        if not np.any(blocks.type == kind):
+            continue
         corners = blocks.centers[blocks.type == kind] - blocks.resolution / 2.0
         cells = [Rectangle(tuple(corner), blocks.resolution, blocks.resolution) for corner in corners]
         axes.add_collection(PatchCollection(cells, facecolor=color, edgecolor="none", zorder=2 + int(kind)))

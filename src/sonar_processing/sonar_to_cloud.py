@@ -60,7 +60,9 @@ class SonarToCloud:
 
     def _take_beam(self, message: SonarScanLine) -> None:
         self.health.count("beams in")
-        self._filter.add(beam_from_message(message))
+        beam = beam_from_message(message)
+        self.health.count("points in", beam.intensities.size)
+        self._filter.add(beam)
 
     def _place(self, beam: Beam, T_target_sonar: np.ndarray) -> None:
         placed = PlacedBeam(beam, T_target_sonar, self._is_moving)
