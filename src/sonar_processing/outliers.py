@@ -75,7 +75,8 @@ def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.
     """Return (n,) bool: which points have at least `min_neighbors` others within `radius` [m], border included.
 
     points: (n, 3), finite. pcl::RadiusOutlierRemoval counts the point itself and keeps more than `min_neighbors`; it
-    compares squared distances computed in float32, so that points on the border are decided in float32 here too.
+    computes squared distances in float32 and compares them with the squared radius in float64, so points on the border
+    are decided that way here too.
     """
     if len(points) == 0:
         return np.ones(0, dtype=bool)
@@ -93,4 +94,4 @@ def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.
 def _squared_distances(points: np.ndarray, center: np.ndarray) -> np.ndarray:
     difference = points - center
     squares = difference * difference
-    return (squares[:, 0] + squares[:, 1]) + squares[:, 2]
+    return ((squares[:, 0] + squares[:, 1]) + squares[:, 2]).astype(np.float64)
