@@ -48,8 +48,9 @@ class LiveParameters:
             self._health.problem("changes of parameters refused", str(error))
             wanted = self.current
         if wanted != self.current:
-            self.current = wanted
+            before, self.current = self.current.to_mapping(), wanted
             self._on_change(wanted)
-            rospy.loginfo("%s: %s", self._health.name, wanted)
+            changed = [f"{key} = {value!r}" for key, value in wanted.to_mapping().items() if value != before[key]]
+            rospy.loginfo("%s: %s", self._health.name, ", ".join(changed))
         config.update({key: value for key, value in wanted.to_mapping().items() if key in changes})
         return config
