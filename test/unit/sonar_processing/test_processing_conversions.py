@@ -1,0 +1,236 @@
+"""Messages become arrays and arrays messages, bit by bit."""
+
+import math
+from io import BytesIO
+
+import genpy
+import numpy as np
+import pytest
+from clouds import SECOND, cloud_of
+from geometry_msgs.msg import Quaternion, Transform, Vector3
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as numpy_st
+from scipy.spatial.transform import Rotation
+from sensor_msgs.msg import PointCloud2, PointField
+from std_msgs.msg import Header
+
+from node_support.refused_input import RefusedInput
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.conversions import (
+    StampedIntensityCloudArrays,
+    beam_from_message,
+    cloud_from_message,
+    cloud_to_message,
+    header,
+    point_cloud,
+    points_from_message,
+)
+from sonar_processing.transforms import matrix_from_message
+from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
+
+STAMP_NS = 1_400_000_000 * SECOND + 123456789
+ANY_BITS = numpy_st.arrays(np.uint32, st.tuples(st.integers(0, 20), st.just(4))).map(lambda bits: bits.view(np.float32))
+
+
+def _line(**values):
+    defaults = {
+        "header": header(STAMP_NS, "sonar"),
+        "angle": 0.5,
+        "intensities": bytes([1, 2, 255]),
+        "maxrange_meters": 50.0,
+        "range_resolution": 0.25,
+        "gain": 20,
+        "sensorAngle": -0.125,
+    }
+    return SonarScanLine(**{**defaults, **values})
+
+
+def _sent(message, received_type):
+    """Return the message as a subscriber of `received_type` gets it."""
+    buff = BytesIO()
+    message.serialize(buff)
+    return received_type().deserialize(buff.getvalue())
+
+
+def _fields(*layout):
+    return [PointField(name, offset, kind, 1) for name, offset, kind in layout]
+
+
+def _message(rows, fields, step, **values):
+    count = len(rows)
+    defaults = {"height": 1, "width": count, "fields": fields, "point_step": step, "row_step": step * count}
+    return PointCloud2(**{**defaults, "data": b"".join(rows), **values})
+
+
+def test_sonar_scan_line_is_wire_compatible_with_the_thesis():
+    assert SonarScanLine._md5sum == "1346c6cd80ae2dac7dcbb520edd4a933"
+
+
+def test_the_stamped_cloud_is_wire_compatible_with_the_thesis():
+    assert StampedIntensityCloud._md5sum == "c3ca4a41dac2f83d11677f1e54b81024"
+
+
+@given(st.integers(0, 2**32 * SECOND - 1))
+def test_a_header_holds_every_stamp_exactly(stamp_ns):
+    assert header(stamp_ns, "sonar").stamp.to_nsec() == stamp_ns
+
+
+def test_a_beam_has_what_its_message_says():
+    beam = beam_from_message(_sent(_line(), SonarScanLine))
+    assert (beam.stamp_ns, beam.frame_id, beam.angle) == (STAMP_NS, "sonar", 0.5)
+    assert (beam.range_resolution, beam.sensor_angle) == (0.25, -0.125)
+    assert beam.intensities.tolist() == [1, 2, 255]
+
+
+def test_a_beam_can_be_made_of_a_list_of_intensities():
+    assert beam_from_message(_line(intensities=[1, 2, 255])).intensities.tolist() == [1, 2, 255]
+
+
+@pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
+@pytest.mark.parametrize("name", ["maxrange_meters", "range_resolution"])
+def test_a_beam_without_a_range_is_refused(name, value):
+    with pytest.raises(RefusedInput, match=f"{name} {value}") as refused:
+        beam_from_message(_line(**{name: value}))
+    assert refused.value.kind == "beams refused"
+
+
+@pytest.mark.parametrize("bins", [0, 10000])
+def test_a_beam_of_no_or_of_too_many_bins_is_refused(bins):
+    with pytest.raises(RefusedInput, match=f"{bins} bins"):
+        beam_from_message(_line(intensities=bytes(bins)))
+
+
+@pytest.mark.parametrize("name", ["angle", "sensorAngle"])
+def test_a_beam_with_an_angle_that_is_not_a_number_is_refused(name):
+    with pytest.raises(RefusedInput, match="nan"):
+        beam_from_message(_line(**{name: math.nan}))
+
+
+@given(ANY_BITS, st.data())
+def test_a_cloud_comes_back_from_its_message_bit_by_bit(points, data):
+    stamps = data.draw(numpy_st.arrays(np.uint64, len(points))).view(np.float64)
+    cloud = IntensityCloud(points, stamps, STAMP_NS, "odom")
+    received = cloud_from_message(_sent(cloud_to_message(cloud), StampedIntensityCloudArrays))
+    assert received.points.tobytes() == points.tobytes()
+    assert received.time_stamps.tobytes() == stamps.tobytes()
+    assert (received.stamp_ns, received.frame_id, received.height) == (STAMP_NS, "odom", 1)
+
+
+def test_a_subscriber_without_numpy_reads_the_same_stamps():
+    received = _sent(cloud_to_message(cloud_of([1, 2, 3])), StampedIntensityCloud)
+    assert list(received.timeStamps) == [1.0, 2.0, 3.0]
+    assert cloud_from_message(received).time_stamps.tolist() == [1.0, 2.0, 3.0]
+
+
+def test_an_organised_cloud_comes_back_organised():
+    message = cloud_to_message(cloud_of([1, np.nan, 3, 4, 5, 6], height=2))
+    assert (message.cloud.height, message.cloud.width, message.cloud.row_step) == (2, 3, 48)
+    assert cloud_from_message(message).height == 2
+
+
+def test_an_empty_cloud_comes_back_empty():
+    received = cloud_from_message(_sent(cloud_to_message(cloud_of([])), StampedIntensityCloudArrays))
+    assert received.points.shape == (0, 4)
+    assert len(received.time_stamps) == 0
+
+
+def test_a_cloud_is_dense_when_every_point_is_finite():
+    assert point_cloud(cloud_of([1, 2]).points, 0, "odom").is_dense is True
+    assert point_cloud(cloud_of([1, np.nan]).points, 0, "odom").is_dense is False
+
+
+def test_both_headers_of_a_stamped_cloud_agree():
+    message = cloud_to_message(cloud_of([1]))
+    assert message.header == message.cloud.header == Header(stamp=genpy.Time(5), frame_id="odom")
+
+
+def test_a_cloud_may_have_other_fields_than_intensity():
+    message = point_cloud(np.arange(10.0).reshape(2, 5), 0, "map", fields=("x", "y", "z", "intensity", "count"))
+    assert [(f.name, f.offset, f.datatype, f.count) for f in message.fields] == [
+        (name, 4 * index, PointField.FLOAT32, 1) for index, name in enumerate(("x", "y", "z", "intensity", "count"))
+    ]
+    assert (message.point_step, message.width, len(message.data)) == (20, 2, 40)
+
+
+@pytest.mark.parametrize("count", [0, 1, 3])
+def test_more_or_fewer_stamps_than_points_are_refused(count):
+    message = cloud_to_message(cloud_of([1, 2]))
+    message.timeStamps = np.zeros(count)
+    with pytest.raises(RefusedInput, match=f"2 points but {count} time stamps"):
+        cloud_from_message(message)
+
+
+def test_pcls_padded_layout_is_read():
+    kind = np.dtype(
+        {"names": ["x", "y", "z", "intensity"], "formats": ["<f4"] * 4, "offsets": [0, 4, 8, 16], "itemsize": 32}
+    )
+    rows = np.zeros(3, dtype=kind)
+    rows["x"], rows["y"], rows["z"], rows["intensity"] = (1, 2, 3), (4, 5, 6), (7, 8, 9), (10, 11, 12)
+    fields = _fields(*[(name, kind.fields[name][1], PointField.FLOAT32) for name in kind.names])
+    points = points_from_message(_message([row.tobytes() for row in rows], fields, 32))
+    assert points.tolist() == [[1, 4, 7, 10], [2, 5, 8, 11], [3, 6, 9, 12]]
+
+
+def test_fields_may_come_in_any_order_and_between_others():
+    layout = [("intensity", 0, 7), ("ring", 4, PointField.UINT16), ("z", 6, 7), ("y", 10, 7), ("x", 14, 7)]
+    kind = np.dtype([("intensity", "<f4"), ("ring", "<u2"), ("z", "<f4"), ("y", "<f4"), ("x", "<f4")])
+    rows = np.array([(40, 1, 3, 2, 1)], dtype=kind)
+    assert points_from_message(_message([rows.tobytes()], _fields(*layout), 18)).tolist() == [[1, 2, 3, 40]]
+
+
+@pytest.mark.parametrize("missing", ["x", "y", "z", "intensity"])
+def test_a_cloud_without_one_of_the_fields_is_refused(missing):
+    message = point_cloud(np.zeros((1, 4)), 0, "odom")
+    message.fields = [field for field in message.fields if field.name != missing]
+    with pytest.raises(RefusedInput, match=f"no float32 field {missing}"):
+        points_from_message(message)
+
+
+def test_a_field_of_another_type_is_refused():
+    fields = _fields(("x", 0, 8), ("y", 8, 8), ("z", 16, 8), ("intensity", 24, 7))
+    with pytest.raises(RefusedInput, match="no float32 field x, y, z"):
+        points_from_message(_message([bytes(28)], fields, 28))
+
+
+@pytest.mark.parametrize("length", [0, 31, 33, 16])
+def test_data_of_another_length_than_announced_is_refused(length):
+    message = point_cloud(np.zeros((2, 4)), 0, "odom")
+    message.data = bytes(length)
+    with pytest.raises(RefusedInput, match=f"{length} bytes for 2 points of 16 bytes"):
+        points_from_message(message)
+
+
+@pytest.mark.parametrize("step", [0, 12, 15])
+def test_points_shorter_than_their_fields_are_refused(step):
+    message = point_cloud(np.zeros((2, 4)), 0, "odom")
+    message.point_step, message.data = step, bytes(2 * step)
+    with pytest.raises(RefusedInput, match=f"2 points of {step} bytes"):
+        points_from_message(message)
+
+
+def test_big_endian_data_are_refused():
+    message = point_cloud(np.zeros((2, 4)), 0, "odom")
+    message.is_bigendian = True
+    with pytest.raises(RefusedInput):
+        points_from_message(message)
+
+
+@given(st.tuples(*[st.floats(-3.0, 3.0)] * 3), st.tuples(*[st.floats(-100.0, 100.0)] * 3))
+def test_a_transform_is_its_matrix(rotation, shift):
+    expected = Rotation.from_euler("xyz", rotation)
+    matrix = matrix_from_message(Transform(Vector3(*shift), Quaternion(*expected.as_quat())))
+    np.testing.assert_allclose(matrix[:3, :3], expected.as_matrix(), atol=1e-12)
+    assert matrix[:3, 3].tolist() == list(shift)
+    assert matrix[3].tolist() == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("shift", "quaternion"),
+    [((0, 0, 0), (0, 0, 0, 0)), ((0, 0, 0), (0, 0, 0, math.nan)), ((math.nan, 0, 0), (0, 0, 0, 1)),
+     ((0, math.inf, 0), (0, 0, 0, 1)), ((0, 0, 0), (0, 0, 0, 5))],
+)  # fmt: skip
+def test_a_transform_that_is_none_is_refused(shift, quaternion):
+    with pytest.raises(RefusedInput) as refused:
+        matrix_from_message(Transform(Vector3(*shift), Quaternion(*quaternion)))
+    assert refused.value.kind == "transforms refused"

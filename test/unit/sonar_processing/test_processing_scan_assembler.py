@@ -1,0 +1,272 @@
+"""Which beams make a scan, and what the scan holds."""
+
+import math
+
+import numpy as np
+import pytest
+from clouds import SECOND, beam_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, ScanMode, SonarToCloudParameters
+
+STEP = math.radians(3.0)
+
+
+def _assembler(**values):
+    return ScanAssembler(SonarToCloudParameters(**{"min_range": 0.0, **values}))
+
+
+def _placed(*, moving=False, shift=(0.0, 0.0, 0.0), **beam):
+    pose = np.eye(4)
+    pose[:3, 3] = shift
+    return PlacedBeam(beam_of(**beam), pose, moving)
+
+
+def _scan_ends(angles, **values):
+    """Return after how many beams each scan came, for a head that passes through `angles`."""
+    assembler = _assembler(scan_size=3600, **values)
+    return [count for count, angle in enumerate(angles, 1) if assembler.add(_placed(angle=angle)) is not None]
+
+
+def test_a_scan_ends_after_scan_size_beams():
+    assembler = _assembler(scan_size=3)
+    assert [assembler.add(_placed()) is not None for _ in range(7)] == [False, False, True, False, False, True, False]
+
+
+def test_a_scan_size_of_one_gives_a_cloud_per_beam():
+    assembler = _assembler(scan_size=1)
+    assert [len(assembler.add(_placed())) for _ in range(3)] == [3, 3, 3]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+@pytest.mark.parametrize("start", [0.0, 0.5, math.pi, -math.pi, 100.0])
+def test_a_scan_ends_before_the_head_passes_its_start_again(direction, start):
+    assert _scan_ends(start + direction * STEP * np.arange(360)) == [120, 240, 360]
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_a_head_that_counts_from_minus_pi_to_pi_makes_no_difference(direction):
+    angles = direction * STEP * np.arange(360)
+    assert _scan_ends(np.arctan2(np.sin(angles), np.cos(angles))) == [120, 240, 360]
+
+
+@pytest.mark.parametrize("missed", [1, 60, 118])
+def test_a_missed_beam_does_not_lengthen_the_scan(missed):
+    angles = np.delete(STEP * np.arange(240), missed)
+    assert _scan_ends(angles) == [119, 239]
+
+
+def test_a_missed_last_beam_is_made_up_for_by_the_first_of_the_next_turn():
+    assert _scan_ends(np.delete(STEP * np.arange(200), 119)) == [120]
+
+
+def test_steps_that_vary_still_make_a_full_turn():
+    steps = STEP * (1.0 + 0.1 * np.sin(np.arange(400)))
+    lengths = np.diff([0, *_scan_ends(np.cumsum(steps))])
+    assert len(lengths) == 3
+    assert all(abs(length - 120) <= 2 for length in lengths)
+
+
+def test_a_sector_that_swings_back_and_forth_never_makes_a_turn():
+    swing = np.concatenate([np.arange(60), np.arange(60, 0, -1)] * 5) * STEP
+    assert _scan_ends(swing) == []
+
+
+def test_a_head_that_stands_still_never_makes_a_turn():
+    assert _scan_ends(np.full(500, 1.0)) == []
+
+
+def test_a_full_turn_can_be_told_not_to_end_a_scan():
+    assert _scan_ends(STEP * np.arange(500), end_at_full_turn=False) == []
+
+
+def test_a_servo_step_ends_the_scan_before_the_beam_that_saw_it():
+    assembler = _assembler()
+    for seconds in (1, 2):
+        assert assembler.add(_placed(seconds=seconds, sensor_angle=0.1)) is None
+    scan = assembler.add(_placed(seconds=3, sensor_angle=0.2))
+    assert np.unique(scan.time_stamps).tolist() == [-2.0, -1.0]
+    assert scan.stamp_ns == 2 * SECOND
+
+
+def test_the_beam_after_a_servo_step_begins_the_next_scan():
+    assembler = _assembler(scan_size=2)
+    assembler.add(_placed(seconds=1, sensor_angle=0.1))
+    assembler.add(_placed(seconds=2, sensor_angle=0.2))
+    scan = assembler.add(_placed(seconds=3, sensor_angle=0.2))
+    assert np.unique(scan.time_stamps).tolist() == [-3.0, -2.0]
+
+
+def test_a_servo_that_trembles_ends_nothing():
+    assembler = _assembler()
+    assert [assembler.add(_placed(sensor_angle=0.0005 * (count % 2))) for count in range(20)] == [None] * 20
+
+
+def test_stamps_are_negative_while_still_and_positive_while_moving():
+    assembler = _assembler(scan_size=2)
+    assembler.add(_placed(seconds=1, moving=False))
+    assert assembler.add(_placed(seconds=2, moving=True)).time_stamps.tolist() == [-1, -1, -1, 2, 2, 2]
+
+
+def test_every_beam_is_placed_by_its_own_transform():
+    assembler = _assembler(scan_size=2)
+    assembler.add(_placed(shift=(1.0, 0.0, 0.0)))
+    scan = assembler.add(_placed(shift=(0.0, 5.0, -2.0)))
+    np.testing.assert_allclose(
+        scan.points[:, :3], [(1.5, 0, 0), (2.5, 0, 0), (3.5, 0, 0), (0.5, 5, -2), (1.5, 5, -2), (2.5, 5, -2)]
+    )
+
+
+def test_a_scan_has_the_stamp_of_its_newest_beam_and_the_target_frame():
+    assembler = _assembler(scan_size=2, target_frame="map")
+    assembler.add(_placed(seconds=7))
+    scan = assembler.add(_placed(seconds=8))
+    assert (scan.stamp_ns, scan.frame_id) == (8 * SECOND, "map")
+
+
+def test_beams_of_different_bin_counts_make_one_scan():
+    assembler = _assembler(scan_size=2)
+    assembler.add(_placed(strengths=(1, 2), seconds=1))
+    scan = assembler.add(_placed(strengths=(3, 4, 5, 6), seconds=2))
+    assert scan.points[:, 3].tolist() == [1, 2, 3, 4, 5, 6]
+    assert scan.time_stamps.tolist() == [-1, -1, -2, -2, -2, -2]
+
+
+def test_bins_nearer_than_min_range_go_with_their_stamps():
+    scan = _assembler(scan_size=1, min_range=1.5).add(_placed(strengths=(9, 8, 7, 6)))
+    assert scan.points[:, 3].tolist() == [8, 7, 6]
+    assert len(scan.time_stamps) == 3
+
+
+def test_points_above_the_height_limit_go_with_their_stamps():
+    assembler = _assembler(scan_size=2, height_limit=-1.0)
+    assembler.add(_placed(seconds=1, shift=(0, 0, -0.5)))
+    assert assembler.add(_placed(seconds=2, shift=(0, 0, -1.0))).time_stamps.tolist() == [-2, -2, -2]
+
+
+def test_a_scan_of_removed_points_only_is_an_empty_cloud():
+    scan = _assembler(scan_size=1, min_range=50.0).add(_placed())
+    assert len(scan) == len(scan.time_stamps) == 0
+
+
+@given(
+    st.lists(st.tuples(st.integers(1, 9), st.booleans()), min_size=1, max_size=8),
+    st.integers(1, 15),
+    st.floats(0.0, 5.0),
+    st.sampled_from(list(ScanMode)),
+    st.booleans(),
+)
+def test_every_point_has_the_stamp_of_its_own_beam(beams, sides, min_range, mode, organized):
+    assembler = _assembler(
+        scan_size=len(beams), dispersed_points=sides, min_range=min_range, mode=mode, keep_organized=organized
+    )
+    for number, (bins, moving) in enumerate(beams, 1):
+        # The strength of every echo tells which beam it is of.
+        scan = assembler.add(_placed(strengths=[number] * bins, seconds=number, moving=moving))
+    signs = np.array([1.0 if moving else -1.0 for _, moving in beams])
+    finite = scan.valid
+    numbers = scan.points[finite, 3].astype(int)
+    np.testing.assert_array_equal(scan.time_stamps[finite], numbers * signs[numbers - 1])
+
+
+@pytest.mark.parametrize("sides", [2, 5])
+def test_dispersed_points_multiply_the_points_and_their_stamps(sides):
+    assembler = _assembler(scan_size=2, dispersed_points=sides)
+    assembler.add(_placed(seconds=1))
+    scan = assembler.add(_placed(seconds=2))
+    assert scan.time_stamps.tolist() == [-1.0] * (3 * sides) + [-2.0] * (3 * sides)
+    assert scan.points[:, 3].tolist() == [10, 20, 30] * (2 * sides)
+
+
+def test_min_range_holds_for_every_side_of_a_dispersed_beam():
+    scan = _assembler(scan_size=1, dispersed_points=3, min_range=1.0).add(_placed())
+    assert scan.points[:, 3].tolist() == [20, 30] * 3
+
+
+def test_an_organised_scan_has_a_row_per_beam_and_nan_for_removed_points():
+    assembler = _assembler(scan_size=2, keep_organized=True, min_range=1.0)
+    assembler.add(_placed(seconds=1))
+    scan = assembler.add(_placed(seconds=2))
+    assert (scan.height, len(scan)) == (2, 6)
+    assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False] * 2
+    assert scan.time_stamps.tolist() == [-1, -1, -1, -2, -2, -2]
+
+
+def test_beams_of_different_bin_counts_cannot_be_organised():
+    assembler = _assembler(scan_size=2, keep_organized=True)
+    assembler.add(_placed(strengths=(1, 2)))
+    assert assembler.add(_placed(strengths=(1, 2, 3))).height == 1
+
+
+def test_laser_keeps_the_strongest_echo_of_every_beam():
+    assembler = _assembler(mode="LASER", scan_size=2)
+    assembler.add(_placed(strengths=(10, 90, 20)))
+    scan = assembler.add(_placed(strengths=(5, 6, 70)))
+    assert scan.points[:, [0, 3]].tolist() == [[1.5, 90], [2.5, 70]]
+
+
+def test_laser_keeps_the_nearest_of_equal_echoes():
+    assert _assembler(mode="LASER", scan_size=1).add(_placed(strengths=(0, 90, 90))).points[0, 0] == 1.5
+
+
+def test_laser_looks_beyond_min_range_only():
+    scan = _assembler(mode="LASER", scan_size=1, min_range=1.0).add(_placed(strengths=(120, 10, 20)))
+    assert scan.points[:, 3].tolist() == [20]
+
+
+def test_laser_has_no_point_where_there_is_no_echo():
+    assembler = _assembler(mode="LASER", scan_size=2)
+    assembler.add(_placed(strengths=(0, 0, 0), seconds=1))
+    assert assembler.add(_placed(strengths=(0, 7, 0), seconds=2)).time_stamps.tolist() == [-2]
+
+
+def test_laser_points_lie_on_the_axis_of_a_dispersed_beam():
+    scan = _assembler(mode="LASER", scan_size=1, dispersed_points=5).add(_placed())
+    assert scan.points[:, :3].tolist() == [[2.5, 0.0, 0.0]]
+
+
+@pytest.mark.parametrize(("mode", "per_beam"), [("SONARCONT", 3), ("LASERCONT", 1)])
+def test_continuous_modes_give_the_newest_scan_size_beams_after_every_beam(mode, per_beam):
+    assembler = _assembler(mode=mode, scan_size=3)
+    scans = [assembler.add(_placed(seconds=seconds)) for seconds in range(1, 6)]
+    beams = [np.unique(-scan.time_stamps).tolist() for scan in scans]
+    assert beams == [[1], [1, 2], [1, 2, 3], [2, 3, 4], [3, 4, 5]]
+    assert [len(scan) for scan in scans] == [per_beam * len(stamps) for stamps in beams]
+
+
+def test_a_servo_step_empties_the_continuous_scan():
+    assembler = _assembler(mode="SONARCONT")
+    assembler.add(_placed(seconds=1, sensor_angle=0.1))
+    assert set(assembler.add(_placed(seconds=2, sensor_angle=0.2)).time_stamps) == {-2.0}
+
+
+def test_clear_forgets_the_unfinished_scan():
+    assembler = _assembler(scan_size=2)
+    assembler.add(_placed(seconds=1))
+    assembler.clear()
+    assert assembler.add(_placed(seconds=2)) is None
+    assert set(assembler.add(_placed(seconds=3)).time_stamps) == {-2.0, -3.0}
+
+
+def test_clear_forgets_how_far_the_head_has_turned():
+    assembler = _assembler()
+    for count in range(119):
+        assembler.add(_placed(angle=count * STEP))
+    assembler.clear()
+    assert assembler.add(_placed(angle=119 * STEP)) is None
+    assert assembler.add(_placed(angle=120 * STEP)) is None
+
+
+def test_clear_forgets_the_servo():
+    assembler = _assembler()
+    assembler.add(_placed(sensor_angle=0.1))
+    assembler.clear()
+    assert assembler.add(_placed(sensor_angle=0.9)) is None
+
+
+def test_projecting_a_beam_shows_it_and_leaves_the_scan_alone():
+    assembler = _assembler(scan_size=2, min_range=1.0)
+    shown = assembler.project(_placed(seconds=1))
+    assert shown.points[:, 3].tolist() == [20, 30]
+    assert assembler.add(_placed(seconds=2)) is None
