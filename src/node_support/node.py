@@ -33,8 +33,16 @@ def run(name: str, construct: Callable[[], Any]) -> None:
         sys.exit(1)
     except rospy.ROSInterruptException:
         return
-    rospy.spin()
+    _spin()
     del node
+
+
+def _spin() -> None:
+    """Wait for the end; rospy.spin notices it up to half a second late, and roslaunch ends nodes one by one."""
+    ended = threading.Event()
+    rospy.on_shutdown(ended.set)
+    while not (ended.is_set() or rospy.is_shutdown()):
+        ended.wait(1.0)
 
 
 def make_health(name: str) -> Health:
