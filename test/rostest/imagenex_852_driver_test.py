@@ -1,21 +1,16 @@
 #!/usr/bin/env python3
 import math
-import os
 import subprocess
-import sys
 import unittest
 
 import numpy as np
 import rospy
 import rostest
+from driver_listener import ERROR, PATIENCE, beams, diagnostics, level, values
 from dynamic_reconfigure.client import Client
 from sensor_msgs.msg import JointState
 
-sys.path.insert(0, os.path.dirname(os.path.realpath(__file__)))
-
-from driver_listener import ERROR, PATIENCE, beams, diagnostics, level, values  # noqa: E402
-
-from underwater_map_construction.srv import OrderFault  # noqa: E402
+from underwater_map_construction.srv import OrderFault
 
 PACKAGE = "underwater_map_construction"
 DEFAULTS = {
@@ -44,7 +39,7 @@ class TestDriver(unittest.TestCase):
         self.beams.wait_for_more(2)
 
     def wait_for_beam(self, wanted):
-        self.assertTrue(self.beams.wait(lambda received: wanted(received[-1])))
+        assert self.beams.wait(lambda received: wanted(received[-1]))
         return self.beams.received[-1]
 
     def test_a_full_turn_has_a_beam_at_every_step_clockwise(self):
@@ -56,23 +51,23 @@ class TestDriver(unittest.TestCase):
             wall = WALL / max(abs(math.cos(beam.angle)), abs(math.sin(beam.angle)))
             strengths = np.frombuffer(beam.intensities, dtype=np.uint8)
             seen = (np.argmax(strengths) + 0.5) * beam.range_resolution
-            self.assertAlmostEqual(seen, wall, delta=2 * beam.range_resolution)
+            assert abs(seen - wall) < 2 * beam.range_resolution
 
     def test_a_beam_says_how_it_was_made(self):
         beam = self.beams.wait_for_more(1)[0]
         made = (beam.header.frame_id, beam.maxrange_meters, len(beam.intensities), beam.gain)
-        self.assertEqual(made, ("sonar", 20.0, 500, 20))
-        self.assertAlmostEqual(beam.range_resolution, 0.04, places=6)
+        assert made == ("sonar", 20.0, 500, 20)
+        assert abs(beam.range_resolution - 0.04) < 1e-6
 
     def test_stamps_grow_and_are_of_now(self):
         stamps = [beam.header.stamp.to_sec() for beam in self.beams.wait_for_more(20)]
-        self.assertTrue(np.all(np.diff(stamps) > 0))
-        self.assertLess(abs(rospy.get_time() - stamps[-1]), 2.0)
+        assert np.all(np.diff(stamps) > 0)
+        assert abs(rospy.get_time() - stamps[-1]) < 2.0
 
     def test_an_accepted_change_reaches_the_head(self):
         self.client.update_configuration({"max_range": 10, "data_points": 250})
         beam = self.wait_for_beam(lambda beam: beam.maxrange_meters == 10.0)
-        self.assertEqual(len(beam.intensities), 252)
+        assert len(beam.intensities) == 252
 
     def test_a_reversed_head_turns_counter_clockwise(self):
         self.client.update_configuration({"direction": "counterclockwise"})
@@ -88,48 +83,46 @@ class TestDriver(unittest.TestCase):
     def test_refused_changes_leave_everything_as_it_was(self):
         for bad in ({"max_range": 25}, {"train_angle_deg": 60}, {"data_points": 300}, {"max_range": 1000}):
             config = self.client.update_configuration(bad)
-            self.assertEqual({name: config[name] for name in bad}, {name: DEFAULTS[name] for name in bad})
-        self.assertEqual(self.beams.wait_for_more(2)[-1].maxrange_meters, 20.0)
+            assert {name: config[name] for name in bad} == {name: DEFAULTS[name] for name in bad}
+        assert self.beams.wait_for_more(2)[-1].maxrange_meters == 20.0
 
     def test_the_tilt_of_the_head_is_that_of_its_joint(self):
         joints = rospy.Publisher("joint_states", JointState, queue_size=1, latch=True)
         joints.publish(JointState(name=["rudder", "sonar_tilt"], position=[1.0, 0.3]))
-        self.assertAlmostEqual(self.wait_for_beam(lambda beam: beam.sensorAngle != 0.0).sensorAngle, 0.3, places=6)
+        assert abs(self.wait_for_beam(lambda beam: beam.sensorAngle != 0.0).sensorAngle - 0.3) < 1e-6
 
     def test_scanning_goes_on_when_the_port_returns(self):
         health = diagnostics()
         last = self.beams.wait_for_more(1)[0].header.stamp.to_sec()
-        self.assertTrue(self.order_fault("disappearance", 1).success)
-        self.assertTrue(health.wait(lambda arrays: bool(arrays) and level(arrays[-1]) == ERROR))
+        assert self.order_fault("disappearance", 1).success
+        assert health.wait(lambda arrays: bool(arrays) and level(arrays[-1]) == ERROR)
         self.wait_for_beam(lambda beam: beam.header.stamp.to_sec() > last + ABSENCE)
         gap = max(np.diff([beam.header.stamp.to_sec() for beam in self.beams.received]))
-        self.assertGreater(gap, ABSENCE)
-        self.assertLess(gap, ABSENCE + 2.0)
-        self.assertTrue(health.wait(lambda arrays: values(arrays[-1])["connected"] == "true"))
+        assert gap > ABSENCE
+        assert gap < ABSENCE + 2.0
+        assert health.wait(lambda arrays: values(arrays[-1])["connected"] == "true")
 
     def test_an_unknown_fault_is_refused(self):
         answer = self.order_fault("explosion", 1)
-        self.assertFalse(answer.success)
-        self.assertIn("explosion", answer.message)
+        assert not answer.success
+        assert "explosion" in answer.message
 
     def test_a_second_driver_on_the_port_ends_with_one_line(self):
         lines = self.start_driver(f"_port:={rospy.get_param('~port')}")
-        self.assertEqual(len(lines), 1)
-        self.assertIn("in use by another program", lines[0])
+        assert len(lines) == 1
+        assert "in use by another program" in lines[0]
 
     def test_a_bad_parameter_ends_the_driver_with_one_line(self):
         lines = self.start_driver("_max_range:=25")
-        self.assertEqual(len(lines), 1)
-        self.assertIn("max_range = 25: must be one of 5, 10, 20, 30, 40, 50", lines[0])
+        assert len(lines) == 1
+        assert "max_range = 25: must be one of 5, 10, 20, 30, 40, 50" in lines[0]
 
     def start_driver(self, argument):
         """Run a second driver until it ends with status 1; return the lines it printed."""
         command = ["rosrun", PACKAGE, "imagenex_852_driver", "__name:=second_driver", argument]
-        done = subprocess.run(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, universal_newlines=True, timeout=PATIENCE
-        )
+        done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
         rospy.delete_param("second_driver")
-        self.assertEqual(done.returncode, 1, done.stdout)
+        assert done.returncode == 1, done.stdout
         return done.stdout.splitlines()
 
 

@@ -8,7 +8,7 @@ import rospy
 import rostest
 
 _HERE = os.path.dirname(os.path.realpath(__file__))
-sys.path[:0] = [_HERE, os.path.join(_HERE, os.pardir, "unit", "imagenex_852_driver")]
+sys.path.insert(0, os.path.join(_HERE, os.pardir, "unit", "imagenex_852_driver"))
 
 from driver_listener import PATIENCE, beams, diagnostics, values  # noqa: E402
 from fault_experiment import GOOD, NumberedEchoes, RecordingInjector, fault_rates  # noqa: E402
@@ -40,21 +40,21 @@ class TestFaults(unittest.TestCase):
         print(f"{len(cls.expected)} good replies sent, {len(cls.delivered)} published")
 
     def test_each_good_reply_is_published_once_and_in_order(self):
-        self.assertEqual(self.expected, self.delivered)
+        assert self.expected == self.delivered
 
     def test_each_broken_reply_is_counted(self):
         counts = self.faults.counts
-        self.assertEqual(int(self.health["bad frames"]), counts[Fault.GARBLED] + counts[Fault.TRUNCATED])
+        assert int(self.health["bad frames"]) == counts[Fault.GARBLED] + counts[Fault.TRUNCATED]
 
     def test_each_late_or_doubled_reply_is_counted(self):
         counts = self.faults.counts
-        self.assertEqual(int(self.health["unexpected replies"]), counts[Fault.LATE] + counts[Fault.DOUBLED])
+        assert int(self.health["unexpected replies"]) == counts[Fault.LATE] + counts[Fault.DOUBLED]
 
     def test_each_overrun_is_counted(self):
-        self.assertEqual(int(self.health["overruns"]), self.faults.counts[Fault.OVERRUN])
+        assert int(self.health["overruns"]) == self.faults.counts[Fault.OVERRUN]
 
     def test_the_driver_is_connected_at_the_end(self):
-        self.assertEqual(self.health["connected"], "true")
+        assert self.health["connected"] == "true"
 
 
 if __name__ == "__main__":

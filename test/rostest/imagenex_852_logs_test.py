@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+import math
+import os
+import shutil
+import signal
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+import rosbag
+import rospy
+import rostest
+from driver_listener import PATIENCE, beams, diagnostics, values
+
+from imagenex_852_driver import log_file
+from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.protocol import Reply, ReplyKind
+from underwater_map_construction.msg import SonarScanLine
+
+_HERE = Path(os.path.realpath(__file__)).parent
+PACKAGE = "underwater_map_construction"
+START = 1447000000.0
+HYDROBALL = Path(os.environ.get("UMC_DATA", _HERE.parents[2] / "shared" / "data")) / "hydroball.852"
+
+
+def tool(name, *arguments):
+    """Return the command that runs one of the tools."""
+    return ["rosrun", PACKAGE, name, *map(str, arguments)]
+
+
+def output_of(command):
+    """Run a tool to its end; return its status and all it printed."""
+    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
+    return done.returncode, done.stdout
+
+
+def logged(index):
+    """Return ping number `index` of a made-up log: half a second and 3 deg after the one before."""
+    reply = Reply(ReplyKind.IMX, 20, bytes([index] * 252), head_position=1400 + 20 * index)
+    return LoggedPing(reply, stamp=START + 0.5 * index, start_gain_db=7)
+
+
+class TestLogs(unittest.TestCase):
+    def setUp(self):
+        self.folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, self.folder)
+        self.log = self.folder / "made_up.852"
+        with log_file.LogWriter(self.log) as writer:
+            for index in range(10):
+                writer.write(logged(index))
+
+    def real_log(self):
+        if not HYDROBALL.exists():
+            self.skipTest(f"{HYDROBALL} is not there; set UMC_DATA to the folder of the recordings")
+        return HYDROBALL
+
+    def play(self, path, *options):
+        """Return the beams that play_852 publishes, and what it prints."""
+        listener = beams()
+        status, text = output_of(tool("play_852", path, "--rate", 200, "--wait-for-subscribers", *options))
+        assert status == 0, text
+        published = int(text.split(" beams published")[0].split()[-1])
+        assert listener.wait(lambda received: len(received) >= published)
+        return listener.received, text
+
+    def test_play_publishes_every_ping_in_order(self):
+        received, _ = self.play(self.log)
+        assert [beam.intensities[0] for beam in received] == list(range(10))
+        assert {(beam.maxrange_meters, beam.gain) for beam in received} == {(20.0, 7)}
+
+    def test_play_turns_the_angles_of_an_inverted_head(self):
+        received, _ = self.play(self.log, "--inverted")
+        assert abs(received[1].angle - math.radians(3.0)) < 1e-5
+
+    def test_play_says_what_is_damaged(self):
+        data = self.log.read_bytes()
+        self.log.write_bytes(data[:384] + b"noise" + data[384:])
+        received, text = self.play(self.log)
+        assert len(received) == 10
+        assert "skipped 1 damaged parts: 5 damaged bytes at byte 384" in text
+
+    def test_play_publishes_all_of_a_real_log(self):
+        received, _ = self.play(self.real_log())
+        kinds = {(len(beam.intensities), beam.maxrange_meters, beam.gain) for beam in received}
+        assert (len(received), kinds) == (177, {(500, 50.0, 12)})
+
+    def test_play_of_no_file_ends_with_one_line(self):
+        status, text = output_of(tool("play_852", self.folder / "none.852"))
+        assert (status, len(text.splitlines())) == (1, 1)
+        assert "No such file" in text
+
+    def convert(self, *arguments):
+        bag = self.folder / "out.bag"
+        status, text = output_of(tool("convert_852", *arguments, "--out", bag))
+        assert status == 0, text
+        with rosbag.Bag(str(bag)) as opened:
+            return list(opened.read_messages())
+
+    def test_convert_makes_a_bag_at_the_times_of_the_log(self):
+        entries = self.convert(self.log)
+        assert [entry.timestamp.to_sec() for entry in entries] == [START + 0.5 * index for index in range(10)]
+        assert {(e.topic, e.message._md5sum) for e in entries} == {("/sonar/raw", SonarScanLine._md5sum)}
+        assert all(entry.message.header.stamp == entry.timestamp for entry in entries)
+
+    def test_convert_paces_a_log_without_times(self):
+        entries = self.convert(self.real_log(), "--rate", 5, "--start", 1000)
+        assert len(entries) == 177
+        assert abs(entries[-1].timestamp.to_sec() - (1000 + 176 / 5)) < 1e-6
+
+    def test_record_writes_what_was_published(self):
+        copy = self.folder / "copy.852"
+        health = diagnostics("record_852")
+        recorder = subprocess.Popen(tool("record_852", copy))
+        self.addCleanup(recorder.wait)
+        self.addCleanup(recorder.send_signal, signal.SIGINT)
+        publisher = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=100)
+        sent = [entry.message for entry in self.convert(self.log)]
+        while not publisher.get_num_connections():
+            rospy.rostime.wallsleep(0.01)
+        for message in sent:
+            publisher.publish(message)
+        assert health.wait(lambda arrays: arrays and values(arrays[-1]).get("pings written") == "10")
+        for made, written in zip(map(logged, range(10)), log_file.read(copy)):
+            assert (written.reply, written.stamp) == (made.reply, made.stamp)
+            assert written.start_gain_db == 7
+        publisher.unregister()
+
+
+if __name__ == "__main__":
+    rospy.init_node("imagenex_852_logs")
+    rostest.rosrun(PACKAGE, "imagenex_852_logs", TestLogs)
