@@ -117,7 +117,7 @@ def _validated(field: dataclasses.Field, value: Any) -> Any:
     description = describe(field)
     try:
         typed = _converted(field.type, value)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         typed = None
     missing = typed is None or (typed == "" and not description.may_be_empty)
     if missing or not _in_range(typed, description):
@@ -138,7 +138,7 @@ def _converted(kind: type, value: Any) -> Any:
 def _in_range(value: Any, description: Description) -> bool:
     if isinstance(value, (str, bool, Enum)):
         return True
-    if not math.isfinite(value):
+    if isinstance(value, float) and not math.isfinite(value):
         return False
     return (description.low is None or value >= description.low) and (
         description.high is None or value <= description.high
