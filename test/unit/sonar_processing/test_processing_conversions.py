@@ -29,6 +29,9 @@ from sonar_processing.conversions import (
 from sonar_processing.transforms import matrix_from_message
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
+# The generated message code of Noetic writes arrays with the old name of tobytes.
+pytestmark = pytest.mark.filterwarnings("ignore:tostring:DeprecationWarning")
+
 STAMP_NS = 1_400_000_000 * SECOND + 123456789
 ANY_BITS = numpy_st.arrays(np.uint32, st.tuples(st.integers(0, 20), st.just(4))).map(lambda bits: bits.view(np.float32))
 

@@ -1,0 +1,147 @@
+"""What a stage reports of itself, and how often it warns."""
+
+import threading
+
+import pytest
+
+from node_support.health import WARNING_PERIOD, Health, Level
+
+
+class _Stage:
+    """A health with a clock that is set by hand and a list of the warnings given."""
+
+    def __init__(self):
+        self.now = 100.0
+        self.warnings = []
+        self.health = Health("thresholder", self.warnings.append, lambda: self.now)
+
+    def problems_at(self, *times, kind="beams refused"):
+        for self.now in times:
+            self.health.problem(kind, f"at {self.now:g}")
+
+
+@pytest.fixture
+def stage():
+    return _Stage()
+
+
+def test_the_first_problem_is_warned_of_at_once(stage):
+    stage.problems_at(0.0)
+    assert stage.warnings == ["thresholder: 1 beams refused (1 in all): at 0"]
+
+
+def test_more_of_a_kind_are_kept_for_one_warning_that_says_how_many(stage):
+    stage.problems_at(0.0, 1.0, 2.0, WARNING_PERIOD - 0.1, WARNING_PERIOD)
+    assert stage.warnings[1:] == ["thresholder: 4 beams refused (5 in all): at 10"]
+
+
+def test_a_flood_gives_one_warning_per_period(stage):
+    stage.problems_at(*[step * 0.25 for step in range(int(5 * WARNING_PERIOD / 0.25))])
+    assert len(stage.warnings) == 5
+
+
+def test_kinds_are_throttled_one_by_one(stage):
+    stage.problems_at(0.0, 1.0, kind="beams refused")
+    stage.problems_at(1.0, 2.0, kind="clouds refused")
+    assert stage.warnings == [
+        "thresholder: 1 beams refused (1 in all): at 0",
+        "thresholder: 1 clouds refused (1 in all): at 1",
+    ]
+
+
+def test_problems_can_be_counted_by_the_number(stage):
+    stage.health.problem("points outside the map", "beyond 10 m", 7)
+    stage.health.problem("points outside the map", "beyond 10 m", 5)
+    assert stage.health.report().values["points outside the map"] == "12"
+    assert stage.warnings == ["thresholder: 7 points outside the map (7 in all): beyond 10 m"]
+
+
+def test_a_stage_without_problems_runs(stage):
+    report = stage.health.report()
+    assert (report.level, report.text, report.values) == (Level.OK, "running", {})
+
+
+def test_a_recent_problem_shows_in_level_and_text(stage):
+    stage.problems_at(0.0, 1.0)
+    report = stage.health.report()
+    assert (report.level, report.text) == (Level.WARN, "2 beams refused: at 1")
+
+
+def test_an_old_problem_shows_in_its_total_only(stage):
+    stage.problems_at(0.0)
+    stage.now = WARNING_PERIOD
+    report = stage.health.report()
+    assert (report.level, report.text) == (Level.OK, "running")
+    assert report.values == {"beams refused": "1"}
+
+
+def test_recent_problems_of_all_kinds_are_named(stage):
+    stage.problems_at(0.0, kind="beams refused")
+    stage.problems_at(1.0, kind="clouds refused")
+    assert stage.health.report().text == "1 beams refused: at 0; 1 clouds refused: at 1"
+
+
+def test_counters_are_totals_since_the_start(stage):
+    stage.health.count("clouds in")
+    stage.health.report()
+    stage.health.count("clouds in", 4)
+    assert stage.health.report().values["clouds in"] == "5"
+
+
+def test_rates_are_those_since_the_previous_report(stage):
+    stage.health.count("beams in", 10)
+    stage.now += 2.0
+    assert stage.health.report().values["beams in per second"] == "5.00"
+    stage.health.count("beams in", 3)
+    stage.now += 4.0
+    assert stage.health.report().values["beams in per second"] == "0.75"
+    stage.now += 1.0
+    assert stage.health.report().values["beams in per second"] == "0.00"
+
+
+def test_two_reports_at_one_moment_do_not_divide_by_zero(stage):
+    stage.health.report()
+    assert stage.health.report().level == Level.OK
+
+
+def test_values_are_reported_as_they_are_and_the_newest_wins(stage):
+    stage.health.show("blocks", "10")
+    stage.health.show("blocks", "12")
+    assert stage.health.report().values == {"blocks": "12"}
+
+
+def test_processing_times_are_reported_in_milliseconds(stage, monkeypatch):
+    ticks = iter([0.0, 0.001, 1.0, 1.003])
+    monkeypatch.setattr("time.perf_counter", lambda: next(ticks))
+    for _ in range(2):
+        with stage.health.timed():
+            pass
+    values = stage.health.report().values
+    assert (values["processing time mean [ms]"], values["processing time longest [ms]"]) == ("2.000", "3.000")
+
+
+def test_a_failing_message_is_timed_too(stage):
+    with pytest.raises(ZeroDivisionError), stage.health.timed():
+        raise ZeroDivisionError
+    assert "processing time mean [ms]" in stage.health.report().values
+
+
+def test_counts_from_many_threads_are_all_kept(stage):
+    def work():
+        for _ in range(2000):
+            stage.health.count("beams in")
+            stage.health.problem("beams refused", "again")
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    values = stage.health.report().values
+    assert (values["beams in"], values["beams refused"]) == ("8000", "8000")
+
+
+def test_a_warning_may_use_the_health_it_comes_from():
+    health = Health("stage", lambda line: health.count("warnings"), lambda: 0.0)
+    health.problem("beams refused", "once")
+    assert health.report().values["warnings"] == "1"

@@ -1,0 +1,115 @@
+"""Which values a parameter set takes, and what it says of the others."""
+
+import dataclasses
+import math
+
+import pytest
+from example_parameters import Color, ExampleParameters
+from hypothesis import given
+from hypothesis import strategies as st
+
+from node_support.parameters import ParameterError
+
+RADIUS = "must be a number from 0 to 10 m"
+COUNT = "must be an integer from 1 to 1000"
+BAD_VALUES = [
+    ({"radius": -0.1}, f"radius = -0.1: {RADIUS}"),
+    ({"radius": 10.1}, f"radius = 10.1: {RADIUS}"),
+    ({"radius": math.nan}, f"radius = nan: {RADIUS}"),
+    ({"radius": math.inf}, f"radius = inf: {RADIUS}"),
+    ({"radius": "1.0"}, f"radius = '1.0': {RADIUS}"),
+    ({"radius": True}, f"radius = True: {RADIUS}"),
+    ({"radius": None}, f"radius = None: {RADIUS}"),
+    ({"radius": [1.0]}, f"radius = [1.0]: {RADIUS}"),
+    ({"radius": 10**400}, f"radius = {10**400}: {RADIUS}"),
+    ({"count": 0}, f"count = 0: {COUNT}"),
+    ({"count": 1001}, f"count = 1001: {COUNT}"),
+    ({"count": 5.0}, f"count = 5.0: {COUNT}"),
+    ({"count": True}, f"count = True: {COUNT}"),
+    ({"count": "5"}, f"count = '5': {COUNT}"),
+    ({"count": 10**400}, f"count = {10**400}: {COUNT}"),
+    ({"fast": 1}, "fast = 1: must be true or false"),
+    ({"fast": "true"}, "fast = 'true': must be true or false"),
+    ({"frame": ""}, "frame = '': must be a text that is not empty"),
+    ({"frame": 5}, "frame = 5: must be a text that is not empty"),
+    ({"color": "blue"}, "color = 'blue': must be one of red, deep+blue"),
+    ({"color": "RED"}, "color = 'RED': must be one of red, deep+blue"),
+    ({"color": ["red"]}, "color = ['red']: must be one of red, deep+blue"),
+    ({"inner": math.nan}, "inner = nan: must be a number from 0 m"),
+]
+
+
+@pytest.mark.parametrize(("values", "text"), BAD_VALUES, ids=[text[:30] for _, text in BAD_VALUES])
+def test_a_bad_value_is_refused_with_key_value_and_what_is_allowed(values, text):
+    with pytest.raises(ParameterError) as refused:
+        ExampleParameters.from_mapping(values)
+    assert str(refused.value) == text
+
+
+def test_an_unknown_key_is_refused_with_the_keys_there_are():
+    with pytest.raises(ParameterError) as refused:
+        ExampleParameters.from_mapping({"raduis": 2.0})
+    text = "raduis = 2.0: no such parameter; there are radius, count, fast, frame, color, inner"
+    assert str(refused.value) == text
+
+
+def test_values_that_do_not_fit_together_are_refused():
+    with pytest.raises(ParameterError, match=r"inner = 2\.0: must be at most radius = 1\.5"):
+        ExampleParameters(inner=2.0)
+
+
+def test_nothing_given_means_the_defaults():
+    assert ExampleParameters.from_mapping({}) == ExampleParameters()
+
+
+@pytest.mark.parametrize(("key", "value"), [("radius", 0.0), ("radius", 10.0), ("count", 1), ("count", 1000)])
+def test_bounds_are_allowed(key, value):
+    parameters = ExampleParameters.from_mapping({"inner": 0.0, key: value})
+    assert getattr(parameters, key) == value
+
+
+def test_an_integer_is_taken_for_a_float_and_becomes_one():
+    radius = ExampleParameters(radius=3).radius
+    assert (radius, type(radius)) == (3.0, float)
+
+
+@pytest.mark.parametrize("value", [Color.DEEP_BLUE, "deep+blue"])
+def test_an_enumeration_is_taken_as_member_or_by_value(value):
+    assert ExampleParameters(color=value).color is Color.DEEP_BLUE
+
+
+def test_a_change_keeps_everything_else():
+    changed = ExampleParameters(count=7).changed({"radius": 2.0})
+    assert changed == ExampleParameters(count=7, radius=2.0)
+
+
+def test_a_refused_change_leaves_the_set_as_it_was():
+    parameters = ExampleParameters(count=7)
+    with pytest.raises(ParameterError, match="count = 0"):
+        parameters.changed({"count": 0})
+    assert parameters == ExampleParameters(count=7)
+
+
+def test_a_change_is_checked_against_the_values_that_stay():
+    with pytest.raises(ParameterError, match="inner"):
+        ExampleParameters().changed({"radius": 0.1})
+
+
+def test_a_set_cannot_be_written_to():
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        ExampleParameters().radius = 2.0
+
+
+def test_plain_values_hold_enumerations_by_value():
+    assert ExampleParameters().to_mapping()["color"] == "red"
+
+
+@given(st.floats(0.5, 10.0), st.integers(1, 1000), st.booleans(), st.text(min_size=1), st.sampled_from(list(Color)))
+def test_plain_values_make_the_same_set_again(radius, count, fast, frame, color):
+    parameters = ExampleParameters(radius, count, fast, frame, color)
+    assert ExampleParameters.from_mapping(parameters.to_mapping()) == parameters
+
+
+def test_tunable_fields_leave_out_what_only_the_start_can_set():
+    names = [field.name for field in ExampleParameters.tunable_fields()]
+    assert names == ["radius", "count", "fast", "color", "inner"]
