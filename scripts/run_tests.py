@@ -1,0 +1,115 @@
+"""Runs lint, unit tests and rostests, and adds up what passed and what failed."""
+
+import os
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Callable, List, Optional
+from xml.etree import ElementTree
+
+ROOT = Path(__file__).resolve().parent.parent
+RESULTS = ROOT / "build/test_results"
+STEP_TIMEOUT = 400.0
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What one step counted."""
+
+    passed: int
+    failed: int
+    skipped: int = 0
+
+
+@dataclass(frozen=True)
+class Step:
+    """One command and how its result is counted; `report` is the JUnit file, or the folder of such files, it leaves."""
+
+    name: str
+    command: List[str]
+    report: Optional[Path] = None
+
+
+def steps() -> List[Step]:
+    """Return all steps, quick ones first."""
+    unit_report = RESULTS / "unit.xml"
+    found = [
+        Step("ruff check", ["ruff", "check", "--quiet", "."]),
+        Step("ruff format", ["ruff", "format", "--quiet", "--check", "."]),
+        Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
+        Step("unit tests", ["python3", "-m", "pytest", f"--junitxml={unit_report}"], unit_report),
+    ]
+    for test in sorted((ROOT / "test/rostest").glob("*.test")):
+        folder = RESULTS / test.stem
+        command = ["rostest", "--results-filename=result.xml", str(test)]
+        found.append(Step(f"rostest {test.stem}", command, folder))
+    return found
+
+
+def run_step(step: Step) -> Outcome:
+    """Run a step, print what failed and return its counts."""
+    start = time.monotonic()
+    environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(step.report or RESULTS)}
+    try:
+        done = subprocess.run(
+            step.command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            stdin=subprocess.DEVNULL, timeout=STEP_TIMEOUT, check=False,
+        )  # fmt: skip
+        status, output = done.returncode, done.stdout.decode(errors="replace")
+    except subprocess.TimeoutExpired as expired:
+        status, output = 1, f"{(expired.stdout or b'').decode(errors='replace')}\nno end after {STEP_TIMEOUT:.0f} s"
+    outcome = _counted(step, status)
+    if outcome.failed:
+        print("\n".join([output.rstrip(), *_failure_texts(step)]))
+    skipped = f", {outcome.skipped} skipped" if outcome.skipped else ""
+    print(
+        f"{'FAILED' if outcome.failed else 'ok':6} {step.name}: {outcome.passed} passed, {outcome.failed} failed"
+        f"{skipped} ({time.monotonic() - start:.1f} s)",
+        flush=True,
+    )
+    for reason in _skip_reasons(step) if outcome.skipped else ():
+        print(f"       skipped: {reason}", flush=True)
+    return outcome
+
+
+def _counted(step: Step, status: int) -> Outcome:
+    if step.report is None:
+        return Outcome(int(status == 0), int(status != 0))
+    cases = _cases(step.report)
+    failed = sum(1 for case in cases if case.find("failure") is not None or case.find("error") is not None)
+    skipped = sum(1 for case in cases if case.find("skipped") is not None)
+    passed = len(cases) - failed - skipped
+    # A step that broke before, after or without its tests has failed, whatever the tests say.
+    return Outcome(passed, max(failed, int(status != 0 or not cases)), skipped)
+
+
+def _cases(report: Path) -> List[ElementTree.Element]:
+    files = [report] if report.is_file() else sorted(report.rglob("rosunit-*.xml"))
+    return [case for file in files for case in ElementTree.parse(str(file)).getroot().iter("testcase")]
+
+
+def _failure_texts(step: Step) -> List[str]:
+    cases = _cases(step.report) if step.report else []
+    return [element.text or "" for case in cases for kind in ("failure", "error") for element in case.findall(kind)]
+
+
+def _skip_reasons(step: Step) -> List[str]:
+    found = [case.find("skipped") for case in _cases(step.report)] if step.report else []
+    return sorted({element.get("message") or element.text or "" for element in found if element is not None})
+
+
+def main(words: List[str], run: Callable[[Step], Outcome] = run_step) -> int:
+    """Run the steps whose names contain one of `words` (all without words); return the exit status."""
+    subprocess.run(["rm", "-rf", str(RESULTS)], check=True)
+    RESULTS.mkdir(parents=True)
+    chosen = [step for step in steps() if not words or any(word in step.name for word in words)]
+    outcomes = [run(step) for step in chosen]
+    passed, failed = sum(o.passed for o in outcomes), sum(o.failed for o in outcomes)
+    print(f"{passed} passed, {failed} failed")
+    return int(failed > 0 or passed == 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

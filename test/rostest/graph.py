@@ -1,0 +1,107 @@
+"""What the rostests share: waiting for events, playing bags, reading diagnostics and maps."""
+
+import os
+import subprocess
+import threading
+import unittest
+from pathlib import Path
+from typing import Any, Callable, Dict, List
+from xml.sax.saxutils import quoteattr
+
+import numpy as np
+import rosgraph
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray
+
+PACKAGE_ROOT = Path(__file__).resolve().parents[2]
+TEST_DATA = PACKAGE_ROOT / "test/data"
+
+
+def recording(name: str) -> Path:
+    """Return the path of a real recording; skips the test, saying so, where it is absent."""
+    folder = Path(os.environ.get("UMC_DATA", str(PACKAGE_ROOT.parent / "shared/data")))
+    path = folder / name
+    if not path.is_file():
+        reason = f"{name} is not in {folder}; set UMC_DATA to the folder of the recordings"
+        _report_skip(path.stem, reason)
+        raise unittest.SkipTest(reason)
+    return path
+
+
+def _report_skip(name: str, reason: str) -> None:
+    """Leave a result beside rosunit's own, which knows no skipped tests and would leave them out."""
+    case = f'<testcase classname="recording" name="{name}"><skipped message={quoteattr(reason)}/></testcase>'
+    folder = Path(os.environ.get("ROS_TEST_RESULTS_DIR", "/tmp"))
+    (folder / f"rosunit-skipped-{name}.xml").write_text(f'<testsuite tests="1">{case}</testsuite>')
+
+
+class Inbox:
+    """The newest message of a topic, and a wait for one that fits."""
+
+    def __init__(self, topic: str, kind: Any) -> None:
+        self._topic = topic
+        self._condition = threading.Condition()
+        self.messages: List[Any] = []
+        self._subscriber = rospy.Subscriber(topic, kind, self._take, queue_size=1000)
+
+    def _take(self, message: Any) -> None:
+        with self._condition:
+            self.messages.append(message)
+            self._condition.notify_all()
+
+    def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = 20.0) -> Any:
+        """Return the newest message once it fits; raises AssertionError after `timeout` seconds of wall time."""
+        with self._condition:
+            if self._condition.wait_for(lambda: bool(self.messages) and fits(self.messages[-1]), timeout):
+                return self.messages[-1]
+        raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {len(self.messages)} messages came")
+
+
+class Diagnostics:
+    """The counters that the nodes publish."""
+
+    def __init__(self) -> None:
+        self._condition = threading.Condition()
+        self._values: Dict[str, Dict[str, str]] = {}
+        self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._take, queue_size=100)
+
+    def _take(self, array: DiagnosticArray) -> None:
+        with self._condition:
+            for status in array.status:
+                self._values[status.name] = {item.key: item.value for item in status.values}
+            self._condition.notify_all()
+
+    def wait_for(self, stage: str, counter: str, number: int, timeout: float = 20.0) -> None:
+        """Wait until a counter has reached `number`; raises AssertionError with what is known of the stage."""
+        with self._condition:
+            if self._condition.wait_for(lambda: self._number(stage, counter) >= number, timeout):
+                return
+            known = self._values.get(stage)
+        raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {known}")
+
+    def _number(self, stage: str, counter: str) -> int:
+        return int(self._values.get(stage, {}).get(counter, -1))
+
+
+def wait_for_subscribers(topic: str, number: int, timeout: float = 20.0) -> None:
+    """Wait until `number` nodes listen to a topic, as the master sees it."""
+    master = rosgraph.Master("/graph_test")
+    ended = threading.Event()
+    for _ in range(int(timeout / 0.1)):
+        listeners = [nodes for name, nodes in master.getSystemState()[1] if name == topic]
+        if listeners and len(listeners[0]) >= number:
+            return
+        ended.wait(0.1)
+    raise AssertionError(f"{topic}: not {number} listeners after {timeout} s")
+
+
+def play(bag: Path, rate: float) -> None:
+    """Play a bag to its end."""
+    command = ["rosbag", "play", "--quiet", "--clock", f"--rate={rate}", str(bag)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=120)
+
+
+def rows(cloud: Any) -> np.ndarray:
+    """Return the points of a float32 PointCloud2 as (n, fields), sorted, so that clouds can be compared."""
+    data = np.frombuffer(cloud.data, dtype=np.float32).reshape(-1, len(cloud.fields))
+    return data[np.lexsort(data.T[::-1])]

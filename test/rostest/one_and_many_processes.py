@@ -1,0 +1,87 @@
+#!/usr/bin/env python3
+"""A recorded tour of the basin gives the basin's walls, whether the stages share a process or not."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import TEST_DATA, Inbox, play, rows, wait_for_subscribers
+from sensor_msgs.msg import PointCloud2
+
+from underwater_map_construction.msg import StampedIntensityCloud
+
+HALF_LENGTH, HALF_WIDTH = 60.0, 25.0
+RANGE = 50.0
+ECHO_SPREAD, NOISE_SPREAD = 0.15, 4.0
+CELL = 0.5
+# Turns of the head in the bag, which ends in the middle of one.
+SCANS = 10
+
+
+class OneAndManyProcesses(unittest.TestCase):
+    """Plays the bag once for all tests."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Play the bag and wait for both maps."""
+        layouts = ("one", "many")
+        maps = {name: Inbox(f"/{name}/MLSM/cloud", PointCloud2) for name in layouts}
+        scans = {name: Inbox(f"/{name}/sonar/scan/cleaned", StampedIntensityCloud) for name in layouts}
+        wait_for_subscribers("/sonar/raw", 2)
+        wait_for_subscribers("/many/sonar/scan/cleaned", 2)
+        wait_for_subscribers("/many/sonar/scan/thresholded", 1)
+        wait_for_subscribers("/many/sonar/scan/sonarCloud", 1)
+        wait_for_subscribers("/one/sonar/scan/cleaned", 1)
+        play(TEST_DATA / "basin.bag", rate=15)
+        cls.blocks = {}
+        for name in layouts:
+            last = scans[name].wait_for(lambda _, inbox=scans[name]: len(inbox.messages) >= SCANS)
+            stamp = last.header.stamp
+            cls.blocks[name] = rows(maps[name].wait_for(lambda cloud, stamp=stamp: cloud.header.stamp == stamp))
+
+    def test_both_layouts_make_the_same_blocks(self) -> None:
+        """Not one bit differs."""
+        np.testing.assert_array_equal(self.blocks["one"], self.blocks["many"])
+
+    def test_every_wall_within_range_is_there(self) -> None:
+        """Each 2 m of each wall that some scan saw at less than 50 m holds a block closer than a cell."""
+        places = np.array([[0.4, 0.0], [34.4, 8.0], [-34.6, -9.0]])
+        xy = self.blocks["one"][:, :2].astype(np.float64)
+        missing = []
+        for wall in walls():
+            seen = np.linalg.norm(wall[:, np.newaxis] - places, axis=2).min(axis=1) < RANGE - 5.0
+            distance = np.linalg.norm(wall[seen][:, np.newaxis] - xy, axis=2).min(axis=1)
+            missing += [tuple(point) for point in wall[seen][distance > 2.0]]
+            self.assertGreater(np.count_nonzero(seen), 10)
+        self.assertEqual(missing, [])
+
+    def test_nothing_lies_outside_by_more_than_the_sensors_error(self) -> None:
+        """Noise echoes are drawn 4 m about an echo, all others 0.15 m."""
+        x, y = np.abs(self.blocks["one"][:, :2].T.astype(np.float64))
+        outside = np.maximum(x - HALF_LENGTH, y - HALF_WIDTH)
+        self.assertLess(outside.max(), 2.0 * NOISE_SPREAD)
+        self.assertLess(np.mean(outside > 3.0 * ECHO_SPREAD + CELL), 0.03)
+
+    def test_walls_stand_where_they_are(self) -> None:
+        """The middle of each wall's blocks is off by less than half a cell."""
+        x, y = np.abs(self.blocks["one"][:, :2].T.astype(np.float64))
+        long_walls = (y - HALF_WIDTH)[(x < 55) & (np.abs(y - HALF_WIDTH) < 1.5)]
+        short_walls = (x - HALF_LENGTH)[(y < 20) & (np.abs(x - HALF_LENGTH) < 1.5)]
+        self.assertLess(abs(np.median(long_walls)), CELL / 2)
+        self.assertLess(abs(np.median(short_walls)), CELL / 2)
+
+
+def walls() -> list:
+    """Return points every 2 m along the four inner faces."""
+    along_x = np.arange(-58.0, 58.1, 2.0)
+    along_y = np.arange(-23.0, 23.1, 2.0)
+    result = [np.column_stack([along_x, np.full(along_x.size, side)]) for side in (-HALF_WIDTH, HALF_WIDTH)]
+    result += [np.column_stack([np.full(along_y.size, side), along_y]) for side in (-HALF_LENGTH, HALF_LENGTH)]
+    return result
+
+
+if __name__ == "__main__":
+    rospy.init_node("one_and_many_processes")
+    rostest.rosrun("underwater_map_construction", "one_and_many_processes", OneAndManyProcesses, sys.argv)
