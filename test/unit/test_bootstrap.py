@@ -1,0 +1,94 @@
+"""What scripts/bootstrap would do, on this system and on the other."""
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+ROWS = [
+    line.split()
+    for line in (ROOT / "scripts" / "dependencies.txt").read_text().splitlines()
+    if line and not line.startswith("#")
+]
+CHANGES_THE_SYSTEM = ["apt-get", "sudo", "pip", "catkin_make"]
+
+
+@pytest.fixture
+def checkout(tmp_path):
+    """Return a fresh checkout's scripts, with programs that would change the system replaced by ones that tell."""
+    shutil.copytree(str(ROOT / "scripts"), str(tmp_path / "checkout" / "scripts"))
+    (tmp_path / "bin").mkdir()
+    for name in CHANGES_THE_SYSTEM:
+        program = tmp_path / "bin" / name
+        program.write_text(f"#!/bin/sh\necho {name} >>{tmp_path / 'called'}\n")
+        program.chmod(0o755)
+    return tmp_path / "checkout"
+
+
+def _dry_run(checkout, distro):
+    """Return what a dry run prints; it must end well."""
+    path = os.pathsep.join([str(checkout.parent / "bin"), os.environ["PATH"]])
+    command = ["bash", str(checkout / "scripts" / "bootstrap"), "--dry-run", "--distro", distro]
+    return subprocess.run(
+        command, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, check=True, text=True
+    ).stdout.splitlines()
+
+
+def _installed(lines):
+    (install,) = [line for line in lines if "apt-get install" in line]
+    return {word for word in install.split("apt-get install", 1)[1].split() if not word.startswith("-")}
+
+
+@pytest.mark.parametrize(("distro", "column"), [("debian", 1), ("ubuntu", 2)])
+def test_a_dry_run_names_every_package_of_its_column(checkout, distro, column):
+    assert _installed(_dry_run(checkout, distro)) == {row[column] for row in ROWS if row[column] != "-"}
+
+
+def test_on_ubuntu_ros_comes_from_noetic(checkout):
+    packages = _installed(_dry_run(checkout, "ubuntu"))
+    assert {"ros-noetic-rospy", "ros-noetic-tf2-ros", "ros-noetic-dynamic-reconfigure"} <= packages
+    assert "python3-rospy" not in packages
+
+
+def test_on_ubuntu_the_build_happens_inside_noetic(checkout):
+    lines = _dry_run(checkout, "ubuntu")
+    assert "+ source /opt/ros/noetic/setup.bash" in lines
+    assert "+ source /opt/ros/noetic/setup.bash" not in _dry_run(checkout, "debian")
+
+
+@pytest.mark.parametrize("distro", ["debian", "ubuntu"])
+def test_a_dry_run_shows_venv_and_build(checkout, distro):
+    lines = _dry_run(checkout, distro)
+    assert any("-m venv --system-site-packages" in line for line in lines)
+    assert any("catkin_make --directory" in line for line in lines)
+
+
+@pytest.mark.parametrize("distro", ["debian", "ubuntu"])
+def test_a_dry_run_changes_nothing(checkout, distro):
+    before = sorted(checkout.rglob("*"))
+    _dry_run(checkout, distro)
+    assert sorted(checkout.rglob("*")) == before
+    assert not (checkout.parent / "called").exists()
+
+
+def test_another_system_is_refused_with_those_there_are(checkout):
+    command = ["bash", str(checkout / "scripts" / "bootstrap"), "--dry-run", "--distro", "arch"]
+    run = subprocess.run(command, stderr=subprocess.PIPE, text=True)
+    assert run.returncode == 2
+    assert run.stderr == "bootstrap: --distro arch: must be debian or ubuntu\n"
+
+
+def test_every_dependency_has_a_name_on_both_systems_or_a_dash():
+    assert [row for row in ROWS if len(row) != 3] == []
+    assert len({row[0] for row in ROWS}) == len(ROWS)
+
+
+def test_every_key_of_the_package_is_installed():
+    package = ET.parse(str(ROOT / "package.xml")).getroot()
+    keys = {element.text for element in package if element.tag.endswith("depend")}
+    assert keys - {row[0] for row in ROWS} == set()
+    assert "rospy" in keys
