@@ -1,0 +1,94 @@
+"""Bags that the 2015 package recorded come out of `rosbag fix` as ours."""
+
+import re
+import subprocess
+from io import BytesIO
+from pathlib import Path
+
+import genpy
+import genpy.dynamic
+import numpy as np
+import pytest
+import rosbag
+
+from sonar_processing.conversions import header, point_cloud
+from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
+
+ROOT = Path(__file__).resolve().parents[2]
+RULES = ROOT / "migration" / "avora_msgs.bmr"
+START = genpy.Time(1400000000, 123456789)
+
+
+def _recorded():
+    """Return what a bag shall hold, as messages of today: (topic, message)."""
+    rng = np.random.default_rng(0)
+    lines = [
+        SonarScanLine(
+            header=header(START.to_nsec() + 10**8 * count, "sonar"),
+            angle=-0.05 * count,
+            intensities=rng.integers(0, 256, 500, dtype=np.uint8).tobytes(),
+            maxrange_meters=50.0,
+            range_resolution=0.1,
+            gain=20 + count,
+            sensorAngle=0.25,
+        )
+        for count in range(5)
+    ]
+    cloud = StampedIntensityCloud(
+        header=header(START.to_nsec(), "odom"),
+        cloud=point_cloud(rng.normal(size=(40, 4)), START.to_nsec() + 1, "odom", height=2),
+        timeStamps=rng.normal(size=40).tolist(),
+    )
+    return [("/sonar/raw", line) for line in lines] + [("/sonar/scan/cleaned", cloud)]
+
+
+def _old_type(new_type):
+    """Return the class of the 2015 package, made from text: its messages differ in the name of the package only."""
+    name = new_type._type.replace("underwater_map_construction", "avora_msgs")
+    return genpy.dynamic.generate_dynamic(name, new_type._full_text)[name]
+
+
+def _bytes(message):
+    buff = BytesIO()
+    message.serialize(buff)
+    return buff.getvalue()
+
+
+@pytest.fixture(scope="module")
+def fixed(tmp_path_factory):
+    """Return what `rosbag fix` makes of a bag of old types: (topic, message, time of recording)."""
+    folder = tmp_path_factory.mktemp("bags")
+    with rosbag.Bag(str(folder / "old.bag"), "w") as bag:
+        for second, (topic, message) in enumerate(_recorded()):
+            old = _old_type(type(message))().deserialize(_bytes(message))
+            bag.write(topic, old, START + genpy.Duration(second))
+    command = ["rosbag", "fix", "--noplugins", str(folder / "old.bag"), str(folder / "new.bag"), str(RULES)]
+    run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert run.returncode == 0, run.stdout
+    with rosbag.Bag(str(folder / "new.bag")) as bag:
+        return list(bag.read_messages())
+
+
+@pytest.mark.parametrize("new_type", [SonarScanLine, StampedIntensityCloud])
+def test_the_old_types_are_those_that_the_rules_are_for(new_type):
+    old_type = _old_type(new_type)
+    assert f"class update_{old_type._type.replace('/', '_')}_{old_type._md5sum}(" in RULES.read_text()
+
+
+def test_every_message_comes_out_as_one_of_ours(fixed):
+    types = [(entry.message._type, entry.message._md5sum) for entry in fixed]
+    assert types == [(message._type, message._md5sum) for _, message in _recorded()]
+
+
+def test_every_byte_of_the_messages_stays(fixed):
+    assert [_bytes(entry.message) for entry in fixed] == [_bytes(message) for _, message in _recorded()]
+
+
+def test_topics_and_times_of_recording_stay(fixed):
+    assert [entry.topic for entry in fixed] == [topic for topic, _ in _recorded()]
+    assert [entry.timestamp for entry in fixed] == [START + genpy.Duration(second) for second in range(6)]
+
+
+def test_the_package_exports_the_rules():
+    exported = re.search(r'<rosbag migration_rule_file="([^"]+)"/>', (ROOT / "package.xml").read_text())
+    assert ROOT / exported.group(1) == RULES
