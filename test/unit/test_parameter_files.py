@@ -6,6 +6,8 @@ from pathlib import Path
 import pytest
 
 import yaml
+from imagenex_852_driver.driver_parameters import DriverParameters
+from imagenex_852_driver.emulator_parameters import EmulatorParameters
 from mlsm_manager.core_parameters import MlsmCoreParameters
 from node_support.parameter_text import default_yaml
 from node_support.parameters import describe
@@ -17,6 +19,8 @@ from sonar_simulator.default_yaml import simulator_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = {
+    "imagenex_852_driver": (DriverParameters, "Imagenex852"),
+    "imagenex_852_emulator": (EmulatorParameters, "Imagenex852Emulator"),
     "mlsm_core": (MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": (OutlierRemoverParameters, "OutlierRemover"),
     "sonar_to_cloud": (SonarToCloudParameters, "SonarToCloud"),

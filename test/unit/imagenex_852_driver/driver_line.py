@@ -14,7 +14,7 @@ FAST = {
     "baud_rate": 1152000,
     "speed_of_sound": 15000.0,
     "reply_margin": 0.1,
-    "late_window": 0.2,
+    "late_window": 0.15,
     "byte_gap": 0.06,
     "back_off_first": 0.02,
 }

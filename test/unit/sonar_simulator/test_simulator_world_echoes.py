@@ -1,0 +1,59 @@
+import math
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from node_support.parameters import ParameterError
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.world import Shape, World
+from sonar_simulator.world_echoes import WorldEchoes, world_echoes
+
+pytest.importorskip("embreex")
+
+WALL = World.from_shapes("wall", [Shape("wall", "box", pose_matrix((10.5, 0, 0)), (1, 40, 40))])
+
+
+def ping(angle=0.0, bin_count=500, max_range=20, gain=20):
+    command = SimpleNamespace(max_range=max_range, start_gain_db=gain)
+    return SimpleNamespace(angle=angle, bin_count=bin_count, command=command)
+
+
+@pytest.fixture
+def source():
+    return WorldEchoes(WALL, np.eye(4), seed=1)
+
+
+def mean_range(echoes, max_range):
+    strengths = np.frombuffer(echoes, dtype=np.uint8).astype(float)
+    return np.average((np.arange(len(strengths)) + 0.5) * max_range / len(strengths), weights=strengths)
+
+
+@pytest.mark.parametrize(("bin_count", "max_range"), [(500, 20), (252, 20), (500, 50)])
+def test_a_wall_is_heard_where_it_stands_whatever_the_head_is_told(source, bin_count, max_range):
+    echoes = source.echoes(ping(bin_count=bin_count, max_range=max_range))
+    assert len(echoes) == bin_count
+    assert mean_range(echoes, max_range) == pytest.approx(10.1, abs=0.5)
+
+
+def test_open_water_is_silent(source):
+    assert not any(source.echoes(ping(angle=math.pi)))
+
+
+def test_a_wall_out_of_reach_is_silent(source):
+    assert not any(source.echoes(ping(max_range=5)))
+
+
+def test_less_gain_makes_weaker_echoes(source):
+    assert sum(source.echoes(ping(gain=8))) < 0.5 * sum(source.echoes(ping(gain=20)))
+
+
+def test_the_head_hears_from_where_it_was_placed():
+    source = WorldEchoes(WALL, pose_matrix((5.0, 0.0, 0.0), (0.0, 0.0, math.pi)), seed=1)
+    assert mean_range(source.echoes(ping(angle=math.pi)), 20) == pytest.approx(5.0, abs=0.5)
+
+
+def test_a_world_that_cannot_be_read_is_a_bad_parameter():
+    parameters = SimpleNamespace(world_file="none.sdf", x=0.0, y=0.0, z=0.0, yaw_deg=0.0, seed=0)
+    with pytest.raises(ParameterError, match=r"world_file.*none\.sdf"):
+        world_echoes(parameters)
