@@ -7,7 +7,7 @@ import time
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable, List, Optional
-from xml.etree import ElementTree
+from xml.etree import ElementTree as ET
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "build/test_results"
@@ -85,9 +85,9 @@ def _counted(step: Step, status: int) -> Outcome:
     return Outcome(passed, max(failed, int(status != 0 or not cases)), skipped)
 
 
-def _cases(report: Path) -> List[ElementTree.Element]:
+def _cases(report: Path) -> List[ET.Element]:
     files = [report] if report.is_file() else sorted(report.rglob("rosunit-*.xml"))
-    return [case for file in files for case in ElementTree.parse(str(file)).getroot().iter("testcase")]
+    return [case for file in files for case in ET.parse(str(file)).getroot().iter("testcase")]
 
 
 def _failure_texts(step: Step) -> List[str]:

@@ -60,17 +60,19 @@ class MlsmCore:
                 "set sonar_to_cloud's target_frame",
             )
         with self.health.timed(), self._lock:
-            report = self._map.insert(cloud.points)
+            report = self._map.insert(cloud.points[cloud.valid])
             blocks = len(self._map)
             self._stamp_ns = cloud.stamp_ns
             self._changed = True
-        self._tell(report, blocks)
+        self._tell(cloud, report, blocks)
 
-    def _tell(self, report: InsertReport, blocks: int) -> None:
+    def _tell(self, cloud: IntensityCloud, report: InsertReport, blocks: int) -> None:
         self.health.count("points inserted", report.inserted)
         self.health.show("blocks", str(blocks))
-        if report.not_finite:
-            self.health.problem("points that are not finite", f"{report.not_finite} in a cloud", report.not_finite)
+        if cloud.broken:
+            self.health.problem(
+                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
+            )
         if report.outside:
             limit = self._live.current.map_limit
             self.health.problem(

@@ -44,6 +44,11 @@ class IntensityCloud:
         """(n,) bool: points whose coordinates, strength and stamp are all finite."""
         return np.isfinite(self.points).all(axis=1) & np.isfinite(self.time_stamps)
 
+    @property
+    def broken(self) -> int:
+        """Number of points that are not finite although no stage removed them; organised clouds hold removed ones."""
+        return 0 if self.is_organized else len(self) - int(np.count_nonzero(self.valid))
+
     def select(self, keep: np.ndarray) -> "IntensityCloud":
         """Return the cloud with the points where `keep` (n,) bool holds, stamps staying with their points.
 

@@ -50,9 +50,10 @@ class StageRunner:
         except RefusedInput as refused:
             self.health.problem(refused.kind, str(refused))
             return None
-        invalid = len(cloud) - int(np.count_nonzero(cloud.valid))
-        if invalid and not cloud.is_organized:
-            self.health.problem("points that are not finite", f"{invalid} of {len(cloud)} in this cloud", invalid)
+        if cloud.broken:
+            self.health.problem(
+                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
+            )
         self.health.count("clouds out")
         self.health.count("points out", int(np.count_nonzero(result.valid)))
         self._publisher.publish(result)

@@ -98,19 +98,16 @@ class TransformFilter(message_filters.SimpleFilter):
             self.signalMessage(beam, T_target_sonar)
 
     def _pop_ready(self) -> List[Tuple[Beam, np.ndarray]]:
-        ready: List[Tuple[Beam, np.ndarray]] = []
-        waiting: List[Beam] = []
-        for beam in self._queue:
-            if not self._can_place(beam):
-                waiting.append(beam)
-                continue
-            hopeless = [earlier for earlier in waiting if earlier.frame_id == beam.frame_id]
-            waiting = [earlier for earlier in waiting if earlier.frame_id != beam.frame_id]
-            for earlier in hopeless:
-                self._drop(earlier)
-            ready.append((beam, self._placed(beam)))
-        self._queue = deque(waiting)
-        return ready
+        beams = list(self._queue)
+        # From the newest back: what tf brings meanwhile can then only help the older ones.
+        placeable = [self._can_place(beam) for beam in reversed(beams)][::-1]
+        newest = {beam.frame_id: index for index, beam in enumerate(beams) if placeable[index]}
+        waiting = [index for index, beam in enumerate(beams) if index > newest.get(beam.frame_id, -1)]
+        self._queue = deque(beams[index] for index in waiting)
+        for index in sorted(set(range(len(beams))) - set(waiting)):
+            if not placeable[index]:
+                self._drop(beams[index])
+        return [(beam, self._placed(beam)) for index, beam in enumerate(beams) if placeable[index]]
 
     def _drop(self, beam: Beam) -> None:
         _, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))

@@ -105,3 +105,13 @@ def rows(cloud: Any) -> np.ndarray:
     """Return the points of a float32 PointCloud2 as (n, fields), sorted, so that clouds can be compared."""
     data = np.frombuffer(cloud.data, dtype=np.float32).reshape(-1, len(cloud.fields))
     return data[np.lexsort(data.T[::-1])]
+
+
+def wait_for_publisher_links(publisher: rospy.Publisher, number: int, timeout: float = 20.0) -> None:
+    """Wait until `number` nodes are connected to a publisher of this process."""
+    ended = threading.Event()
+    for _ in range(int(timeout / 0.05)):
+        if publisher.get_num_connections() >= number:
+            return
+        ended.wait(0.05)
+    raise AssertionError(f"{publisher.name}: not {number} connections after {timeout} s")

@@ -1,0 +1,105 @@
+#!/usr/bin/env python3
+"""No cloud can end a stage: what cannot be used is counted, and the next cloud passes."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import Diagnostics, Inbox, wait_for_publisher_links
+from sensor_msgs.msg import PointCloud2
+
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.conversions import cloud_to_message
+from underwater_map_construction.msg import StampedIntensityCloud
+
+STAGES = {"thresholder": "/sonar/scan/sonarCloud", "outlier_remover": "/sonar/scan/thresholded",
+          "mlsm_core": "/sonar/scan/cleaned"}  # fmt: skip
+
+
+def wall(points: int = 400) -> np.ndarray:
+    """Return points (n, 4) of a wall of strong echoes among weak ones."""
+    along = np.linspace(0.0, 20.0, points, dtype=np.float32)
+    strengths = np.where(np.arange(points) % 2, 120, 5).astype(np.float32)
+    return np.column_stack([along, np.full(points, 3.0, np.float32), np.zeros(points, np.float32), strengths])
+
+
+def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
+    """Return the points as a message with good stamps."""
+    return cloud_to_message(IntensityCloud(points, np.full(len(points), -10.0), 10 * 10**9, frame))
+
+
+class BadClouds(unittest.TestCase):
+    """Sends to each stage on its own input."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Connect to every stage."""
+        cls.diagnostics = Diagnostics()
+        cls.map = Inbox("/MLSM/cloud", PointCloud2)
+        cls.inputs = {s: rospy.Publisher(topic, StampedIntensityCloud, queue_size=10) for s, topic in STAGES.items()}
+        for publisher in cls.inputs.values():
+            wait_for_publisher_links(publisher, 1)
+
+    def send_to_all(self, cloud: StampedIntensityCloud) -> None:
+        """Publish on every stage's input."""
+        for publisher in self.inputs.values():
+            publisher.publish(cloud)
+
+    def expect_for_all(self, counter: str, number: int) -> None:
+        """Wait for a counter of every stage."""
+        for stage in STAGES:
+            self.diagnostics.wait_for(stage, counter, number)
+
+    def test_1_stamps_that_do_not_match_the_points(self) -> None:
+        """The cloud is refused."""
+        cloud = message(wall())
+        cloud.timeStamps = cloud.timeStamps[:-3]
+        self.send_to_all(cloud)
+        self.expect_for_all("clouds refused", 1)
+
+    def test_2_data_shorter_than_its_header_says(self) -> None:
+        """The cloud is refused."""
+        cloud = message(wall())
+        cloud.cloud.data = cloud.cloud.data[:-7]
+        self.send_to_all(cloud)
+        self.expect_for_all("clouds refused", 2)
+
+    def test_3_points_and_stamps_that_are_not_finite_are_left_out(self) -> None:
+        """One bad point costs one point."""
+        points = wall()
+        points[7, 0] = np.nan
+        points[8, 2] = np.inf
+        self.send_to_all(message(points))
+        self.expect_for_all("points that are not finite", 2)
+        cloud = message(wall())
+        cloud.timeStamps = np.array(cloud.timeStamps)
+        cloud.timeStamps[5] = np.nan
+        self.send_to_all(cloud)
+        self.expect_for_all("points that are not finite", 3)
+
+    def test_4_an_empty_cloud_passes(self) -> None:
+        """No echo is no error."""
+        self.send_to_all(message(np.zeros((0, 4), np.float32)))
+        self.diagnostics.wait_for("mlsm_core", "clouds in", 5)
+
+    def test_5_a_cloud_far_outside_is_left_out_of_the_map(self) -> None:
+        """1000 km away is a broken transform, not a wall."""
+        self.inputs["mlsm_core"].publish(message(wall() + np.float32([1e6, 0, 0, 0])))
+        self.diagnostics.wait_for("mlsm_core", "points outside the map", 400)
+
+    def test_6_a_cloud_in_another_frame_is_refused_by_the_map(self) -> None:
+        """The map cannot know where the sonar was."""
+        self.inputs["mlsm_core"].publish(message(wall(), frame="sonar"))
+        self.diagnostics.wait_for("mlsm_core", "clouds refused", 3)
+
+    def test_7_a_good_cloud_still_goes_all_the_way(self) -> None:
+        """Beams, threshold, outliers, map."""
+        self.inputs["thresholder"].publish(message(wall() + np.float32([100, 0, 0, 0])))
+        self.map.wait_for(lambda cloud: np.any(np.frombuffer(cloud.data, np.float32).reshape(-1, 7)[:, 0] > 99.0))
+
+
+if __name__ == "__main__":
+    rospy.init_node("bad_clouds")
+    rostest.rosrun("underwater_map_construction", "bad_clouds", BadClouds, sys.argv)

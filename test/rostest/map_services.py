@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""What the map tells the world: map -> odom steadily, all of itself to late subscribers, files where it may write."""
+
+import shutil
+import sys
+import unittest
+from pathlib import Path
+
+import numpy as np
+import rospy
+import rostest
+from graph import Inbox, wait_for_publisher_links
+from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
+
+from mlsm_manager.storage import read_ply
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.conversions import cloud_to_message
+from underwater_map_construction.msg import StampedIntensityCloud
+from underwater_map_construction.srv import SaveMap
+
+
+class MapServices(unittest.TestCase):
+    """A map of one pillar and one floor point."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Insert the points and wait until the map shows them."""
+        cls.folder = Path(rospy.get_param("~folder"))
+        points = np.array([[0.1, 0.1, z, 100] for z in np.arange(0, 3, 0.2)] + [[5.1, 5.1, 0, 90]], np.float32)
+        cloud = IntensityCloud(points, np.full(len(points), -1.0), 10**9, "odom")
+        cls.publisher = rospy.Publisher("/sonar/scan/cleaned", StampedIntensityCloud, queue_size=1)
+        wait_for_publisher_links(cls.publisher, 1)
+        cls.publisher.publish(cloud_to_message(cloud))
+        Inbox("/MLSM/Markers", MarkerArray).wait_for(lambda array: len(array.markers) > 1)
+
+    @classmethod
+    def tearDownClass(cls) -> None:
+        """Leave nothing behind."""
+        shutil.rmtree(str(cls.folder), ignore_errors=True)
+
+    def test_a_late_subscriber_sees_the_whole_map(self) -> None:
+        """The markers are latched, and they show true extents: 2.8 m of pillar."""
+        array = Inbox("/MLSM/Markers", MarkerArray).wait_for()
+        vertical = [marker for marker in array.markers if marker.ns == "vertical"]
+        horizontal = [marker for marker in array.markers if marker.ns == "horizontal"]
+        self.assertEqual({marker.type for marker in array.markers}, {Marker.CUBE_LIST})
+        tops = [point.z + marker.scale.z / 2 for marker in vertical for point in marker.points]
+        bottoms = [point.z - marker.scale.z / 2 for marker in vertical for point in marker.points]
+        self.assertAlmostEqual(max(tops), 2.8, places=5)
+        self.assertAlmostEqual(min(bottoms), 0.0, places=5)
+        self.assertEqual(sum(len(marker.points) for marker in horizontal), 1)
+        self.assertNotEqual(vertical[0].color, horizontal[0].color)
+
+    def test_map_to_odom_comes_steadily_and_never_twice_with_one_stamp(self) -> None:
+        """20 times a second, stamped ahead."""
+        inbox = Inbox("/tf", TFMessage)
+        inbox.wait_for(lambda _: len(inbox.messages) >= 41, timeout=10.0)
+        transforms = [message.transforms[0] for message in inbox.messages]
+        stamps = np.array([transform.header.stamp.to_sec() for transform in transforms])
+        self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in transforms}, {("map", "odom")})
+        self.assertEqual(len(np.unique(stamps)), len(stamps))
+        self.assertAlmostEqual(np.median(np.diff(stamps)), 0.05, delta=0.01)
+
+    def test_a_map_is_saved_in_the_folder_that_was_named(self) -> None:
+        """The file holds the blocks."""
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar")
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual(sorted(read_ply(self.folder / "pillar.ply").count), [1, 15])
+
+    def test_a_name_that_leaves_the_folder_is_refused(self) -> None:
+        """With the name in the answer."""
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar")
+        self.assertFalse(answer.success)
+        self.assertIn("'../pillar'", answer.message)
+
+    def test_reset_forgets_the_map_and_clears_the_display(self) -> None:
+        """Runs on the same map as the others and puts it back."""
+        inbox = Inbox("/MLSM/Markers", MarkerArray)
+        shown = inbox.wait_for()
+        self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset", Trigger)().success)
+        cleared = inbox.wait_for(lambda array: all(marker.action == Marker.DELETE for marker in array.markers))
+        self.assertEqual(len(cleared.markers), len(shown.markers))
+        self.setUpClass()
+
+
+if __name__ == "__main__":
+    rospy.init_node("map_services")
+    rostest.rosrun("underwater_map_construction", "map_services", MapServices, sys.argv)
