@@ -6,7 +6,7 @@ from driver_line import served
 
 from imagenex_852_driver.connection import ConnectionParameters
 from imagenex_852_driver.device import SonarDevice
-from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates
+from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates, Transmission
 from imagenex_852_driver.port import PortUnavailableError
 from imagenex_852_driver.protocol import ReplyKind, SwitchCommand
 
@@ -169,3 +169,21 @@ def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
     assert device.ping(SwitchCommand(max_range=5)) is None
     assert device.stats.replies == 0
     device.close()
+
+
+class EchoingLine(EmulatedHead):
+    """A head on two wires whose adapter hears what it sends."""
+
+    def receive(self, data, time):
+        return [Transmission(time, data), *super().receive(data, time)]
+
+
+def test_an_adapter_that_echoes_the_command_does_no_harm(tmp_path):
+    timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
+    with served(tmp_path, EchoingLine(timing=timing)) as (_, connection):
+        device = SonarDevice(connection)
+        device.open()
+        replies = [device.ping(COMMAND).reply.head_position for _ in range(3)]
+        device.close()
+    assert replies == [1400, 1420, 1440]
+    assert (device.stats.replies, device.stats.bad_frames, device.stats.unexpected_replies) == (3, 0, 0)
