@@ -51,6 +51,14 @@ def test_no_cells_need_no_slots():
     assert CellIndex(0).slots(_keys([])).tolist() == []
 
 
+def test_a_crowded_table_does_not_grow_before_it_must():
+    index = CellIndex(0)
+    before = index.nbytes
+    for x in range(600):
+        index.slots(_keys([(x, -x)]))
+    assert index.nbytes == before
+
+
 def test_known_cells_take_no_more_memory():
     index = CellIndex(0)
     keys = _keys([(x, 0) for x in range(10)])

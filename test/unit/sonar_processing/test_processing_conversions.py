@@ -196,6 +196,14 @@ def test_a_field_of_another_type_is_refused():
         points_from_message(_message([bytes(28)], fields, 28))
 
 
+def test_a_field_of_several_values_is_refused():
+    message = point_cloud(np.zeros((1, 4)), 0, "odom")
+    message.fields = _fields(*[(field.name, field.offset, field.datatype) for field in message.fields])
+    message.fields[3].count = 2
+    with pytest.raises(RefusedInput, match="no float32 field intensity"):
+        points_from_message(message)
+
+
 @pytest.mark.parametrize("length", [0, 31, 33, 16])
 def test_data_of_another_length_than_announced_is_refused(length):
     message = point_cloud(np.zeros((2, 4)), 0, "odom")
