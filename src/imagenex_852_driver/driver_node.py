@@ -18,6 +18,7 @@ from node_support.node import StartError, guarded
 from underwater_map_construction.msg import SonarScanLine
 
 _LONGEST_STOP = 1.0
+_PAUSE_AFTER_FAILURE = 1.0
 
 
 class DriverNode:
@@ -35,7 +36,7 @@ class DriverNode:
         if self._live.current.sensor_joint:
             rospy.Subscriber("joint_states", JointState, guarded(self.health, self._take_joints), queue_size=10)
         self._connect()
-        self._thread = threading.Thread(target=self._scanner.run, daemon=True)
+        self._thread = threading.Thread(target=self._scan, daemon=True)
         self._thread.start()
         rospy.on_shutdown(self._end)
 
@@ -56,6 +57,12 @@ class DriverNode:
         stats = self._stats()
         if not stats.connected:
             rospy.logwarn("%s: %s; waiting for it", self.health.name, stats.last_error)
+
+    def _scan(self) -> None:
+        run = guarded(self.health, self._scanner.run)
+        while not self._stop.is_set():
+            run()
+            self._stop.wait(_PAUSE_AFTER_FAILURE)
 
     def _publish(self, ping: Ping) -> None:
         parameters = self._live.current
