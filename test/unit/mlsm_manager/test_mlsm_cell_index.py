@@ -59,6 +59,13 @@ def test_a_crowded_table_does_not_grow_before_it_must():
     assert index.nbytes == before
 
 
+def test_an_expected_number_of_cells_is_reserved_at_once():
+    index = CellIndex(14400)
+    before = index.nbytes
+    index.slots(_keys([(x, y) for x in range(120) for y in range(120)]))
+    assert index.nbytes == before
+
+
 def test_known_cells_take_no_more_memory():
     index = CellIndex(0)
     keys = _keys([(x, 0) for x in range(10)])
