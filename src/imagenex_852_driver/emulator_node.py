@@ -10,7 +10,7 @@ import rospy
 from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FixedPattern, PtyServer
 from imagenex_852_driver.emulator_parameters import EchoSourceKind, EmulatorParameters
 from node_support.live_parameters import LiveParameters
-from node_support.node import StartError, make_health
+from node_support.node import DIAGNOSTICS_PERIOD, StartError, every, make_health
 from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
 
 PACKAGE = "underwater_map_construction"
@@ -39,12 +39,17 @@ class EmulatorNode:
             raise StartError(f"link = {link!r}: the port cannot be made: {error}") from error
         rospy.on_shutdown(self._line.close)
         rospy.Service("~order_fault", OrderFault, self._order)
+        every(DIAGNOSTICS_PERIOD, self._show_counts, self.health)
         rospy.loginfo("%s: the head is at %s", self.health.name, link)
 
     def _use_parameters(self, parameters: EmulatorParameters) -> None:
         if self._faults is None:
             self._faults = FaultInjector(parameters, parameters.seed)
         self._faults.rates = parameters
+
+    def _show_counts(self) -> None:
+        for fault, count in dict(self._faults.counts).items():
+            self.health.total("good replies" if fault is Fault.NONE else fault.value, count)
 
     def _order(self, request: OrderFaultRequest) -> OrderFaultResponse:
         try:
