@@ -29,6 +29,7 @@ class DriverNode:
         self._device: Optional[SonarDevice] = None
         self._scanner: Optional[Scanner] = None
         self._stop = threading.Event()
+        self._last_stats = DeviceStats()
         self._sensor_angle: Optional[float] = None
         self.health = DriverHealth(lambda line: rospy.logwarn("%s", line), self._stats)
         self._live = LiveParameters(DriverParameters, namespace, "Imagenex852", self.health, self._use_parameters)
@@ -41,7 +42,10 @@ class DriverNode:
         rospy.on_shutdown(self._end)
 
     def _stats(self) -> DeviceStats:
-        return self._device.stats if self._device is not None else DeviceStats()
+        # A port that is closed because the node ends is no loss.
+        if self._device is not None and not self._stop.is_set():
+            self._last_stats = self._device.stats
+        return self._last_stats
 
     def _use_parameters(self, parameters: DriverParameters) -> None:
         if self._scanner is None:
