@@ -34,15 +34,18 @@ def box_lists(blocks: Blocks) -> List[BoxList]:
     depth = np.maximum(blocks.depth, thinnest)
     # frexp finds the largest power of two that is not above the depth without a logarithm's rounding.
     power = np.maximum(np.frexp(depth / blocks.resolution)[1] - 1, THINNEST)
-    return [_box_list(blocks, depth, power == value, int(value)) for value in np.unique(power)]
+    height = blocks.resolution * np.exp2(power)
+    middle = (blocks.bottom + blocks.height) / 2.0
+    offset = (depth - height) / 2.0
+    lower = np.column_stack([blocks.centers, middle - offset])
+    upper = np.column_stack([lower[:, :2], middle + offset])
+    needs_two = offset > 0.0
+    return [
+        _box_list(np.concatenate([lower[power == value], upper[(power == value) & needs_two]]), blocks, int(value))
+        for value in np.unique(power)
+    ]
 
 
-def _box_list(blocks: Blocks, depth: np.ndarray, chosen: np.ndarray, power: int) -> BoxList:
-    height = blocks.resolution * 2.0**power
-    middle = (blocks.bottom[chosen] + blocks.height[chosen]) / 2.0
-    offset = (depth[chosen] - height) / 2.0
-    lower = np.column_stack([blocks.centers[chosen], middle - offset])
-    upper = np.column_stack([blocks.centers[chosen], middle + offset])[offset > 0.0]
-    size = np.array([blocks.resolution, blocks.resolution, height])
-    kind = BlockType.VERTICAL if power >= 0 else BlockType.HORIZONTAL
-    return BoxList(np.concatenate([lower, upper]), size, kind, power)
+def _box_list(centers: np.ndarray, blocks: Blocks, power: int) -> BoxList:
+    size = np.array([blocks.resolution, blocks.resolution, blocks.resolution * 2.0**power])
+    return BoxList(centers, size, BlockType.VERTICAL if power >= 0 else BlockType.HORIZONTAL, power)

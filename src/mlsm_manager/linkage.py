@@ -62,19 +62,26 @@ def group_points(points: np.ndarray, cell: np.ndarray, resolution: float) -> Int
 
 
 def link(intervals: Intervals, resolution: float) -> np.ndarray:
-    """Return the positions, (m,), at which a new block starts in sorted `intervals` (n > 0)."""
-    # A running maximum per cell: ranks of the tops are integers, so adding the cell's rank keeps them exact.
-    sorted_tops = np.argsort(intervals.top, kind="stable")
-    rank = np.empty(len(intervals), dtype=np.int64)
-    rank[sorted_tops] = np.arange(len(intervals))
-    new_cell = np.empty(len(intervals), dtype=bool)
-    new_cell[0] = True
-    new_cell[1:] = intervals.cell[1:] != intervals.cell[:-1]
-    highest = np.maximum.accumulate(rank + np.cumsum(new_cell) * len(intervals)) % len(intervals)
-    reached = intervals.top[sorted_tops[highest]]
-    starts = new_cell
-    starts[1:] |= intervals.bottom[1:] - reached[:-1] >= resolution
+    """Return the positions, (m,), at which a new block starts in sorted `intervals` (n > 0).
+
+    In one cell the stored blocks must lie at least the resolution apart from each other, and so must the new ones.
+    """
+    cell = intervals.cell
+    reached = np.maximum(_last_top(intervals, intervals.row < 0), _last_top(intervals, intervals.row >= 0))
+    starts = np.empty(len(intervals), dtype=bool)
+    starts[0] = True
+    starts[1:] = (cell[1:] != cell[:-1]) | (intervals.bottom[1:] - reached[:-1] >= resolution)
     return np.flatnonzero(starts)
+
+
+def _last_top(intervals: Intervals, chosen: np.ndarray) -> np.ndarray:
+    """Return, for each interval, the top of the last chosen one up to it in its cell, -inf where there is none.
+
+    The chosen ones lie apart from each other, so the last of them is the highest.
+    """
+    last = np.maximum.accumulate(np.where(chosen, np.arange(len(intervals)), -1))
+    exists = (last >= 0) & (intervals.cell[last] == intervals.cell)
+    return np.where(exists, intervals.top[last], -np.inf)
 
 
 def merge(intervals: Intervals, starts: np.ndarray) -> Intervals:

@@ -2,7 +2,7 @@
 
 import struct
 from io import BytesIO
-from typing import Dict, List, Set, Tuple
+from typing import Dict, Set, Tuple
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3
@@ -71,9 +71,3 @@ def _serialized(marker: Marker) -> bytes:
     buff = BytesIO()
     marker.serialize(buff)
     return buff.getvalue()
-
-
-def clear_all() -> MarkerArray:
-    """Return the message that empties rviz's display."""
-    markers: List[Marker] = [Marker(action=Marker.DELETEALL)]
-    return MarkerArray(markers=markers)

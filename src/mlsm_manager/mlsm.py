@@ -30,8 +30,8 @@ class MultiLevelSurfaceMap:
         """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted."""
         self.resolution = resolution
         self.limit = limit
-        self._rows = np.zeros((max(expected_blocks, _MIN_ROWS), ROW_WIDTH))
-        self._next = np.full(len(self._rows), NO_BLOCK, dtype=np.int32)
+        self._rows = np.empty((max(expected_blocks, _MIN_ROWS), ROW_WIDTH))
+        self._next = np.empty(len(self._rows), dtype=np.int32)
         self._index = CellIndex(expected_blocks)
         self._used = 0
         self._free = np.empty(0, dtype=np.int64)
@@ -42,8 +42,8 @@ class MultiLevelSurfaceMap:
 
     @property
     def nbytes(self) -> int:
-        """Memory held by the arrays, bytes, with the room they have to grow."""
-        return self._rows.nbytes + self._next.nbytes + self._index.nbytes
+        """Memory in use, bytes; rows beyond those are reserved but never touched, so that they cost nothing yet."""
+        return self._used * (self._rows.itemsize * ROW_WIDTH + self._next.itemsize) + self._index.nbytes
 
     @property
     def blocks(self) -> Blocks:
@@ -109,9 +109,10 @@ class MultiLevelSurfaceMap:
     def _take_rows(self, number: int) -> np.ndarray:
         reused, self._free = self._free[:number], self._free[number:]
         first, self._used = self._used, self._used + number - len(reused)
-        while self._used > len(self._rows):
-            self._rows = np.concatenate([self._rows, np.zeros_like(self._rows)])
-            self._next = np.concatenate([self._next, np.full_like(self._next, NO_BLOCK)])
+        if self._used > len(self._rows):
+            capacity = max(2 * len(self._rows), self._used)
+            self._rows = _grown(self._rows, first, capacity)
+            self._next = _grown(self._next, first, capacity)
         return np.concatenate([reused, np.arange(first, self._used)])
 
     def _write(self, rows: np.ndarray, merged: Intervals, changed: np.ndarray) -> None:
@@ -128,3 +129,9 @@ class MultiLevelSurfaceMap:
         self._next[rows] = np.where(same_cell, np.append(rows[1:], NO_BLOCK), NO_BLOCK)
         first = np.append(True, ~same_cell[:-1])
         self._index.heads[slots] = rows[first]
+
+
+def _grown(array: np.ndarray, used: int, capacity: int) -> np.ndarray:
+    result = np.empty((capacity, *array.shape[1:]), dtype=array.dtype)
+    result[:used] = array[:used]
+    return result
