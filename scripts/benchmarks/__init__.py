@@ -1,0 +1,1 @@
+"""Figures of the package, each measured by a command of the repository: scripts/bench."""

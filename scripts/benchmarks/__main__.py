@@ -1,0 +1,25 @@
+"""Prints the figures of the sections that were asked for, all of them when none was."""
+
+import argparse
+from typing import Callable, Dict, List
+
+from benchmarks import map_figures, processing_figures
+from benchmarks.table import Row, print_table
+
+SECTIONS: Dict[str, Callable[[], List[Row]]] = {
+    "map": map_figures.rows,
+    "processing": processing_figures.rows,
+}
+
+
+def main() -> None:
+    """Print one table."""
+    parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
+    for name in SECTIONS:
+        parser.add_argument(f"--{name}", action="append_const", const=name, dest="chosen", help=f"figures of {name}")
+    chosen = parser.parse_args().chosen or list(SECTIONS)
+    print_table([row for name in chosen for row in SECTIONS[name]()])
+
+
+if __name__ == "__main__":
+    main()

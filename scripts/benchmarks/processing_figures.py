@@ -1,0 +1,76 @@
+"""Messages, and the chain from beams to blocks."""
+
+from io import BytesIO
+from pathlib import Path
+from typing import List
+
+import numpy as np
+import rosbag
+
+from benchmarks.map_figures import RESOLUTION, scan
+from benchmarks.table import Row, median_seconds
+from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.conversions import (
+    StampedIntensityCloudArrays,
+    beam_from_message,
+    cloud_from_message,
+    cloud_to_message,
+)
+from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, SonarToCloudParameters
+from sonar_processing.threshold import Thresholder, ThresholderParameters
+from sonar_processing.transforms import matrix_from_message
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def message_rows() -> List[Row]:
+    """Measure a 60,000-point cloud to bytes and back."""
+    rng = np.random.default_rng(3)
+    points = scan(rng, np.zeros(2), 60_000).astype(np.float32)
+    cloud = IntensityCloud(points, rng.uniform(1, 2, len(points)), 10**9, "odom")
+    buffer = BytesIO()
+
+    def write() -> None:
+        buffer.seek(0)
+        cloud_to_message(cloud).serialize(buffer)
+
+    write_seconds = median_seconds(write)
+    data = buffer.getvalue()
+    read_seconds = median_seconds(lambda: cloud_from_message(StampedIntensityCloudArrays().deserialize(data)))
+    return [
+        ("60,000 points to a serialised message", f"{1e3 * write_seconds:.2f} ms", ""),
+        ("a serialised message to 60,000 points", f"{1e3 * read_seconds:.2f} ms", ""),
+    ]
+
+
+def chain_rows() -> List[Row]:
+    """Measure beams to inserted blocks on the recorded tour of the basin."""
+    beams, poses = [], {}
+    with rosbag.Bag(str(ROOT / "test/data/basin.bag")) as bag:
+        for topic, message, stamp in bag.read_messages(["/sonar/raw", "/tf"]):
+            if topic == "/tf":
+                poses[stamp.to_nsec()] = matrix_from_message(message.transforms[0].transform)
+            else:
+                beams.append(message)
+    recorded = beams[-1].header.stamp.to_sec() - beams[0].header.stamp.to_sec()
+
+    def run() -> None:
+        assembler, surface_map = ScanAssembler(SonarToCloudParameters()), MultiLevelSurfaceMap(RESOLUTION)
+        stages = [Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())]
+        for message in beams:
+            beam = beam_from_message(message)
+            cloud = assembler.add(PlacedBeam(beam, poses[beam.stamp_ns], is_moving=False))
+            if cloud is not None:
+                for stage in stages:
+                    cloud = stage(cloud)
+                surface_map.insert(cloud.points)
+
+    seconds = median_seconds(run, repeats=5)
+    return [(f"beams to blocks, {len(beams)} beams of 500 bins", f"{recorded / seconds:.0f} times real time", ">= 50")]
+
+
+def rows() -> List[Row]:
+    """Return the figures of the processing chain."""
+    return message_rows() + chain_rows()
