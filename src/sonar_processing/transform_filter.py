@@ -63,7 +63,8 @@ class TransformFilter(message_filters.SimpleFilter):
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
             if len(self._queue) >= QUEUE_SIZE:
-                self._drop(self._queue.popleft())
+                oldest = self._queue.popleft()
+                self._drop(oldest, self._obstacle(oldest) or f"{QUEUE_SIZE} newer beams wait, the machine is too slow")
             self._newest_ns = beam.stamp_ns
             self._queue.append(beam)
             self._condition.notify()
@@ -100,21 +101,26 @@ class TransformFilter(message_filters.SimpleFilter):
     def _pop_ready(self) -> List[Tuple[Beam, np.ndarray]]:
         beams = list(self._queue)
         # From the newest back: what tf brings meanwhile can then only help the older ones.
-        placeable = [self._can_place(beam) for beam in reversed(beams)][::-1]
+        placeable = [not self._obstacle(beam) for beam in reversed(beams)][::-1]
         newest = {beam.frame_id: index for index, beam in enumerate(beams) if placeable[index]}
         waiting = [index for index, beam in enumerate(beams) if index > newest.get(beam.frame_id, -1)]
         self._queue = deque(beams[index] for index in waiting)
-        for index in sorted(set(range(len(beams))) - set(waiting)):
-            if not placeable[index]:
-                self._drop(beams[index])
-        return [(beam, self._placed(beam)) for index, beam in enumerate(beams) if placeable[index]]
+        ready = []
+        for beam in [beam for index, beam in enumerate(beams) if index not in waiting]:
+            obstacle = self._obstacle(beam)
+            if obstacle:
+                self._drop(beam, obstacle)
+            else:
+                ready.append((beam, self._placed(beam)))
+        return ready
 
-    def _drop(self, beam: Beam) -> None:
-        _, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))
+    def _drop(self, beam: Beam, reason: str) -> None:
         self._health.problem("beams without transform", f"from {beam.frame_id} to {self._target_frame}: {reason}")
 
-    def _can_place(self, beam: Beam) -> bool:
-        return bool(self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))[0])
+    def _obstacle(self, beam: Beam) -> str:
+        """Why tf cannot place a beam; empty when it can."""
+        can, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))
+        return "" if can else reason or "unknown to tf"
 
     def _placed(self, beam: Beam) -> np.ndarray:
         stamped = self._buffer.lookup_transform_core(self._target_frame, beam.frame_id, _time(beam))
