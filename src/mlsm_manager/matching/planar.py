@@ -1,0 +1,37 @@
+"""Planar poses as arrays: x y [m] and yaw [rad] in the last axis; T_a_b takes coordinates in b to coordinates in a."""
+
+import numpy as np
+
+
+def wrapped(angle: np.ndarray) -> np.ndarray:
+    """Return angles in [-pi, pi)."""
+    return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
+
+
+def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+    """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y = vectors[..., 0], vectors[..., 1]
+    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+
+
+def composed(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return T_a_c (..., 3) of `first` = T_a_b and `second` = T_b_c; the yaw is not wrapped."""
+    first, second = np.asarray(first, dtype=np.float64), np.asarray(second, dtype=np.float64)
+    position = first[..., :2] + rotated(second[..., :2], first[..., 2])
+    return np.concatenate([position, (first[..., 2] + second[..., 2])[..., np.newaxis]], axis=-1)
+
+
+def inverse(pose: np.ndarray) -> np.ndarray:
+    """Return T_b_a (..., 3) of T_a_b."""
+    pose = np.asarray(pose, dtype=np.float64)
+    position = -rotated(pose[..., :2], -pose[..., 2])
+    return np.concatenate([position, -pose[..., 2, np.newaxis]], axis=-1)
+
+
+def transformed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return points (n, >= 2) with x y taken through T_a_b (3,) or (n, 3), further columns as they are."""
+    pose = np.asarray(pose, dtype=np.float64)
+    result = np.array(points, dtype=np.float64)
+    result[:, :2] = pose[..., :2] + rotated(result[:, :2], pose[..., 2])
+    return result
