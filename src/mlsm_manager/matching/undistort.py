@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.matching.planar import composed, inverse, rotated
+from mlsm_manager.matching.planar import composed, inverse, transformed
 from mlsm_manager.matching.result import MatchResult
 from mlsm_manager.matching.scan import Scan
 
@@ -10,14 +10,4 @@ from mlsm_manager.matching.scan import Scan
 def corrected_points(scan: Scan, result: MatchResult) -> np.ndarray:
     """Return (n, 4) points in map: each taken from the odometry's pose to the matched pose at its own beam's time."""
     path = np.stack([np.interp(scan.times, result.beam_times, column) for column in result.beam_poses.T], axis=-1)
-    corrections = composed(path, inverse(scan.track.at(scan.times)))
-    points = scan.points.copy()
-    points[:, :2] = corrections[:, :2] + rotated(points[:, :2], corrections[:, 2])
-    return points
-
-
-def points_by_prior(scan: Scan, correction: np.ndarray) -> np.ndarray:
-    """Return (n, 4) points in map by one T_map_odom (3,) for the whole scan."""
-    points = scan.points.copy()
-    points[:, :2] = correction[:2] + rotated(points[:, :2], correction[2])
-    return points
+    return transformed(composed(path, inverse(scan.track.at(scan.times))), scan.points)
