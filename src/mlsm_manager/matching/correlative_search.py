@@ -6,7 +6,7 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.matching.planar import rotated, wrapped
-from mlsm_manager.matching.planar_motion import STATES, PlanarMotion
+from mlsm_manager.matching.planar_motion import PlanarMotion
 from mlsm_manager.matching.score_field import ScoreField
 
 YAW_STEP = np.radians(2.75)
@@ -57,7 +57,7 @@ def search(
     for number, rate in enumerate(window.yaw_rates):
         theta = center.copy()
         theta[5] += rate
-        arms = motion.points(theta)[chosen] - center[:2]
+        arms = motion.points(motion.path(theta))[chosen] - center[:2]
         for index, yaw in enumerate(yaws):
             points = center[:2] + rotated(arms, yaw)
             scores[number, index] = field.shifted_sums(points, weights, reach) - objection[index]
@@ -102,6 +102,3 @@ def separation(first: np.ndarray, second: np.ndarray) -> float:
     """Return how far apart two states are: 1 where they differ by what keeps two candidates apart."""
     distance = np.hypot(*(first[:2] - second[:2])) / _APART
     return float(max(distance, abs(float(wrapped(first[2] - second[2]))) / _APART_YAW))
-
-
-assert STATES == 8

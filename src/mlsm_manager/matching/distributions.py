@@ -1,9 +1,10 @@
 """The map as local distributions: what a point near a block should look like (Segal et al. 2009; Stoyanov et al. 2012).
 
 A block is too small to tell the direction of the wall it belongs to, so each is joined with its neighbours, weighted by
-a Gaussian window. A window of width h shows a long wall as if it were h long, so its information along the wall,
-up to a margin, is the window's and not the wall's, and is taken away: along a wall a point may slide, while a buoy
-holds it on all sides.
+a Gaussian window. A window shows a long wall as if it were as long as the window, and the end of what a scan saw of a
+wall as if the wall ended there: both would pull the next scan back to where the last one was taken. So the extent along
+the structure comes from a window twice as wide, and what the window itself accounts for, up to a margin, is taken away.
+Along a wall a point may slide, while a buoy holds it on all sides.
 """
 
 from typing import Tuple
@@ -14,18 +15,21 @@ from scipy.spatial import cKDTree
 from mlsm_manager.blocks import Blocks
 
 _NEIGHBOURS = 16
-_WINDOW_NEIGHBOUR = 5
+_WINDOW_NEIGHBOUR = 2
 _LEAST_WINDOW = 0.7
 _GREATEST_WINDOW = 2.5
 _ALONG_MARGIN = 3.0
 _PRIOR_POINTS = 2.0
 _LEAST_DEVIATION = 0.05
+_LONE_DEVIATION = 0.5
+_SURFACE_DEVIATION = 0.4
+_UNBOUNDED = 100.0
 
 
 class LocalDistributions:
     """One planar distribution per block.
 
-    mean: (n, 2) m in map. information: (n, 2, 2) inverse of the covariance of echoes about it, 1/m^2.
+    mean: (n, 2) m in map. covariance: (n, 2, 2) m^2 of echoes about it.
     deviation: m, how far echoes typically lie from the line that their neighbours make.
     """
 
@@ -33,37 +37,59 @@ class LocalDistributions:
         """`blocks` must hold at least one."""
         centers = blocks.mean[:, :2]
         self._tree = cKDTree(centers)
-        weights, neighbours, window = self._windows(centers, np.sqrt(blocks.count))
-        self.mean = np.einsum("ij,ijk->ik", weights, centers[neighbours])
-        spread = centers[neighbours] - self.mean[:, np.newaxis, :]
-        covariance = np.einsum("ij,ija,ijb->iab", weights, spread, spread)
-        own = np.einsum("ij,ijk->ik", weights, blocks.variance[neighbours, :2])
-        covariance[:, 0, 0] += own[:, 0]
-        covariance[:, 1, 1] += own[:, 1]
-        members = 1.0 / (weights**2).sum(axis=1)
-        self.deviation, self.information = _information(covariance, members, window)
+        count = min(_NEIGHBOURS, len(centers))
+        distances, neighbours = self._tree.query(centers, k=np.arange(1, count + 1))
+        window = np.clip(distances[:, min(_WINDOW_NEIGHBOUR, count - 1)], _LEAST_WINDOW, _GREATEST_WINDOW)
+        self.window = window
+        near = np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
+        self.support = (near * blocks.count[neighbours]).sum(axis=1)
+        mass = np.sqrt(blocks.count)[neighbours]
+        weights = _window_weights(mass, distances, window)
+        self.mean, covariance = _moments(weights, neighbours, blocks)
+        _, broad = _moments(_window_weights(mass, distances, 2.0 * window), neighbours, blocks)
+        members = _members(weights, blocks.count[neighbours])
+        self.deviation, self.covariance, thickness = _structure(covariance, broad, members, 2.0 * window)
+        self.weight = (1.0 + thickness / _SURFACE_DEVIATION**2) ** -2
 
     def nearest(self, points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return for points (n, 2) the distance (n,) to the nearest block and its index (n,)."""
         return self._tree.query(points)
 
-    def _windows(self, centers: np.ndarray, mass: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        count = min(_NEIGHBOURS, len(centers))
-        distances, neighbours = self._tree.query(centers, k=np.arange(1, count + 1))
-        window = distances[:, min(_WINDOW_NEIGHBOUR, count - 1)]
-        window = np.clip(window, _LEAST_WINDOW, _GREATEST_WINDOW)
-        weights = mass[neighbours] * np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
-        return weights / weights.sum(axis=1, keepdims=True), neighbours, window
+
+def _window_weights(mass: np.ndarray, distances: np.ndarray, window: np.ndarray) -> np.ndarray:
+    weights = mass * np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
+    return weights / weights.sum(axis=1, keepdims=True)
 
 
-def _information(covariance: np.ndarray, members: np.ndarray, window: np.ndarray) -> Tuple[float, np.ndarray]:
+def _moments(weights: np.ndarray, neighbours: np.ndarray, blocks: Blocks) -> Tuple[np.ndarray, np.ndarray]:
+    centers = blocks.mean[neighbours, :2]
+    mean = np.einsum("ij,ijk->ik", weights, centers)
+    spread = centers - mean[:, np.newaxis, :]
+    covariance = np.einsum("ij,ija,ijb->iab", weights, spread, spread)
+    own = np.einsum("ij,ijk->ik", weights, blocks.variance[neighbours, :2])
+    covariance[:, 0, 0] += own[:, 0]
+    covariance[:, 1, 1] += own[:, 1]
+    return mean, covariance
+
+
+def _members(weights: np.ndarray, counts: np.ndarray) -> np.ndarray:
+    """Return (n,) to how many equally weighted points each window comes."""
+    return weights.sum(axis=1) ** 2 / (weights**2 / counts).sum(axis=1)
+
+
+def _structure(
+    covariance: np.ndarray, broad: np.ndarray, members: np.ndarray, broad_window: np.ndarray
+) -> Tuple[float, np.ndarray]:
     values, vectors = np.linalg.eigh(covariance)
-    sure = members >= 3.0
-    typical = float(np.median(values[sure, 0])) if sure.any() else 0.0
-    typical = max(typical, _LEAST_DEVIATION**2)
+    sure = (members >= 3.0) & (values[:, 0] < _SURFACE_DEVIATION**2)
+    typical = max(float(np.median(values[sure, 0])) if sure.any() else 0.0, _LEAST_DEVIATION**2)
     # With few members a line through them fits too well; the deviation found elsewhere counts as two more.
-    values = (members[:, np.newaxis] * values + _PRIOR_POINTS * typical) / (members[:, np.newaxis] + _PRIOR_POINTS)
-    values = np.maximum(values, _LEAST_DEVIATION**2)
-    information = 1.0 / values
-    information[:, 1] = np.maximum(information[:, 1] - _ALONG_MARGIN / window**2, 0.0)
-    return float(np.sqrt(typical)), np.einsum("iak,ik,ibk->iab", vectors, information, vectors)
+    across = (members * values[:, 0] + _PRIOR_POINTS * typical) / (members + _PRIOR_POINTS)
+    # Two points always lie on a line: whether they are a structure or clutter, only a third can tell.
+    known = np.clip((members - 1.0) / 2.0, 0.0, 1.0)
+    across = known * across + (1.0 - known) * np.maximum(_LONE_DEVIATION**2, across)
+    along = np.einsum("na,nab,nb->n", vectors[:, :, 1], broad, vectors[:, :, 1])
+    along = np.maximum(along, across)
+    information = np.maximum(1.0 / along - _ALONG_MARGIN / broad_window**2, _UNBOUNDED**-2)
+    values = np.column_stack([across, 1.0 / information])
+    return float(np.sqrt(typical)), np.einsum("iak,ik,ibk->iab", vectors, values, vectors), across

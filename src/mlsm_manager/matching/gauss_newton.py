@@ -1,149 +1,166 @@
-"""Refines a state so that the points lie where the local distributions expect them (thesis 6.3 in one step)."""
+"""Refines a state so that the points lie where the local distributions expect them (thesis 6.3, all at once)."""
 
 from dataclasses import dataclass
-from typing import Tuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.distributions import LocalDistributions
-from mlsm_manager.matching.planar_motion import STATES, PlanarMotion
-from mlsm_manager.matching.robust import geman_mcclure
+from mlsm_manager.matching.planar_motion import PlanarMotion
+from mlsm_manager.matching.robust import geman_mcclure, geman_mcclure_cost
 
 SCALES = (8.0, 4.0, 2.5)
+_GATE = 0.75
+_ITERATIONS_PER_SCALE = 4
 _CLUSTER = 3.0
+_GREATEST_INFLATION = 30.0
 _LAST_STEP = 1e-3
-_INLIER = 3.0
+_LEVER = 20.0
+_NEIGHBOURS = 12
+INLIER = 3.0
 
 
 @dataclass(frozen=True)
 class PriorState:
-    """Mean (8,) and information (8, 8) of the state before the scan."""
+    """Mean (8,) and information (8, 8) of the state before the scan, as in planar_motion."""
 
     mean: np.ndarray
     information: np.ndarray
+
+    def objection(self, theta: np.ndarray) -> float:
+        """Return half the squared Mahalanobis distance of a state from the mean."""
+        difference = theta - self.mean
+        return float(difference @ self.information @ difference) / 2.0
 
 
 @dataclass(frozen=True)
 class Fit:
     """Where Gauss-Newton ended.
 
-    theta: (8,). data: (8, 8) information that the points gave, after allowing for their correlation.
-    covariance: (8, 8), prior included. cost: mean robust cost of a point, 0 (on the map) to 1, without the prior.
-    weights: (n,) robust weights. distances: (n,) m to the nearest block's distribution. converged: the last step was small.
+    theta: (8,). covariance: (8, 8), prior included. gain: by how many nats the points prefer this place to one where
+    they meet nothing, less the prior's objection. inliers: (n,) bool, points that lie on a surface of the map.
+    distances: (n,) m from the nearest block. converged: whether the last step was small.
     """
 
     theta: np.ndarray
-    data: np.ndarray
     covariance: np.ndarray
-    cost: float
-    weights: np.ndarray
-    distances: np.ndarray
+    gain: float
     inliers: np.ndarray
+    distances: np.ndarray
     iterations: int
     converged: bool
 
 
-def refine(
-    motion: PlanarMotion,
-    point_weights: np.ndarray,
-    target: LocalDistributions,
-    start: np.ndarray,
-    prior: PriorState,
-    max_iterations: int,
-) -> Fit:
-    """Minimise the points' robust squared Mahalanobis distances plus the prior's, from `start` (8,).
-
-    The robust kernel narrows as the iterations go on. Points that lie near each other in the map err alike; the
-    information is divided by what their gradients' sum over clusters of 3 m shows of that (a design effect), so that
-    the prior keeps its honest share.
-    """
-    theta, inflation, scale_index = np.array(start, dtype=np.float64), 1.0, 0
-    converged = False
-    iteration = 0
-    for iteration in range(1, max_iterations + 1):
-        normal = _normal_equations(motion, point_weights, target, theta, SCALES[scale_index])
-        if scale_index == len(SCALES) - 1:
-            inflation = _design_effect(normal, prior)
-        information = normal.information / inflation + prior.information
-        gradient = normal.gradient.sum(axis=0) / inflation + prior.information @ (theta - prior.mean)
-        step = -np.linalg.solve(information, gradient)
-        theta = theta + step
-        small = _is_small(step, motion)
-        if small and scale_index == len(SCALES) - 1:
-            converged = True
-            break
-        if small or iteration % 4 == 0:
-            scale_index = min(scale_index + 1, len(SCALES) - 1)
-    return _fit(motion, point_weights, target, theta, prior, iteration, converged)
-
-
 @dataclass(frozen=True)
 class _Normal:
+    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals."""
+
     information: np.ndarray
     gradient: np.ndarray
     world: np.ndarray
     squared: np.ndarray
-    weights: np.ndarray
+    importance: np.ndarray
     distances: np.ndarray
 
 
-def _normal_equations(
-    motion: PlanarMotion, point_weights: np.ndarray, target: LocalDistributions, theta: np.ndarray, scale: float
-) -> _Normal:
-    world = motion.points(theta)
-    distances, nearest = target.nearest(world)
-    residual = world - target.mean[nearest]
-    weighted = np.einsum("nab,nb->na", target.information[nearest], residual)
-    squared = np.einsum("na,na->n", residual, weighted)
-    weights = point_weights * geman_mcclure(squared, scale) * (distances < _gate(scale))
-    jacobian = motion.point_jacobian(theta)
-    lever = np.einsum("nab,nbs->nas", target.information[nearest], jacobian)
-    information = np.einsum("n,nas,nat->st", weights, jacobian, lever)
-    gradient = weights[:, np.newaxis] * np.einsum("nas,na->ns", jacobian, weighted)
-    return _Normal(information, gradient, world, squared, weights, distances)
+class Refiner:
+    """Minimises the points' robust squared Mahalanobis distances plus the prior's.
+
+    The robust kernel narrows as the iterations go on. Points that lie near each other in the map err alike; the
+    information is divided by what the sums of their gradients over clusters of 3 m show of that (a design effect), so
+    that the prior keeps its honest share.
+    """
+
+    def __init__(
+        self, motion: PlanarMotion, point_weights: np.ndarray, target: LocalDistributions, prior: PriorState
+    ) -> None:
+        """`point_weights` is (n,), n > 0."""
+        self._motion = motion
+        self._point_weights = point_weights
+        self._target = target
+        self._prior = prior
+        spots = motion.points(motion.path(prior.mean))
+        self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
+        seconds = motion.beam_times[-1] - motion.beam_times[0]
+        self._lengths = np.array([1.0, 1.0, _LEVER, seconds, seconds, _LEVER * seconds, _LEVER, _LEVER])
+
+    def refine(self, start: np.ndarray, max_iterations: int) -> Fit:
+        """Return the fit found from `start` (8,)."""
+        theta, narrowest = np.array(start, dtype=np.float64), len(SCALES) - 1
+        index, iteration, converged = 0, 0, False
+        while iteration < max_iterations and not converged:
+            iteration += 1
+            normal = self._normal(theta, SCALES[index])
+            inflation = self._design_effect(normal) if index == narrowest else 1.0
+            step = self._step(theta, normal, inflation)
+            theta = theta + step
+            small = bool(np.abs(step * self._lengths).max() < _LAST_STEP)
+            converged = small and index == narrowest
+            if small or iteration % _ITERATIONS_PER_SCALE == 0:
+                index = min(index + 1, narrowest)
+        return self._fit(theta, iteration, converged)
+
+    def matched(self, theta: np.ndarray) -> np.ndarray:
+        """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
+        return self._on_surface(self._normal(theta, SCALES[-1]))
+
+    def _step(self, theta: np.ndarray, normal: _Normal, inflation: float) -> np.ndarray:
+        information = normal.information / inflation + self._prior.information
+        objection = self._prior.information @ (theta - self._prior.mean)
+        return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
+
+    def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
+        path = self._motion.path(theta)
+        world = self._motion.points(path)
+        distances, nearest = self._target.nearest(world)
+        residual = world - self._target.mean[nearest]
+        metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(path))
+        weighted = np.einsum("nab,nb->na", metric, residual)
+        squared = np.einsum("na,na->n", residual, weighted)
+        importance = self._point_weights * self._target.weight[nearest] * self._map_share(nearest)
+        importance = importance * (distances < _GATE * scale)
+        weights = importance * geman_mcclure(squared, scale)
+        jacobian = self._motion.point_jacobian(path, theta)
+        lever = (metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
+        information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
+        gradient = np.einsum("nas,na->ns", lever, residual)
+        return _Normal(information, gradient, world, squared, importance, distances)
+
+    def _map_share(self, nearest: np.ndarray) -> np.ndarray:
+        """Return (n,) the share of the points' information that is left after the map's own noise.
+
+        k points of a scan that are compared with the same m points of the map err by s^2/k + s^2/m together, and the
+        fit cannot see the second part.
+        """
+        window = self._target.window[nearest][:, np.newaxis]
+        scan_support = np.exp(-0.5 * (self._apart / window) ** 2).sum(axis=1)
+        map_support = self._target.support[nearest]
+        return map_support / (map_support + scan_support)
+
+    def _design_effect(self, normal: _Normal) -> float:
+        cell = np.floor(normal.world / _CLUSTER).astype(np.int64)
+        _, cluster = np.unique(cell[:, 0] * 2**32 + cell[:, 1], return_inverse=True)
+        sums = np.stack([np.bincount(cluster, weights=column) for column in normal.gradient.T], axis=1)
+        whitening = np.linalg.inv(normal.information + self._prior.information)
+        independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
+        return float(np.clip(np.trace(whitening @ (sums.T @ sums)) / independent, 1.0, _GREATEST_INFLATION))
+
+    def _on_surface(self, normal: _Normal) -> np.ndarray:
+        return (normal.squared < INLIER**2) & (normal.importance > 0.0)
+
+    def _fit(self, theta: np.ndarray, iterations: int, converged: bool) -> Fit:
+        normal = self._normal(theta, SCALES[-1])
+        inflation = self._design_effect(normal)
+        covariance = np.linalg.inv(normal.information / inflation + self._prior.information)
+        saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(normal.squared, SCALES[-1])
+        gain = float((normal.importance * saved).sum()) / inflation - self._prior.objection(theta)
+        return Fit(theta, covariance, gain, self._on_surface(normal), normal.distances, iterations, converged)
 
 
-def _gate(scale: float) -> float:
-    return 0.75 * scale
-
-
-def _design_effect(normal: _Normal, prior: PriorState) -> float:
-    cell = np.floor(normal.world / _CLUSTER).astype(np.int64)
-    _, cluster = np.unique(cell, axis=0, return_inverse=True)
-    cluster = cluster.reshape(-1)
-    sums = np.stack([np.bincount(cluster, weights=column) for column in normal.gradient.T], axis=1)
-    shared = sums.T @ sums
-    whitening = np.linalg.inv(normal.information + prior.information)
-    return float(np.clip(np.trace(whitening @ shared) / max(np.trace(whitening @ normal.information), 1e-9), 0.3, 30.0))
-
-
-def _is_small(step: np.ndarray, motion: PlanarMotion) -> bool:
-    seconds = motion.beam_times[-1] - motion.beam_times[0]
-    lengths = np.array([1.0, 1.0, 20.0, seconds, seconds, 20.0 * seconds, 1.0, 1.0])
-    return bool(np.abs(step * lengths).max() < _LAST_STEP)
-
-
-def _fit(
-    motion: PlanarMotion,
-    point_weights: np.ndarray,
-    target: LocalDistributions,
-    theta: np.ndarray,
-    prior: PriorState,
-    iterations: int,
-    converged: bool,
-) -> Fit:
-    normal = _normal_equations(motion, point_weights, target, theta, SCALES[-1])
-    data = normal.information / _design_effect(normal, prior)
-    covariance = np.linalg.inv(data + prior.information)
-    inliers = (normal.squared < _INLIER**2) & (normal.distances < _gate(SCALES[-1]))
-    cost, used = robust_cost(normal.squared, inliers, point_weights)
-    return Fit(theta, data, covariance, cost, normal.weights, normal.distances, used, iterations, converged)
-
-
-def robust_cost(squared: np.ndarray, near: np.ndarray, weights: np.ndarray) -> Tuple[float, np.ndarray]:
-    """Return the mean Geman-McClure cost, 1 for points that are not `near` the map, and `near` itself."""
-    cost = squared / (squared + SCALES[-1] ** 2)
-    return float(np.average(np.where(near, cost, 1.0), weights=weights)), near
-
-
-assert STATES == 8
+def _inverse(matrices: np.ndarray) -> np.ndarray:
+    """Return the inverses of symmetric matrices (n, 2, 2)."""
+    a, b, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    result = np.empty_like(matrices)
+    result[:, 0, 0], result[:, 1, 1] = d, a
+    result[:, 0, 1] = result[:, 1, 0] = -b
+    return result / (a * d - b * b)[:, np.newaxis, np.newaxis]

@@ -37,7 +37,8 @@ class PlanarMotion:
     time. beam: (n,) index of each point's time in beam_times.
     """
 
-    def __init__(self, scan: Scan) -> None:
+    def __init__(self, scan: Scan, bearing_deviation: float = 0.0) -> None:
+        """`bearing_deviation`: rad, standard deviation of an echo's bearing within its beam."""
         start = scan.times.min() if len(scan) else scan.reference_time
         steady = np.linspace(start, scan.reference_time, _LEAST_NODES)
         times = np.unique(np.append(scan.times, steady))
@@ -50,6 +51,7 @@ class PlanarMotion:
         self._heading = relative[:, 2]
         self._step = np.diff(relative[:, :2], axis=0)
         self._seconds = np.diff(self.beam_times)
+        self._bearing_deviation = bearing_deviation
         self._velocity = scan.track.velocity_at(scan.reference_time)
 
     def path(self, theta: np.ndarray) -> np.ndarray:
@@ -82,16 +84,21 @@ class PlanarMotion:
         result[:, 2, 5] = self._tau
         return result
 
-    def points(self, theta: np.ndarray) -> np.ndarray:
-        """Return the points (n, 2) in map."""
-        path = self.path(theta)[self.beam]
-        return path[:, :2] + rotated(self.local, path[:, 2])
+    def points(self, path: np.ndarray) -> np.ndarray:
+        """Return the points (n, 2) in map for a `path` (b, 3)."""
+        poses = path[self.beam]
+        return poses[:, :2] + rotated(self.local, poses[:, 2])
 
-    def point_jacobian(self, theta: np.ndarray) -> np.ndarray:
-        """Return the derivative (n, 2, 8) of `points`."""
+    def point_jacobian(self, path: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Return the derivative (n, 2, 8) of `points` by the state; `path` is that of `theta`."""
         jacobian = self.jacobian(theta)
-        arms = _quarter_turn(rotated(self.local, self.path(theta)[self.beam, 2]))
+        arms = _quarter_turn(rotated(self.local, path[self.beam, 2]))
         return jacobian[self.beam, :2] + arms[:, :, np.newaxis] * jacobian[self.beam, 2][:, np.newaxis, :]
+
+    def point_covariance(self, path: np.ndarray) -> np.ndarray:
+        """Return (n, 2, 2) m^2 in map: what a beam's width leaves open of each point's bearing."""
+        sideways = _quarter_turn(rotated(self.local, path[self.beam, 2])) * self._bearing_deviation
+        return sideways[:, :, np.newaxis] * sideways[:, np.newaxis, :]
 
     def velocity(self, theta: np.ndarray) -> np.ndarray:
         """Return the (3,) body velocity at the reference time."""

@@ -1,11 +1,13 @@
-"""Robust weights: how much a point counts that lies off what it is compared with."""
+"""Robust weights: how much a point counts that lies off what it is compared with (Geman and McClure 1985)."""
 
 import numpy as np
 
 
 def geman_mcclure(squared: np.ndarray, scale: float) -> np.ndarray:
-    """Return weights (n,) of squared normalised residuals (n,): 1 at 0, 1/4 at `scale`, towards 0 beyond.
-
-    Geman and McClure (1985), as used with Gauss-Newton: derivative of r^2 / (1 + r^2 / scale^2), over 2 r.
-    """
+    """Return Gauss-Newton weights (n,) of squared normalised residuals (n,): 1 at 0, 1/4 at `scale`, towards 0."""
     return (1.0 + squared / scale**2) ** -2
+
+
+def geman_mcclure_cost(squared: np.ndarray, scale: float) -> np.ndarray:
+    """Return costs (n,) whose slope the weights are: half the square near 0, never above half of `scale` squared."""
+    return 0.5 * squared / (1.0 + squared / scale**2)

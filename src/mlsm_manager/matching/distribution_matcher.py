@@ -1,0 +1,135 @@
+"""The default matcher: a correlative search, then one path for the whole scan among local distributions."""
+
+import time
+from typing import List, Tuple
+
+import numpy as np
+
+from mlsm_manager.blocks import Blocks
+from mlsm_manager.matching.correlative_search import YAW_STEP, SearchWindow, search, separation
+from mlsm_manager.matching.distributions import LocalDistributions
+from mlsm_manager.matching.gauss_newton import Fit, PriorState, Refiner
+from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES, PlanarMotion
+from mlsm_manager.matching.result import MatchResult, MatchStatus, Prior
+from mlsm_manager.matching.scan import Scan
+from mlsm_manager.matching.score_field import ScoreField
+from mlsm_manager.matching.significance import significance
+
+_CANDIDATES = 4
+_WINDOW_DEVIATIONS = 3.0
+_OBJECTION_SHARE = 0.01
+_MOST_RATES = 9
+_LEAST_VARIANCE = 1e-12
+_FIELD_CELLS = 2.0
+
+
+class DistributionMatcher:
+    """Searches around the prior, refines the best candidates and judges what comes out."""
+
+    def __init__(self, parameters: DistributionMatcherParameters) -> None:
+        self.parameters = parameters
+
+    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+        """Return where the scan was taken; see Matcher."""
+        start = time.perf_counter()
+        state = prior_state(prior, scan)
+        motion = PlanarMotion(scan, self.parameters.beam_width / np.sqrt(12.0))
+        fewest = self.parameters.min_points
+        if len(scan) < fewest or len(target) < fewest:
+            reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
+            return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
+        fits, refiner = self._fits(scan, motion, target, state)
+        status, reason = self._judge(fits, refiner, state)
+        return _result(status, reason, motion, fits[0], start)
+
+    def _fits(self, scan: Scan, motion: PlanarMotion, target: Blocks, state: PriorState) -> Tuple[List[Fit], Refiner]:
+        parameters = self.parameters
+        weights = np.ones(len(scan))
+        window = self._window(motion, state)
+        margin = window.distance + 2.0 * parameters.search_cell
+        field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
+        pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
+        found = search(motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, _CANDIDATES)
+        refiner = Refiner(motion, weights, LocalDistributions(target), state)
+        fits = [refiner.refine(candidate.theta, parameters.max_iterations) for candidate in found]
+        return sorted(fits, key=lambda fit: -fit.gain), refiner
+
+    def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
+        deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))
+        seconds = max(motion.beam_times[-1] - motion.beam_times[0], 1e-3)
+        step = 2.0 * YAW_STEP / seconds
+        rates = min(int(np.ceil(deviations[5] / step - 0.5)), _MOST_RATES // 2)
+        return SearchWindow(
+            distance=min(float(deviations[:2].max()), self.parameters.search_distance),
+            angle=min(float(deviations[2]), self.parameters.search_angle),
+            yaw_rates=np.arange(-rates, rates + 1) * step,
+        )
+
+    def _judge(self, fits: List[Fit], refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
+        parameters, best = self.parameters, fits[0]
+        if not best.converged:
+            return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
+        used = int(np.count_nonzero(best.inliers))
+        if used < parameters.min_points:
+            return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {parameters.min_points} or more"
+        certainty = significance(refiner.matched, best.theta)
+        if certainty < parameters.min_significance:
+            return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
+        jump = float(np.sqrt(2.0 * state.objection(best.theta)))
+        if jump > parameters.max_jump:
+            return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
+        return self._judge_certainty(fits)
+
+    def _judge_certainty(self, fits: List[Fit]) -> Tuple[MatchStatus, str]:
+        parameters, best = self.parameters, fits[0]
+        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
+        if position > parameters.max_position_deviation:
+            return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
+        yaw = float(np.sqrt(best.covariance[2, 2]))
+        if yaw > parameters.max_yaw_deviation:
+            return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
+        for other in fits[1:]:
+            lead = best.gain - other.gain
+            if separation(best.theta, other.theta) >= 0.5 and lead < parameters.min_gain_over_second:
+                return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
+        return MatchStatus.CONVERGED, ""
+
+
+def prior_state(prior: Prior, scan: Scan) -> PriorState:
+    """Return the prior over the eight states of planar_motion; states without variance are held."""
+    covariance = np.zeros((STATES, STATES))
+    covariance[:6, :6] = prior.covariance
+    covariance[MOTION, MOTION] = prior.motion_covariance
+    covariance[np.diag_indices(STATES)] += _LEAST_VARIANCE
+    mean = np.concatenate([prior.pose(scan), prior.rate, prior.motion])
+    return PriorState(mean, np.linalg.inv(covariance))
+
+
+def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, start: float) -> MatchResult:
+    used = fit.distances[fit.inliers]
+    to_output = np.zeros((6, STATES))
+    to_output[POSE, POSE] = np.eye(3)
+    to_output[3:] = motion.velocity_jacobian(fit.theta)
+    return MatchResult(
+        status=status,
+        pose=fit.theta[POSE],
+        velocity=motion.velocity(fit.theta),
+        covariance=to_output @ fit.covariance @ to_output.T,
+        rate=fit.theta[RATE],
+        motion=fit.theta[MOTION],
+        motion_covariance=fit.covariance[MOTION, MOTION],
+        error=float(used.mean()) if used.size else float("inf"),
+        points_used=int(used.size),
+        iterations=fit.iterations,
+        seconds=time.perf_counter() - start,
+        beam_times=motion.beam_times,
+        beam_poses=motion.path(fit.theta),
+        reason=reason,
+    )
+
+
+def _unmatched(status: MatchStatus, reason: str, motion: PlanarMotion, state: PriorState, start: float) -> MatchResult:
+    nothing = np.empty(0)
+    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, nothing.astype(bool), nothing, 0, False)
+    return _result(status, reason, motion, fit, start)
