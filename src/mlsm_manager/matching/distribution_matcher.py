@@ -98,10 +98,7 @@ class DistributionMatcher:
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:
     """Return the prior over the eight states of planar_motion; states without variance are held."""
-    covariance = np.zeros((STATES, STATES))
-    covariance[:6, :6] = prior.covariance
-    covariance[MOTION, MOTION] = prior.motion_covariance
-    covariance[np.diag_indices(STATES)] += _LEAST_VARIANCE
+    covariance = prior.covariance + _LEAST_VARIANCE * np.eye(STATES)
     mean = np.concatenate([prior.pose(scan), prior.rate, prior.motion])
     return PriorState(mean, np.linalg.inv(covariance))
 
@@ -118,7 +115,7 @@ def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, st
         covariance=to_output @ fit.covariance @ to_output.T,
         rate=fit.theta[RATE],
         motion=fit.theta[MOTION],
-        motion_covariance=fit.covariance[MOTION, MOTION],
+        state_covariance=fit.covariance,
         error=float(used.mean()) if used.size else float("inf"),
         points_used=int(used.size),
         iterations=fit.iterations,

@@ -1,14 +1,12 @@
 """What a matcher is told beforehand and what it answers."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 
 from mlsm_manager.matching.planar import composed, inverse, wrapped
 from mlsm_manager.matching.scan import Scan
-
-STATES = 6
 
 
 class MatchStatus(Enum):
@@ -28,17 +26,16 @@ class Prior:
     correction: (3,) planar T_map_odom at the scan's reference time; the pose it gives is T_map_odom * T_odom_base.
     rate: (3,) error of the odometry's velocity during the scan, m/s, m/s, rad/s in the vehicle's frame: the true
         body velocity is the odometry's plus this.
-    covariance: (6, 6) of [pose, rate]; pose: x y [m] in map, yaw [rad] of base_link at the reference time.
     motion: (2,) relative error of the distances that the odometry reports, and error of their direction [rad]:
         the vehicle went 1 + motion[0] times as far, turned by motion[1] counter-clockwise.
-    motion_covariance: (2, 2); zeros take the odometry's distances and directions as they are.
+    covariance: (8, 8) of [pose, rate, motion]; pose: x y [m] in map, yaw [rad] of base_link at the reference time.
+        A state without variance is held.
     """
 
     correction: np.ndarray
     rate: np.ndarray
+    motion: np.ndarray
     covariance: np.ndarray
-    motion: np.ndarray = field(default_factory=lambda: np.zeros(2))
-    motion_covariance: np.ndarray = field(default_factory=lambda: np.zeros((2, 2)))
 
     def pose(self, scan: Scan) -> np.ndarray:
         """Return the (3,) T_map_base expected at the scan's reference time."""
@@ -52,7 +49,7 @@ class MatchResult:
     pose: (3,) T_map_base, x y [m] yaw [rad], at the scan's reference time.
     velocity: (3,) in the vehicle's frame at the reference time, m/s, m/s, rad/s.
     covariance: (6, 6) of [pose, velocity], prior included.
-    rate, motion, motion_covariance: as in `Prior`, after the match, prior included.
+    rate, motion, state_covariance: as in `Prior`, after the match; the covariance is (8, 8) of [pose, rate, motion].
     error: mean distance of the used points from the map, m. seconds: time the match took.
     beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
     reason: one line that tells why a match was not accepted, with the value that decided; empty when it was.
@@ -64,7 +61,7 @@ class MatchResult:
     covariance: np.ndarray
     rate: np.ndarray
     motion: np.ndarray
-    motion_covariance: np.ndarray
+    state_covariance: np.ndarray
     error: float
     points_used: int
     iterations: int

@@ -1,0 +1,93 @@
+"""Carries what is known of pose and odometry errors from one scan to the next (an extended Kalman filter's prediction)."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlsm_manager.matching.planar import composed, inverse, rotated
+from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES
+from mlsm_manager.matching.result import Prior
+from mlsm_manager.matching.scan import Track
+from node_support.parameters import ParameterSet, parameter
+
+_NODES = 17
+_DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class OdometryErrors(ParameterSet):
+    """How wrong the odometry may be: standard deviations, and how long an error lasts."""
+
+    scale_deviation: float = parameter(
+        0.1, "relative error of the distances it reports", low=0.0, high=2.0, tunable=False
+    )
+    direction_deviation: float = parameter(
+        0.05, "error of their direction, a sensor's mounting angle", unit="rad", low=0.0, high=1.0, tunable=False
+    )
+    speed_deviation: float = parameter(
+        0.02, "error of the speed that does not grow with it, as of a current", unit="m/s", low=0.0, high=5.0,
+        tunable=False,
+    )  # fmt: skip
+    turn_rate_deviation: float = parameter(
+        0.001, "error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
+    )
+    rate_time: float = parameter(
+        60.0, "how long an error of speed or turn rate lasts", unit="s", low=0.1, high=1e6, tunable=False
+    )
+    motion_time: float = parameter(
+        3600.0, "how long an error of scale or direction lasts", unit="s", low=0.1, high=1e9, tunable=False
+    )
+
+    def covariance(self) -> np.ndarray:
+        """Return (8, 8) of [pose, rate, motion] where the pose is known and nothing of the odometry's errors."""
+        deviations = np.zeros(STATES)
+        deviations[RATE] = self.speed_deviation, self.speed_deviation, self.turn_rate_deviation
+        deviations[MOTION] = self.scale_deviation, self.direction_deviation
+        return np.diag(deviations**2)
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known at a time. theta: (8,) [pose, rate, motion] as in planar_motion. covariance: (8, 8)."""
+
+    time: float
+    theta: np.ndarray
+    covariance: np.ndarray
+
+
+def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors) -> Belief:
+    """Return the belief at a later `time`: the pose follows the odometry and its errors, the errors fade."""
+    theta = _advanced(belief.theta, belief.time, track, time)
+    jacobian = np.eye(STATES)
+    for state in range(STATES):
+        change = np.zeros(STATES)
+        change[state] = _DIFFERENCE
+        moved = _advanced(belief.theta + change, belief.time, track, time)
+        jacobian[POSE, state] = (moved - theta)[POSE] / _DIFFERENCE
+    lasting = np.ones(STATES)
+    lasting[RATE] = np.exp(-(time - belief.time) / errors.rate_time)
+    lasting[MOTION] = np.exp(-(time - belief.time) / errors.motion_time)
+    transition = lasting[:, np.newaxis] * jacobian
+    fresh = errors.covariance() * (1.0 - lasting**2)
+    return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
+
+
+def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
+    """Return the belief as a matcher's prior; `odometry_pose` is T_odom_base (3,) at its time."""
+    correction = composed(belief.theta[POSE], inverse(odometry_pose))
+    return Prior(correction, belief.theta[RATE], belief.theta[MOTION], belief.covariance)
+
+
+def _advanced(theta: np.ndarray, start: float, track: Track, end: float) -> np.ndarray:
+    times = np.linspace(start, end, _NODES)
+    poses = track.at(times)
+    relative = composed(inverse(poses[0]), poses)
+    middle = (times[1:] + times[:-1]) / 2.0 - start
+    heading = (relative[1:, 2] + relative[:-1, 2]) / 2.0
+    steps = (1.0 + theta[6]) * rotated(np.diff(relative[:, :2], axis=0), theta[7])
+    steps = steps + np.diff(times)[:, np.newaxis] * rotated(np.broadcast_to(theta[3:5], (_NODES - 1, 2)), heading)
+    shift = rotated(steps, theta[5] * middle).sum(axis=0)
+    result = theta.copy()
+    result[:2] += rotated(shift, theta[2])
+    result[2] += relative[-1, 2] + theta[5] * (end - start)
+    return result
