@@ -17,7 +17,10 @@ _APART_YAW = np.radians(8.0)
 
 @dataclass(frozen=True)
 class SearchWindow:
-    """Where to look. distance: m to either side in x and y. angle: rad to either side. yaw_rates: (k,) errors, rad/s."""
+    """Where to look.
+
+    distance: m to either side in x and y. angle: rad to either side. yaw_rates: (k,) errors of the yaw rate, rad/s.
+    """
 
     distance: float
     angle: float

@@ -1,4 +1,4 @@
-"""The interface of the matchers, and the table of those that a parameter can pick."""
+"""The interface of the matchers."""
 
 from typing import Protocol
 

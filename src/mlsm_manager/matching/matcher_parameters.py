@@ -36,3 +36,21 @@ class DistributionMatcherParameters(ParameterSet):
         low=1.0, high=100.0,
     )  # fmt: skip
     max_iterations: int = parameter(40, "steps of Gauss-Newton from each candidate", low=1, high=1000)
+
+
+@dataclass(frozen=True)
+class SegmentsMatcherParameters(ParameterSet):
+    """Parameters of the thesis's matcher."""
+
+    max_iterations: int = parameter(20, "segments: iterations at most", low=1, high=1000, thesis_name="maxIterations")
+    error_threshold: float = parameter(
+        0.3, "segments: with an error at or below this the match holds", unit="m", low=0.0, high=100.0,
+        thesis_name="errorThreshold",
+    )  # fmt: skip
+    n_samples: int = parameter(
+        5, "segments: places searched in the direction of movement", low=0, high=100, thesis_name="nSamples"
+    )
+    sample_step: float = parameter(
+        0.1, "segments: distance of these places, as a share of the estimated movement", low=0.0, high=10.0,
+        thesis_name="sampleStep",
+    )  # fmt: skip
