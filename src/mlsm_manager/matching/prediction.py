@@ -1,4 +1,4 @@
-"""Carries what is known of pose and odometry errors from one scan to the next (an extended Kalman filter's prediction)."""
+"""Carries what is known of pose and odometry errors from scan to scan (an extended Kalman filter's prediction)."""
 
 from dataclasses import dataclass
 
