@@ -12,6 +12,8 @@ setup(
             "imagenex_852_driver.protocol",
             "sonar_processing",
             "mlsm_manager",
+            "mlsm_manager.mapping",
+            "mlsm_manager.matching",
             "sonar_simulator",
         ],
         package_dir={"": "src"},

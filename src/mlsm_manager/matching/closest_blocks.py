@@ -1,4 +1,4 @@
-"""The closest block of a point through the tree of cells, and in the direction of movement (thesis 6.5.6, figure 6.5)."""
+"""The closest block of a point through the tree of cells, and along the movement (thesis 6.5.6, figure 6.5)."""
 
 import numpy as np
 from scipy.spatial import cKDTree

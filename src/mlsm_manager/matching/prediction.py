@@ -78,16 +78,20 @@ def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
     return Prior(correction, belief.theta[RATE], belief.theta[MOTION], belief.covariance)
 
 
-def _advanced(theta: np.ndarray, start: float, track: Track, end: float) -> np.ndarray:
-    times = np.linspace(start, end, _NODES)
-    poses = track.at(times)
+def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarray) -> np.ndarray:
+    """Return T_map_base (m, 3) at increasing `times` (m,), none before `start`, where the state is `theta` (8,)."""
+    nodes = np.append(start, times)
+    poses = track.at(nodes)
     relative = composed(inverse(poses[0]), poses)
-    middle = (times[1:] + times[:-1]) / 2.0 - start
+    middle = (nodes[1:] + nodes[:-1]) / 2.0 - start
     heading = (relative[1:, 2] + relative[:-1, 2]) / 2.0
     steps = (1.0 + theta[6]) * rotated(np.diff(relative[:, :2], axis=0), theta[7])
-    steps = steps + np.diff(times)[:, np.newaxis] * rotated(np.broadcast_to(theta[3:5], (_NODES - 1, 2)), heading)
-    shift = rotated(steps, theta[5] * middle).sum(axis=0)
-    result = theta.copy()
-    result[:2] += rotated(shift, theta[2])
-    result[2] += relative[-1, 2] + theta[5] * (end - start)
-    return result
+    steps = steps + np.diff(nodes)[:, np.newaxis] * rotated(np.broadcast_to(theta[3:5], (len(times), 2)), heading)
+    shifts = np.cumsum(rotated(steps, theta[5] * middle), axis=0)
+    position = theta[:2] + rotated(shifts, theta[2])
+    return np.column_stack([position, theta[2] + relative[1:, 2] + theta[5] * (times - start)])
+
+
+def _advanced(theta: np.ndarray, start: float, track: Track, end: float) -> np.ndarray:
+    times = np.linspace(start, end, _NODES)[1:]
+    return np.concatenate([advanced_path(theta, start, track, times)[-1], theta[3:]])

@@ -1,0 +1,78 @@
+"""The correction map -> odom between scans, without jumps: the odometry's errors that were found go on."""
+
+from collections import deque
+from typing import Deque, Optional, Tuple
+
+import numpy as np
+
+from mlsm_manager.matching.planar import composed, inverse, wrapped
+from mlsm_manager.matching.planar_motion import POSE
+from mlsm_manager.matching.prediction import Belief, advanced_path
+from mlsm_manager.matching.scan import Track
+
+_MOST_SAMPLES = 4000
+_IDENTITY = np.zeros(3)
+
+
+class LiveCorrection:
+    """Follows the odometry from the last belief to now. A new belief is approached within `blend_time` seconds."""
+
+    def __init__(self, blend_time: float) -> None:
+        self.blend_time = blend_time
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, because time jumped or the map is gone."""
+        self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
+        self._state: Optional[np.ndarray] = None
+        self._jump = _IDENTITY
+        self._jump_time = -np.inf
+        self._shown: Optional[np.ndarray] = None
+
+    def believe(self, belief: Belief) -> None:
+        """Take what a match found at a time in the past; the samples since then bring it to now."""
+        self._state = np.array(belief.theta)
+        start = belief.time
+        later = [sample for sample in self._samples if sample[0] > belief.time]
+        earlier = [sample for sample in self._samples if sample[0] <= belief.time]
+        if later:
+            known = earlier[-1:] + later
+            times = np.array([time for time, _ in known])
+            track = Track(times, np.array([pose for _, pose in known]))
+            since = times[times > start]
+            self._state[POSE] = advanced_path(self._state, start, track, since)[-1]
+        if self._shown is not None and self._samples:
+            self._jump = composed(inverse(self._state[POSE]), self._shown)
+            self._jump[2] = wrapped(self._jump[2])
+            self._jump_time = self._samples[-1][0]
+
+    def sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        """Take T_odom_base (3,) at `time` [s] and return T_map_odom (3,) to be shown now.
+
+        Times that do not increase change nothing.
+        """
+        odometry = np.asarray(odometry, dtype=np.float64)
+        if self._samples and time <= self._samples[-1][0]:
+            time, odometry = self._samples[-1]
+        else:
+            self._follow(time, odometry)
+            self._samples.append((time, odometry))
+        if self._state is None:
+            return _IDENTITY
+        left = self._share_left(time)
+        self._shown = composed(self._state[POSE], left * self._jump)
+        correction = composed(self._shown, inverse(odometry))
+        correction[2] = wrapped(correction[2])
+        return correction
+
+    def _follow(self, time: float, odometry: np.ndarray) -> None:
+        if self._state is None or not self._samples:
+            return
+        before, pose = self._samples[-1]
+        track = Track(np.array([before, time]), np.array([pose, odometry]))
+        self._state[POSE] = advanced_path(self._state, before, track, np.array([time]))[-1]
+
+    def _share_left(self, time: float) -> float:
+        if self.blend_time <= 0.0:
+            return 0.0
+        return float(np.clip(1.0 - (time - self._jump_time) / self.blend_time, 0.0, 1.0))
