@@ -7,6 +7,7 @@ import rospy
 from node_support.health import Health
 from node_support.parameters import ParameterError
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.sonar_image import SonarImage
 from sonar_processing.sonar_to_cloud import SonarToCloud
 from sonar_processing.stage_runner import StageRunner
 from sonar_processing.stages import STAGES
@@ -40,7 +41,7 @@ class StageChain:
 
 
 class ProcessingHost:
-    """Hosts the stages named by `~chain`, each with the parameters and topics it has as a node of its own.
+    """Hosts the stages named by `~chain` and sonar_image, with the parameters and topics they have as nodes.
 
     Stages that take polar scans run beside the others, and only while somebody wants what they make.
     """
@@ -54,8 +55,11 @@ class ProcessingHost:
         clouds = StageChain([runner for runner in runners if not runner.takes_polar_scans], deliver)
         polar = StageChain([runner for runner in runners if runner.takes_polar_scans], deliver_echoes)
         self._source = SonarToCloud(rospy.resolve_name("sonar_to_cloud"), clouds.process, polar)
-        self.healths: List[Health] = [self._source.health] + [runner.health for runner in runners]
-        """The health of every stage, in the order of the chain."""
+        self._image = SonarImage(rospy.resolve_name("sonar_image"))
+        self.healths: List[Health] = [
+            self._source.health, *[runner.health for runner in runners], self._image.health
+        ]  # fmt: skip
+        """The health of everything that is hosted."""
 
 
 def _chain() -> List[str]:

@@ -13,6 +13,7 @@ from node_support.parameter_text import default_yaml
 from node_support.parameters import describe
 from sonar_processing.echo_extraction import EchoExtractorParameters
 from sonar_processing.outliers import OutlierRemoverParameters
+from sonar_processing.polar_image import SonarImageParameters
 from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.stages import STAGES
 from sonar_processing.threshold import ThresholderParameters
@@ -25,6 +26,7 @@ NODES = {
     "imagenex_852_emulator": (EmulatorParameters, "Imagenex852Emulator"),
     "mlsm_core": (MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": (OutlierRemoverParameters, "OutlierRemover"),
+    "sonar_image": (SonarImageParameters, "SonarImage"),
     "sonar_to_cloud": (SonarToCloudParameters, "SonarToCloud"),
     "thresholder": (ThresholderParameters, "Thresholder"),
 }
