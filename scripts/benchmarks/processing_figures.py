@@ -18,7 +18,9 @@ from sonar_processing.conversions import (
     cloud_to_message,
 )
 from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, SonarToCloudParameters
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.scan_assembler import ScanAssembler
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.threshold import Thresholder, ThresholderParameters
 from sonar_processing.transforms import matrix_from_message
 

@@ -34,13 +34,17 @@ class EchoExtractorParameters(ParameterSet):
     """Parameters of echo_extractor."""
 
     mode: ExtractionMode = parameter(
-        ExtractionMode.MATCHED_FILTER, "an echo's peak, where it begins, or points all along it"
+        ExtractionMode.MATCHED_FILTER, "the peak of an echo, where it begins, or points all along it"
     )
     pulse_sigma: float = parameter(
-        0.15, "standard deviation of an echo along range, the matched filter's width", unit="m", low=0.001, high=10.0
+        0.15,
+        "standard deviation of an echo along range, the width of the matched filter",
+        unit="m",
+        low=0.001,
+        high=10.0,
     )
     ring_quantile: float = parameter(
-        0.4, "share of the directions below the ring's strength; 0.3 among walls, 0.5 in open water, 0 for sectors",
+        0.4, "share of directions weaker than the ring: 0.3 among walls, 0.5 in open water; 0 for sectors",
         low=0.0, high=0.9,
     )  # fmt: skip
     min_height: float = parameter(

@@ -1,5 +1,7 @@
 """The stage echo_extractor: from an organised polar cloud to the points of its echoes."""
 
+from typing import Optional
+
 import numpy as np
 
 from node_support.refused_input import RefusedInput
@@ -14,6 +16,8 @@ class EchoExtractor:
 
     def __init__(self, parameters: EchoExtractorParameters) -> None:
         self.parameters = parameters
+        self.newest_threshold: Optional[float] = None
+        """The height that parted echoes from speckle in the newest scan."""
 
     def __call__(self, cloud: IntensityCloud) -> IntensityCloud:
         """Return the echoes of an organised cloud (rows are beams, columns are bins) as a cloud without order.
@@ -26,6 +30,7 @@ class EchoExtractor:
         rows = cloud.points.reshape(cloud.height, -1, 4)
         strengths = np.nan_to_num(rows[..., 3], nan=0.0, posinf=0.0, neginf=0.0)
         echoes = extract_echoes(strengths, bin_length(rows), self.parameters)
+        self.newest_threshold = echoes.threshold
         points = places(rows, echoes.beams, echoes.bins)
         points[:, 3] = echoes.heights
         stamps = cloud.time_stamps.reshape(cloud.height, -1)[echoes.beams, 0]

@@ -2,6 +2,7 @@
 
 from node_support.node import DiagnosticsPublisher, run
 from sonar_processing.host import ProcessingHost
+from sonar_processing.sonar_image import SonarImage
 from sonar_processing.sonar_to_cloud import SonarToCloud
 from sonar_processing.stage_runner import StageRunner
 
@@ -25,6 +26,16 @@ def run_stage(name: str) -> None:
         return runner, DiagnosticsPublisher([runner.health])
 
     run(name, construct)
+
+
+def run_sonar_image() -> None:
+    """Run sonar_image as a node of its own."""
+
+    def construct() -> tuple:
+        node = SonarImage()
+        return node, DiagnosticsPublisher([node.health])
+
+    run("sonar_image", construct)
 
 
 def run_host() -> None:

@@ -11,18 +11,22 @@ from imagenex_852_driver.emulator_parameters import EmulatorParameters
 from mlsm_manager.core_parameters import MlsmCoreParameters
 from node_support.parameter_text import default_yaml
 from node_support.parameters import describe
+from sonar_processing.echo_extraction import EchoExtractorParameters
 from sonar_processing.outliers import OutlierRemoverParameters
-from sonar_processing.scan_assembler import SonarToCloudParameters
+from sonar_processing.polar_image import SonarImageParameters
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.stages import STAGES
 from sonar_processing.threshold import ThresholderParameters
 from sonar_simulator.default_yaml import simulator_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = {
+    "echo_extractor": (EchoExtractorParameters, "EchoExtractor"),
     "imagenex_852_driver": (DriverParameters, "Imagenex852"),
     "imagenex_852_emulator": (EmulatorParameters, "Imagenex852Emulator"),
     "mlsm_core": (MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": (OutlierRemoverParameters, "OutlierRemover"),
+    "sonar_image": (SonarImageParameters, "SonarImage"),
     "sonar_to_cloud": (SonarToCloudParameters, "SonarToCloud"),
     "thresholder": (ThresholderParameters, "Thresholder"),
 }
