@@ -1,14 +1,52 @@
 """Parameters of mlsm_core."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Type, TypeVar
 
+from mlsm_manager.mapping.mapper import MapSettings
+from mlsm_manager.matching.matcher import Matcher
+from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters, SegmentsMatcherParameters
+from mlsm_manager.matching.matchers import MATCHERS, MatcherName
+from mlsm_manager.matching.prediction import OdometryErrors
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 MAX_PREALLOCATED_CELLS = 16_000_000
 
 
+Part = TypeVar("Part", bound=ParameterSet)
+
+
+class MatchInput(Enum):
+    """Which points are matched."""
+
+    ECHOES = "ECHOES"
+    CLEANED = "CLEANED"
+
+
 @dataclass(frozen=True)
-class MlsmCoreParameters(ParameterSet):
+class MatchingParameters(ParameterSet):
+    """Which matcher runs on what, and what becomes of its answers."""
+
+    matcher: MatcherName = parameter(
+        MatcherName.DISTRIBUTIONS, "the default matcher, or the thesis's to compare with", tunable=False
+    )
+    match_input: MatchInput = parameter(
+        MatchInput.ECHOES, "points that are matched: sonar/scan/echoes or sonar/scan/cleaned", tunable=False
+    )
+    start_matching: bool = parameter(
+        False, "match from the start; afterwards the topic startMatching says it", tunable=False
+    )
+    match_resolution: float = parameter(
+        0.5, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0, tunable=False
+    )
+    blend_time: float = parameter(
+        1.0, "map -> odom goes over to a new fix within this time", unit="s", low=0.0, high=60.0
+    )
+
+
+@dataclass(frozen=True)
+class MapParameters(ParameterSet):
     """The map's grid, its frames and how often it is shown."""
 
     resolution: float = parameter(
@@ -28,6 +66,7 @@ class MlsmCoreParameters(ParameterSet):
     )  # fmt: skip
     map_frame: str = parameter("map", "frame of the map", tunable=False)
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
+    base_frame: str = parameter("base_link", "frame of the vehicle, which the dead reckoning places", tunable=False)
     transform_rate: float = parameter(
         20.0, "how often map -> odom is sent", unit="1/s", low=0.1, high=1000.0, tunable=False
     )
@@ -54,3 +93,25 @@ class MlsmCoreParameters(ParameterSet):
     def expected_blocks(self) -> int:
         """Cells of the reserved extent."""
         return int(self.size_x_meters / self.resolution) * int(self.size_y_meters / self.resolution)
+
+
+@dataclass(frozen=True)
+class MlsmCoreParameters(
+    SegmentsMatcherParameters, DistributionMatcherParameters, OdometryErrors, MatchingParameters, MapParameters
+):
+    """All of mlsm_core's parameters, in one namespace."""
+
+    def part(self, kind: Type[Part]) -> Part:
+        """Return those that belong to one of the sets that this one is made of."""
+        return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
+
+    def settings(self) -> MapSettings:
+        """Return what the mapper's grids are made from."""
+        return MapSettings(
+            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points
+        )
+
+    def build_matcher(self) -> Matcher:
+        """Return the matcher that `matcher` names."""
+        kind = MATCHERS[self.matcher]
+        return kind.build(self.part(kind.parameters))

@@ -2,6 +2,7 @@
 
 from typing import Callable
 
+import numpy as np
 import rospy
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
@@ -12,11 +13,14 @@ from node_support.node import guarded
 
 
 class MapTransform:
-    """The correction that tf knows as map -> odom; the identity until something corrects it."""
+    """The correction that tf knows as map -> odom."""
 
-    def __init__(self, parameters: Callable[[], MlsmCoreParameters], health: Health) -> None:
-        """`parameters` returns those in force, for the tolerance may change while the node runs."""
+    def __init__(
+        self, parameters: Callable[[], MlsmCoreParameters], correction: Callable[[], np.ndarray], health: Health
+    ) -> None:
+        """`parameters` and `correction`, T_map_odom (3,), return what holds now."""
         self._parameters = parameters
+        self._correction = correction
         self._health = health
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._last_stamp = rospy.Time(0)
@@ -29,10 +33,12 @@ class MapTransform:
         if stamp == self._last_stamp:
             return
         self._last_stamp = stamp
+        x, y, yaw = self._correction()
         message = TransformStamped()
         message.header.stamp = stamp
         message.header.frame_id = parameters.map_frame
         message.child_frame_id = parameters.odom_frame
-        message.transform.rotation.w = 1.0
+        message.transform.translation.x, message.transform.translation.y = x, y
+        message.transform.rotation.z, message.transform.rotation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
         self._broadcaster.sendTransform(message)
         self._health.count("transforms sent")

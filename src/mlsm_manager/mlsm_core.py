@@ -1,15 +1,26 @@
-"""The ROS side of the map: clouds in; markers, cloud, map -> odom and services out (thesis 4.5.1, 6.5.6)."""
+"""The ROS side of the map: clouds and echoes in; map, fix, map -> odom and services out (thesis 4.5.1, 6.5.6)."""
 
 import threading
+from typing import Optional
 
+import numpy as np
 import rospy
+from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from mlsm_manager.core_parameters import MlsmCoreParameters
+from mlsm_manager.core_parameters import MatchInput, MlsmCoreParameters
+from mlsm_manager.fix_publisher import FixPublisher
 from mlsm_manager.map_publisher import MapPublisher
 from mlsm_manager.map_transform import MapTransform
-from mlsm_manager.mlsm import InsertReport, MultiLevelSurfaceMap
+from mlsm_manager.mapping.live_correction import LiveCorrection
+from mlsm_manager.mapping.mapper import CloudUpdate, Mapper, ScanUpdate
+from mlsm_manager.mapping.relocalisation import relocalised, relocaliser
+from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.prediction import OdometryErrors
+from mlsm_manager.matching.scan import Scan, Track
+from mlsm_manager.odometry_track import OdometryTrack
 from mlsm_manager.storage import map_path, write_ply
+from mlsm_manager.update_report import tell_cloud, tell_scan
 from node_support.live_parameters import LiveParameters
 from node_support.node import every, guarded, make_health
 from node_support.refused_input import RefusedInput
@@ -18,40 +29,95 @@ from sonar_processing.conversions import StampedIntensityCloudArrays, cloud_from
 from sonar_processing.stage_runner import subscribe_to_clouds
 from underwater_map_construction.srv import SaveMap, SaveMapRequest, SaveMapResponse
 
+_LONGEST_SILENCE = 60.0
+
 
 class MlsmCore:
-    """Inserts clouds into the map and keeps the world informed of it."""
+    """Inserts clouds into the map, matches scans with it, and keeps the world informed of both."""
 
     def __init__(self, namespace: str = "~") -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health("mlsm_core")
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._changed = False
         self._stamp_ns = 0
-        self._live = LiveParameters(MlsmCoreParameters, namespace, "MlsmCore", self.health, lambda _: None)
-        self._map = self._empty_map()
-        self._publisher = MapPublisher(self._live.current.map_frame)
-        self._transform = MapTransform(lambda: self._live.current, self.health)
+        self._live = LiveParameters(MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters)
+        parameters = self._live.current
+        self._odometry = OdometryTrack(parameters.odom_frame, parameters.base_frame)
+        self._publisher = MapPublisher(parameters.map_frame)
+        self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
+        self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
         prefix = namespace if namespace == "~" else namespace + "/"
         rospy.Service(f"{prefix}save_map", SaveMap, self._save)
         rospy.Service(f"{prefix}reset", Trigger, self._reset)
-        every(self._live.current.map_period, self._publish_if_changed, self.health)
+        rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
+        rospy.Subscriber("startMatching", Bool, guarded(self.health, self._start_matching), queue_size=10)
+        every(parameters.map_period, self._publish_if_changed, self.health)
 
     def subscribe(self) -> None:
-        """Take clouds from sonar/scan/cleaned."""
+        """Take clouds from sonar/scan/cleaned and scans of echoes from sonar/scan/echoes."""
 
         def take(message: StampedIntensityCloudArrays) -> None:
             self.insert(cloud_from_message(message))
 
+        def take_echoes(message: StampedIntensityCloudArrays) -> None:
+            self.match(cloud_from_message(message))
+
         subscribe_to_clouds("sonar/scan/cleaned", guarded(self.health, take))
+        subscribe_to_clouds("sonar/scan/echoes", guarded(self.health, take_echoes))
 
     def insert(self, cloud: IntensityCloud) -> None:
         """Insert a cloud; one that cannot be placed in the map is counted and left out."""
         guarded(self.health, self._insert)(cloud)
 
+    def match(self, cloud: IntensityCloud) -> None:
+        """Match a scan of echoes; one that cannot be matched is counted."""
+        if self._live.current.match_input is MatchInput.ECHOES:
+            guarded(self.health, self._match)(cloud)
+
+    def _use_parameters(self, parameters: MlsmCoreParameters) -> None:
+        with self._lock:
+            if not hasattr(self, "_mapper"):
+                self._correcting = LiveCorrection(parameters.blend_time)
+                self._mapper = Mapper(
+                    parameters.settings(), parameters.part(OdometryErrors), parameters.build_matcher()
+                )
+                self._mapper.matching = parameters.start_matching
+            self._mapper.matcher = parameters.build_matcher()
+            self._correcting.blend_time = parameters.blend_time
+
+    def _start_matching(self, message: Bool) -> None:
+        with self._lock:
+            changed = self._mapper.matching != message.data
+            self._mapper.matching = message.data
+        if changed:
+            rospy.loginfo("%s: matching is %s", self.health.name, "on" if message.data else "off")
+
     def _insert(self, cloud: IntensityCloud) -> None:
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
+        self._check(cloud)
+        if cloud.broken:
+            kind, detail = "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud"
+            self.health.problem(kind, detail, cloud.broken)
+        if self._live.current.match_input is MatchInput.CLEANED and cloud.frame_id != self._live.current.map_frame:
+            guarded(self.health, self._match)(cloud)
+        with self.health.timed(), self._lock:
+            self._notice_jump(cloud.stamp_ns * 1e-9)
+            update = self._insert_here(cloud)
+            self._stamp_ns = cloud.stamp_ns
+            self._changed = True
+            blocks = len(self._mapper.shown)
+        tell_cloud(self.health, update, blocks, self._live.current.map_limit)
+
+    def _insert_here(self, cloud: IntensityCloud) -> CloudUpdate:
+        if cloud.frame_id == self._live.current.map_frame:
+            return CloudUpdate(self._mapper.shown.insert(cloud.points[cloud.valid]), False, 0)
+        time = cloud.stamp_ns * 1e-9
+        nowhere = Track(np.array([time]), np.zeros((1, 3)))
+        return self._mapper.take_cloud(Scan.from_stamps(cloud.points, cloud.time_stamps, time, nowhere))
+
+    def _check(self, cloud: IntensityCloud) -> None:
         parameters = self._live.current
         if cloud.frame_id not in (parameters.odom_frame, parameters.map_frame):
             raise RefusedInput(
@@ -59,49 +125,106 @@ class MlsmCore:
                 f"frame {cloud.frame_id!r}, must be {parameters.odom_frame!r} or {parameters.map_frame!r}; "
                 "set sonar_to_cloud's target_frame",
             )
-        with self.health.timed(), self._lock:
-            report = self._map.insert(cloud.points[cloud.valid])
-            blocks = len(self._map)
-            self._stamp_ns = cloud.stamp_ns
-            self._changed = True
-        self._tell(cloud, report, blocks)
 
-    def _tell(self, cloud: IntensityCloud, report: InsertReport, blocks: int) -> None:
-        self.health.count("points inserted", report.inserted)
-        self.health.show("blocks", str(blocks))
-        if cloud.broken:
-            self.health.problem(
-                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
-            )
-        if report.outside:
-            limit = self._live.current.map_limit
-            self.health.problem(
-                "points outside the map",
-                f"{report.outside} beyond map_limit of {limit:g} m; check tf",
-                report.outside,
-            )
+    def _match(self, cloud: IntensityCloud) -> None:
+        self.health.count("scans in")
+        self._check(cloud)
+        self._notice_jump(cloud.stamp_ns * 1e-9)
+        scan = self._scan(cloud)
+        if scan is None:
+            return
+        with self._lock:
+            update = self._mapper.take_echoes(scan)
+            self._correcting.believe(update.belief)
+            waited = iter(self._mapper.take_waiting, None)
+            for cloud_update in waited:
+                tell_cloud(self.health, cloud_update, len(self._mapper.shown), self._live.current.map_limit)
+                self._changed = True
+        tell_scan(self.health, update, self._mapper.matching)
+        self._publish_fix(update, cloud.stamp_ns)
 
-    def _empty_map(self) -> MultiLevelSurfaceMap:
-        parameters = self._live.current
-        return MultiLevelSurfaceMap(parameters.resolution, parameters.map_limit, parameters.expected_blocks)
+    def _scan(self, cloud: IntensityCloud) -> Optional[Scan]:
+        time, times = cloud.stamp_ns * 1e-9, np.unique(np.abs(cloud.time_stamps[cloud.valid]))
+        belief = self._mapper.belief
+        start = min([time, *times[:1], *([] if belief is None else [belief.time])])
+        try:
+            track = self._odometry.track(start, times, time)
+        except RefusedInput:
+            self.health.count("scans not used")
+            if self._mapper.matching:
+                raise
+            return None
+        return Scan.from_stamps(cloud.points, cloud.time_stamps, time, track)
+
+    def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
+        if update.result is None or not update.accepted:
+            return
+        x, y, yaw = update.result.correction(update.scan)
+        T_map_odom = np.eye(4)
+        T_map_odom[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
+        T_map_odom[:2, 3] = x, y
+        T_map_base = T_map_odom @ self._odometry.matrix(update.scan.reference_time)
+        self._fix.publish(update.result, T_map_base, stamp_ns)
+
+    def _correction(self) -> np.ndarray:
+        newest = self._odometry.newest()
+        with self._lock:
+            if newest is None:
+                return self._mapper.correction
+            time, pose = newest
+            self._notice_jump(time)
+            belief = self._mapper.belief
+            if belief is not None and time - belief.time > _LONGEST_SILENCE:
+                track = self._odometry.track(belief.time, np.empty(0), time)
+                self._mapper.follow(track, time)
+            return self._correcting.sample(time, pose)
+
+    def _notice_jump(self, time: float) -> None:
+        with self._lock:
+            belief = self._mapper.belief
+            if belief is None or time >= belief.time - _LONGEST_SILENCE / 2.0:
+                return
+            self._mapper.forget_place()
+            self._correcting.clear()
+            self._odometry.clear()
+        detail = f"by {belief.time - time:.1f} s; the map stays, the place in it begins at odom again"
+        self.health.problem("jumps back in time", detail)
 
     def _publish_if_changed(self) -> None:
         with self._lock:
             if not self._changed:
                 return
-            blocks, stamp_ns, self._changed = self._map.blocks, self._stamp_ns, False
+            blocks, stamp_ns, self._changed = self._mapper.shown.blocks, self._stamp_ns, False
         self._publisher.publish(blocks, stamp_ns)
 
     def _reset(self, _request: TriggerRequest) -> TriggerResponse:
         with self._lock:
-            count = len(self._map)
-            self._map = self._empty_map()
+            count = len(self._mapper.shown)
+            self._mapper.clear()
+            self._correcting.clear()
+            self._fix.clear()
             self._changed = True
         return TriggerResponse(True, f"{count} blocks forgotten")
 
+    def _relocalise(self, _request: TriggerRequest) -> TriggerResponse:
+        with self._lock:
+            scan = self._mapper.newest
+            if scan is None:
+                return TriggerResponse(False, "no scan yet")
+            parameters = self._live.current
+            matcher = relocaliser(parameters.part(DistributionMatcherParameters))
+            result = relocalised(scan, self._mapper.matched.blocks, matcher, self._mapper.errors)
+            if not result.accepted:
+                return TriggerResponse(False, f"{result.status.value}: {result.reason}")
+            update = self._mapper.adopt(scan, result)
+            self._correcting.believe(update.belief)
+        self._publish_fix(update, int(scan.reference_time * 1e9))
+        x, y, yaw = result.pose
+        return TriggerResponse(True, f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(yaw):.1f} deg in map")
+
     def _save(self, request: SaveMapRequest) -> SaveMapResponse:
         with self._lock:
-            blocks = self._map.blocks
+            blocks = self._mapper.shown.blocks
         try:
             path = map_path(self._live.current.save_folder, request.name)
             write_ply(path, blocks)

@@ -23,7 +23,7 @@ def run_mapping() -> None:
 
     def construct() -> tuple:
         core = MlsmCore(rospy.resolve_name("mlsm_core"))
-        host = ProcessingHost(core.insert)
+        host = ProcessingHost(core.insert, core.match)
         return core, host, DiagnosticsPublisher([*host.healths, core.health])
 
     run("mapping", construct)

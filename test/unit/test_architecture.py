@@ -19,7 +19,9 @@ ALLOWED = {
 # Nodes, conversions and markers; every other module is a core and runs without ROS.
 ROS_SIDE = {
     "imagenex_852_driver": {"driver_node", "emulator_node", "log_tools", "messages", "nodes"},
-    "mlsm_manager": {"map_publisher", "map_transform", "markers", "mlsm_core", "nodes"},
+    "mlsm_manager": {
+        "fix_publisher", "map_publisher", "map_transform", "markers", "mlsm_core", "nodes", "odometry_track",
+    },
     "node_support": {"live_parameters", "node", "reconfigure_description"},
     "sonar_processing": {
         "beam_subscriber", "cloud_publisher", "conversions", "figure_publisher", "host", "nodes", "sonar_image",

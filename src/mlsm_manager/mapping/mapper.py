@@ -8,10 +8,10 @@ import numpy as np
 
 from mlsm_manager.mapping.correction_history import CorrectionHistory
 from mlsm_manager.matching.matcher import Matcher
-from mlsm_manager.matching.planar import composed
+from mlsm_manager.matching.planar import composed, transformed
 from mlsm_manager.matching.prediction import Belief, OdometryErrors, predicted, prior_of
 from mlsm_manager.matching.result import MatchResult
-from mlsm_manager.matching.scan import Scan
+from mlsm_manager.matching.scan import Scan, Track
 from mlsm_manager.matching.undistort import corrected_points
 from mlsm_manager.mlsm import InsertReport, MultiLevelSurfaceMap
 
@@ -75,6 +75,7 @@ class Mapper:
     def forget_place(self) -> None:
         """Keep the map but forget where the vehicle is, because time jumped."""
         self.belief: Optional[Belief] = None
+        self.correction = np.zeros(3)
         self.newest = None
         self._history = CorrectionHistory()
         self._waiting: Deque[Scan] = deque(maxlen=_MOST_WAITING)
@@ -92,18 +93,20 @@ class Mapper:
         """Take a match as the truth: the scan goes into the map, its pose into the belief."""
         theta = np.concatenate([result.pose, result.rate, result.motion])
         self.belief = Belief(scan.reference_time, theta, result.state_covariance)
+        self.correction = result.correction(scan)
         self.matched.insert(corrected_points(scan, result))
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
         return ScanUpdate(scan, result, True, self.belief)
 
     def take_cloud(self, cloud: Scan) -> CloudUpdate:
         """Insert a cloud into the map that is shown, or let it wait for the match of its time."""
-        if self.matching and cloud.reference_time > self._history.end:
+        if not self.matching:
+            return CloudUpdate(self.shown.insert(transformed(self.correction, cloud.points)), False, 0)
+        if cloud.reference_time > self._history.end:
             self._waiting.append(cloud)
             return CloudUpdate(_NOTHING, True, 0)
-        if not self.matching and cloud.reference_time > self._history.end:
-            self._history.add(*self._path(cloud, self._belief_at(cloud)), cloud.track, holds=True)
-        return self._insert(cloud)
+        points, unplaced = self._history.placed(cloud)
+        return CloudUpdate(self.shown.insert(points), False, unplaced)
 
     def take_waiting(self) -> Optional[CloudUpdate]:
         """Insert the next cloud that waited, if its time is known now; None when there is none."""
@@ -111,15 +114,17 @@ class Mapper:
             return None
         return self.take_cloud(self._waiting.popleft())
 
-    def _insert(self, cloud: Scan) -> CloudUpdate:
-        points, unplaced = self._history.placed(cloud)
-        return CloudUpdate(self.shown.insert(points) if len(points) else _NOTHING, False, unplaced)
+    def follow(self, track: Track, time: float) -> None:
+        """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
+        if self.belief is not None and time > self.belief.time:
+            self.belief = predicted(self.belief, track, time, self.errors)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)
         self._history.add(times, poses, scan.track, holds=True)
         self.matched.insert(self._history.placed(scan)[0])
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
+        self.correction = prior_of(belief, scan.reference_pose).correction
         return ScanUpdate(scan, None, True, self.belief)
 
     def _reject(self, scan: Scan, result: MatchResult, belief: Belief) -> ScanUpdate:
@@ -138,7 +143,6 @@ class Mapper:
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""
-        start = scan.times.min() if len(scan) else scan.reference_time
-        times = np.unique(np.append(np.linspace(start, scan.reference_time, 17), scan.reference_time))
+        times = np.unique(np.append(np.linspace(scan.start, scan.reference_time, 17), scan.reference_time))
         correction = prior_of(belief, scan.reference_pose).correction
         return times, composed(correction, scan.track.at(times))

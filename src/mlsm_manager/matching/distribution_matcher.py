@@ -16,7 +16,6 @@ from mlsm_manager.matching.scan import Scan
 from mlsm_manager.matching.score_field import ScoreField
 from mlsm_manager.matching.significance import significance
 
-_CANDIDATES = 4
 _WINDOW_DEVIATIONS = 3.0
 _OBJECTION_SHARE = 0.01
 _MOST_RATES = 9
@@ -50,9 +49,11 @@ class DistributionMatcher:
         margin = window.distance + 2.0 * parameters.search_cell
         field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
         pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
-        found = search(motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, _CANDIDATES)
+        found = search(
+            motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, parameters.candidates
+        )
         refiner = Refiner(motion, weights, LocalDistributions(target), state)
-        fits = [refiner.refine(candidate.theta, parameters.max_iterations) for candidate in found]
+        fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
         return sorted(fits, key=lambda fit: -fit.gain), refiner
 
     def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:

@@ -16,6 +16,7 @@ class DistributionMatcherParameters(ParameterSet):
         0.384, "how far from the expected heading a scan is searched, at most", unit="rad", low=0.0, high=3.1416
     )
     search_cell: float = parameter(0.5, "step of the search", unit="m", low=0.05, high=10.0)
+    candidates: int = parameter(4, "places that the search hands to the refinement", low=1, high=100)
     beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
     min_points: int = parameter(15, "a scan with fewer points on the map tells nothing", low=3, high=10000)
     max_position_deviation: float = parameter(
@@ -35,7 +36,7 @@ class DistributionMatcherParameters(ParameterSet):
         4.0, "a pose farther than this from the expected one, in the prior's standard deviations, is rejected",
         low=1.0, high=100.0,
     )  # fmt: skip
-    max_iterations: int = parameter(40, "steps of Gauss-Newton from each candidate", low=1, high=1000)
+    max_steps: int = parameter(40, "steps of Gauss-Newton from each candidate", low=1, high=1000)
 
 
 @dataclass(frozen=True)

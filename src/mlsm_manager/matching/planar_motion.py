@@ -39,8 +39,7 @@ class PlanarMotion:
 
     def __init__(self, scan: Scan, bearing_deviation: float = 0.0) -> None:
         """`bearing_deviation`: rad, standard deviation of an echo's bearing within its beam."""
-        start = scan.times.min() if len(scan) else scan.reference_time
-        steady = np.linspace(start, scan.reference_time, _LEAST_NODES)
+        steady = np.linspace(scan.start, scan.reference_time, _LEAST_NODES)
         times = np.unique(np.append(scan.times, steady))
         self.beam_times = times[times <= scan.reference_time]
         self.beam = np.minimum(np.searchsorted(self.beam_times, scan.times), len(self.beam_times) - 1)

@@ -19,7 +19,7 @@ class OdometryErrors(ParameterSet):
     """How wrong the odometry may be: standard deviations, and how long an error lasts."""
 
     scale_deviation: float = parameter(
-        0.1, "relative error of the distances it reports", low=0.0, high=2.0, tunable=False
+        0.2, "relative error of the distances it reports", low=0.0, high=2.0, tunable=False
     )
     direction_deviation: float = parameter(
         0.05, "error of their direction, a sensor's mounting angle", unit="rad", low=0.0, high=1.0, tunable=False

@@ -81,6 +81,11 @@ class Scan:
         return len(self.points)
 
     @property
+    def start(self) -> float:
+        """Time of the oldest point, s; the reference time when there is none."""
+        return float(self.times.min()) if len(self) else self.reference_time
+
+    @property
     def reference_pose(self) -> np.ndarray:
         """(3,) T_odom_base at the reference time."""
         return self.track.at(self.reference_time)

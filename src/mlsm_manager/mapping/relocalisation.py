@@ -1,0 +1,33 @@
+"""Finds a vehicle that lost its place: one scan against the whole map."""
+
+import numpy as np
+
+from mlsm_manager.blocks import Blocks
+from mlsm_manager.matching.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matcher import Matcher
+from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.planar import composed, inverse
+from mlsm_manager.matching.prediction import OdometryErrors
+from mlsm_manager.matching.result import MatchResult, Prior
+from mlsm_manager.matching.scan import Scan
+
+_CELL = 1.0
+_CANDIDATES = 12
+
+
+def relocaliser(parameters: DistributionMatcherParameters) -> Matcher:
+    """Return the default matcher, made to look everywhere."""
+    everywhere = {"search_distance": 500.0, "search_angle": np.pi, "search_cell": _CELL, "candidates": _CANDIDATES}
+    return DistributionMatcher(parameters.changed(everywhere))
+
+
+def relocalised(scan: Scan, target: Blocks, matcher: Matcher, errors: OdometryErrors) -> MatchResult:
+    """Return where in the whole map `scan` was taken, whatever was believed before."""
+    centers = target.mean[:, :2] if len(target) else np.zeros((1, 2))
+    low, high = centers.min(axis=0), centers.max(axis=0)
+    middle = np.append((low + high) / 2.0, scan.reference_pose[2])
+    covariance = errors.covariance()
+    covariance[0, 0] = covariance[1, 1] = (float((high - low).max()) / 4.0 + _CELL) ** 2
+    covariance[2, 2] = np.pi**2
+    correction = composed(middle, inverse(scan.reference_pose))
+    return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))
