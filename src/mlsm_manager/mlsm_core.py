@@ -29,6 +29,7 @@ from sonar_processing.conversions import StampedIntensityCloudArrays, cloud_from
 from sonar_processing.stage_runner import subscribe_to_clouds
 from underwater_map_construction.srv import SaveMap, SaveMapRequest, SaveMapResponse
 
+_JUMP_BACK = 30.0
 _LONGEST_SILENCE = 60.0
 
 
@@ -168,22 +169,22 @@ class MlsmCore:
 
     def _correction(self) -> np.ndarray:
         newest = self._odometry.newest()
-        with self._lock:
-            if newest is None:
-                return self._mapper.correction
-            time, pose = newest
-            self._notice_jump(time)
-            belief = self._mapper.belief
-            if belief is not None and time - belief.time > _LONGEST_SILENCE:
-                track = self._odometry.track(belief.time, np.empty(0), time)
+        if newest is None:
+            return self._mapper.correction
+        time, pose = newest
+        self._notice_jump(time)
+        belief = self._mapper.belief
+        if belief is not None and time - belief.time > _LONGEST_SILENCE:
+            track = self._odometry.track(belief.time, np.empty(0), time)
+            with self._lock:
                 self._mapper.follow(track, time)
-            return self._correcting.sample(time, pose)
+        return self._correcting.sample(time, pose)
 
     def _notice_jump(self, time: float) -> None:
+        belief = self._mapper.belief
+        if belief is None or time >= belief.time - _JUMP_BACK:
+            return
         with self._lock:
-            belief = self._mapper.belief
-            if belief is None or time >= belief.time - _LONGEST_SILENCE / 2.0:
-                return
             self._mapper.forget_place()
             self._correcting.clear()
             self._odometry.clear()

@@ -11,14 +11,14 @@ from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.result import MatchResult, Prior
 from mlsm_manager.matching.scan import Scan
 
-_CELL = 1.0
-_CANDIDATES = 12
+_EVERYWHERE = {
+    "search_distance": 500.0, "search_angle": np.pi, "search_cell": 1.0, "candidates": 80, "min_gain_over_second": 6.0
+}  # fmt: skip
 
 
 def relocaliser(parameters: DistributionMatcherParameters) -> Matcher:
     """Return the default matcher, made to look everywhere."""
-    everywhere = {"search_distance": 500.0, "search_angle": np.pi, "search_cell": _CELL, "candidates": _CANDIDATES}
-    return DistributionMatcher(parameters.changed(everywhere))
+    return DistributionMatcher(parameters.changed(_EVERYWHERE))
 
 
 def relocalised(scan: Scan, target: Blocks, matcher: Matcher, errors: OdometryErrors) -> MatchResult:
@@ -27,7 +27,7 @@ def relocalised(scan: Scan, target: Blocks, matcher: Matcher, errors: OdometryEr
     low, high = centers.min(axis=0), centers.max(axis=0)
     middle = np.append((low + high) / 2.0, scan.reference_pose[2])
     covariance = errors.covariance()
-    covariance[0, 0] = covariance[1, 1] = (float((high - low).max()) / 4.0 + _CELL) ** 2
+    covariance[0, 0] = covariance[1, 1] = (float((high - low).max()) / 4.0 + 1.0) ** 2
     covariance[2, 2] = np.pi**2
     correction = composed(middle, inverse(scan.reference_pose))
     return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))

@@ -54,7 +54,7 @@ class DistributionMatcher:
         )
         refiner = Refiner(motion, weights, LocalDistributions(target), state)
         fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
-        return sorted(fits, key=lambda fit: -fit.gain), refiner
+        return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain)), refiner
 
     def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
         deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))

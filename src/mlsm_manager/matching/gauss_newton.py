@@ -14,8 +14,7 @@ _GATE = 0.75
 _ITERATIONS_PER_SCALE = 4
 _CLUSTER = 3.0
 _GREATEST_INFLATION = 30.0
-_LAST_STEP = 1e-3
-_LEVER = 20.0
+_LAST_STEP = 0.1
 _NEIGHBOURS = 12
 INLIER = 3.0
 
@@ -66,9 +65,9 @@ class _Normal:
 class Refiner:
     """Minimises the points' robust squared Mahalanobis distances plus the prior's.
 
-    The robust kernel narrows as the iterations go on. Points that lie near each other in the map err alike; the
-    information is divided by what the sums of their gradients over clusters of 3 m show of that (a design effect), so
-    that the prior keeps its honest share.
+    The robust kernel narrows as the iterations go on, until a step is below a tenth of a standard deviation. Points
+    that lie near each other in the map err alike; the information is divided by what the sums of their gradients over
+    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share.
     """
 
     def __init__(
@@ -81,8 +80,6 @@ class Refiner:
         self._prior = prior
         spots = motion.points(motion.path(prior.mean))
         self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
-        seconds = motion.beam_times[-1] - motion.beam_times[0]
-        self._lengths = np.array([1.0, 1.0, _LEVER, seconds, seconds, _LEVER * seconds, _LEVER, _LEVER])
 
     def refine(self, start: np.ndarray, max_iterations: int) -> Fit:
         """Return the fit found from `start` (8,)."""
@@ -92,9 +89,10 @@ class Refiner:
             iteration += 1
             normal = self._normal(theta, SCALES[index])
             inflation = self._design_effect(normal) if index == narrowest else 1.0
-            step = self._step(theta, normal, inflation)
+            information = normal.information / inflation + self._prior.information
+            step = self._step(theta, normal, information, inflation)
             theta = theta + step
-            small = bool(np.abs(step * self._lengths).max() < _LAST_STEP)
+            small = bool(step @ information @ step < _LAST_STEP**2)
             converged = small and index == narrowest
             if small or iteration % _ITERATIONS_PER_SCALE == 0:
                 index = min(index + 1, narrowest)
@@ -104,8 +102,7 @@ class Refiner:
         """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
         return self._on_surface(self._normal(theta, SCALES[-1]))
 
-    def _step(self, theta: np.ndarray, normal: _Normal, inflation: float) -> np.ndarray:
-        information = normal.information / inflation + self._prior.information
+    def _step(self, theta: np.ndarray, normal: _Normal, information: np.ndarray, inflation: float) -> np.ndarray:
         objection = self._prior.information @ (theta - self._prior.mean)
         return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
 

@@ -1,0 +1,90 @@
+#!/usr/bin/env python3
+"""A vehicle whose odometry is 30 % wrong knows where it is, once startMatching says so (thesis 7.4)."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from graph import Diagnostics, Inbox
+from nav_msgs.msg import Odometry, Path
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
+
+SCANS = 6
+
+
+class Matching(unittest.TestCase):
+    """Three moves of 5.2, 3.9 and -10.4 m that the odometry believes to be 4, 3 and -8 m."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Start matching and wait until the whole tour is matched."""
+        cls.truth = Inbox("/ground_truth", Odometry)
+        cls.transforms = Inbox("/tf", TFMessage)
+        cls.fixes = Inbox("/MLSM/odometry", Odometry)
+        cls.poses = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        cls.starter = rospy.Publisher("/startMatching", Bool, queue_size=1, latch=True)
+        cls.starter.publish(True)
+        cls.diagnostics = Diagnostics()
+        cls.fixes.wait_for(lambda _: len(cls.fixes.messages) >= SCANS, timeout=60.0)
+
+    def errors(self) -> np.ndarray:
+        """Return the distance of each fix from the truth at its stamp, m."""
+        stamps = np.array([message.header.stamp.to_sec() for message in self.truth.messages])
+        places = np.array([place(message) for message in self.truth.messages])
+        times = [fix.header.stamp.to_sec() for fix in self.fixes.messages]
+        true = np.column_stack([np.interp(times, stamps, places[:, axis]) for axis in range(2)])
+        return np.linalg.norm(np.array([place(fix) for fix in self.fixes.messages]) - true, axis=1)
+
+    def test_every_fix_is_close_to_the_truth(self) -> None:
+        """Published for these moves: 0.15, 0.37 and 0.28 m."""
+        errors = self.errors()
+        self.assertGreaterEqual(len(errors), SCANS)
+        self.assertLess(errors.max(), 0.2, errors)
+        self.assertLess(np.median(errors), 0.1, errors)
+
+    def test_the_fix_says_honestly_how_sure_it_is(self) -> None:
+        """No fix is off by more than four of its own standard deviations, and none is vague."""
+        variances = np.array([fix.pose.covariance[0] + fix.pose.covariance[7] for fix in self.fixes.messages])
+        self.assertLess((self.errors() / np.sqrt(variances)).max(), 4.0)
+        self.assertLess(variances.max(), 0.5**2)
+
+    def test_map_to_odom_holds_the_corrections_of_the_thesis(self) -> None:
+        """At the end -1.2 m in x and 0.9 m in y, reached without jumps and never twice with one stamp."""
+        transforms = [t for m in self.transforms.messages for t in m.transforms if t.header.frame_id == "map"]
+        way = np.array([[t.transform.translation.x, t.transform.translation.y] for t in transforms])
+        self.assertLess(np.abs(way[-1] - [-1.2, 0.9]).max(), 0.2, way[-1])
+        self.assertLess(np.abs(np.diff(way, axis=0)).max(), 0.5)
+        self.assertEqual(len({t.header.stamp for t in transforms}), len(transforms))
+
+    def test_pose_and_path_say_the_same_as_the_odometry_message(self) -> None:
+        """Three shapes of one fix."""
+        path = Inbox("/MLSM/path", Path).wait_for(lambda way: len(way.poses) >= SCANS)
+        fixes = np.array([place(message) for message in self.fixes.messages])
+        np.testing.assert_array_equal(np.array([place(pose) for pose in path.poses]), fixes)
+        np.testing.assert_array_equal(np.array([place(message) for message in self.poses.messages]), fixes)
+
+    def test_the_diagnostics_count_the_matches(self) -> None:
+        """The first scan makes the map, the others are matched."""
+        self.diagnostics.wait_for("mlsm_core", "scans matched", SCANS)
+
+    def test_the_whole_map_is_searched_on_request(self) -> None:
+        """Relocalisation finds the place of the newest scan without knowing anything."""
+        answer = rospy.ServiceProxy("/mlsm_core/relocalise", Trigger)()
+        self.assertTrue(answer.success, answer.message)
+
+
+def place(message: object) -> np.ndarray:
+    """Return x and y of a message with a pose."""
+    pose = message.pose if isinstance(message, PoseStamped) else message.pose.pose
+    return np.array([pose.position.x, pose.position.y])
+
+
+if __name__ == "__main__":
+    rospy.init_node("matching_test")
+
+    rostest.rosrun("underwater_map_construction", "matching", Matching, sys.argv)
