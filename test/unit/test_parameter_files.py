@@ -11,6 +11,8 @@ from imagenex_852_driver.emulator_parameters import EmulatorParameters
 from mlsm_manager.core_parameters import MlsmCoreParameters
 from node_support.parameter_text import default_yaml
 from node_support.parameters import describe
+from sonar_processing.circles import CircleDetectorParameters
+from sonar_processing.lines import LineDetectorParameters
 from sonar_processing.outliers import OutlierRemoverParameters
 from sonar_processing.scan_assembler import SonarToCloudParameters
 from sonar_processing.stages import STAGES
@@ -19,8 +21,10 @@ from sonar_simulator.default_yaml import simulator_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = {
+    "circle_detector": (CircleDetectorParameters, "CircleDetector"),
     "imagenex_852_driver": (DriverParameters, "Imagenex852"),
     "imagenex_852_emulator": (EmulatorParameters, "Imagenex852Emulator"),
+    "line_detector": (LineDetectorParameters, "LineDetector"),
     "mlsm_core": (MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": (OutlierRemoverParameters, "OutlierRemover"),
     "sonar_to_cloud": (SonarToCloudParameters, "SonarToCloud"),
