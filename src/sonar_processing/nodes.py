@@ -5,6 +5,7 @@ from typing import Type
 from node_support.node import DiagnosticsPublisher, run
 from sonar_processing.host import ProcessingHost
 from sonar_processing.shape_detectors import CircleDetectorNode, LineDetectorNode, ShapeDetectorNode
+from sonar_processing.sonar_control import SonarControl
 from sonar_processing.sonar_to_cloud import SonarToCloud
 from sonar_processing.stage_runner import StageRunner
 
@@ -48,6 +49,16 @@ def run_line_detector() -> None:
 def run_circle_detector() -> None:
     """Run circle_detector."""
     run_shape_detector(CircleDetectorNode)
+
+
+def run_sonar_control() -> None:
+    """Run sonar_control."""
+
+    def construct() -> tuple:
+        node = SonarControl()
+        return node, DiagnosticsPublisher([node.health])
+
+    run("sonar_control", construct)
 
 
 def run_host() -> None:

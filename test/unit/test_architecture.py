@@ -22,8 +22,8 @@ ROS_SIDE = {
     "mlsm_manager": {"map_publisher", "map_transform", "markers", "mlsm_core", "nodes"},
     "node_support": {"live_parameters", "node", "reconfigure_description"},
     "sonar_processing": {
-        "cloud_publisher", "conversions", "host", "nodes", "shape_detectors", "shape_messages", "sonar_places",
-        "sonar_to_cloud", "stage_runner", "transform_filter", "transforms",
+        "cloud_publisher", "conversions", "host", "nodes", "shape_detectors", "shape_messages", "sonar_control",
+        "sonar_places", "sonar_to_cloud", "stage_runner", "transform_filter", "transforms",
     },
     "sonar_simulator": {"nodes", "simulator_messages", "simulator_node", "simulator_publisher"},
 }  # fmt: skip

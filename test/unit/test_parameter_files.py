@@ -17,6 +17,7 @@ from sonar_processing.outliers import OutlierRemoverParameters
 from sonar_processing.scan_assembler import SonarToCloudParameters
 from sonar_processing.stages import STAGES
 from sonar_processing.threshold import ThresholderParameters
+from sonar_processing.tilt_scan import SonarControlParameters
 from sonar_simulator.default_yaml import simulator_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,6 +28,7 @@ NODES = {
     "line_detector": (LineDetectorParameters, "LineDetector"),
     "mlsm_core": (MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": (OutlierRemoverParameters, "OutlierRemover"),
+    "sonar_control": (SonarControlParameters, "SonarControl"),
     "sonar_to_cloud": (SonarToCloudParameters, "SonarToCloud"),
     "thresholder": (ThresholderParameters, "Thresholder"),
 }
