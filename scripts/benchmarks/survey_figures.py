@@ -1,5 +1,6 @@
 """A 3-D scan of the basin with the tilting sonar: its blocks against the world."""
 
+import itertools
 from pathlib import Path
 from typing import Dict, List
 
@@ -17,59 +18,50 @@ from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, SonarToCl
 from sonar_processing.threshold import Thresholder, ThresholderParameters
 from sonar_processing.tilt_scan import SonarControlParameters, TiltScan
 from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.odometry import Odometry, OdometryParameters
 from sonar_simulator.poses import pose_matrix
 from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.script_file import load_script
 from sonar_simulator.sdf import load_sdf
 from sonar_simulator.servo import Servo, ServoParameters, tilted
-from sonar_simulator.simulation import Moment, Simulation
 from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
 
 ROOT = Path(__file__).resolve().parents[2]
 RESOLUTION = 0.5
-TICK_RATE = 20.0
-FAN_BEAM = {"sonar": {"vertical_opening_deg": 22.0}}
-T_BASE_SONAR = pose_matrix((0.4, 0.0, 0.2))
+FAN_BEAM = {"vertical_opening_deg": 22.0}
+T_WORLD_SONAR = pose_matrix((40.4, 8.0, -1.8))
 WORLD = load_sdf(ROOT / "worlds/basin.sdf").world
 
 
 class Survey:
-    """One sweep of the servo in yaml/survey_script.yaml, through the default chain into a map."""
+    """One sweep of the servo in the default steps, through the default chain into a map; the vehicle stands still."""
 
-    def __init__(self, changes: Dict[str, dict]) -> None:
+    def __init__(self, changes: Dict[str, object]) -> None:
+        """`changes`: of the head's parameters in yaml/sonar_simulator_survey.yaml."""
         settings = yaml.safe_load((ROOT / "yaml/sonar_simulator_survey.yaml").read_text())
-        head = SonarParameters.from_mapping({**settings["sonar"], **changes.get("sonar", {})})
+        parameters = SonarParameters.from_mapping({**settings["sonar"], **changes})
         model = make_echo_model("laser_cone", settings["echo"])
-        self._sonar = Sonar(RayCaster(WORLD), head.pattern(), model, np.random.default_rng(1))
+        self._sonar = Sonar(RayCaster(WORLD), parameters.pattern(), model, np.random.default_rng(1))
+        self._head = SonarHead(parameters.beams_per_turn, parameters.seconds_per_turn)
         self._servo = Servo(ServoParameters())
-        script = load_script(ROOT / "yaml/survey_script.yaml")
-        odometry = Odometry(OdometryParameters(scale_error=0.0), script.pose(0.0))
-        turn = SonarHead(head.beams_per_turn, head.seconds_per_turn)
-        self._simulation = Simulation(script, odometry, self._sonar, turn, T_BASE_SONAR, self._servo)
-        self._control = TiltScan(
-            SonarControlParameters(), 0.0, self._servo.command, Health("sonar_control", lambda _: None)
-        )
+        health = Health("sonar_control", lambda _: None)
+        self._control = TiltScan(SonarControlParameters(), 0.0, self._servo.command, health)
         self._assembler = ScanAssembler(SonarToCloudParameters())
         self._stages = [Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())]
         self._map = MultiLevelSurfaceMap(RESOLUTION)
 
     def run(self) -> Blocks:
         """Return the map's blocks after one sweep."""
-        for moment in self._simulation.moments(TICK_RATE):
-            self._control.take_joint(moment.time, moment.tilt)
-            if moment.ping is not None:
-                self._control.take_beam(moment.time, moment.ping.angle)
-                self._take(moment)
-            if self._control.sweeps:
-                break
+        for number in itertools.takewhile(lambda _: not self._control.sweeps, itertools.count()):
+            time, angle = self._head.time(number), self._head.angle(number)
+            tilt = self._servo.angle(time)
+            self._control.take_joint(time, tilt)
+            self._control.take_beam(time, angle)
+            self._take_beam(time, angle, tilt)
         return self._map.blocks
 
-    def _take(self, moment: Moment) -> None:
-        stamp_ns = round(1e9 * (1000.0 + moment.time))
-        strengths = moment.ping.strengths
-        beam = Beam(stamp_ns, "sonar", moment.ping.angle, strengths, self._sonar.range_resolution, moment.tilt)
-        pose = moment.T_odom_base @ tilted(T_BASE_SONAR, moment.tilt)
+    def _take_beam(self, time: float, angle: float, tilt: float) -> None:
+        pose = tilted(T_WORLD_SONAR, tilt)
+        strengths = self._sonar.ping(pose, angle)
+        beam = Beam(round(1e9 * (1000.0 + time)), "sonar", angle, strengths, self._sonar.range_resolution, tilt)
         cloud = self._assembler.add(PlacedBeam(beam, pose, is_moving=False))
         if cloud is not None:
             for stage in self._stages:
