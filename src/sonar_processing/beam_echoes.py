@@ -29,8 +29,16 @@ class BeamEchoes:
         return len(self.points)
 
     def strong(self, share: float) -> np.ndarray:
-        """Return the indices of the echoes with at least `share` times as many points as the median echo."""
-        return np.flatnonzero(self.weights >= share * np.median(self.weights)) if len(self) else np.arange(0)
+        """Return the indices of the echoes with at least `share` times as many points as the usual one.
+
+        Half of all points belong to echoes as large as the usual one or larger: noise, many echoes of one bin each,
+        does not change it.
+        """
+        if not len(self):
+            return np.arange(0)
+        sizes = np.sort(self.weights)
+        usual = sizes[np.searchsorted(np.cumsum(sizes), sizes.sum() / 2.0)]
+        return np.flatnonzero(self.weights >= share * usual)
 
 
 def beam_echoes(cloud: IntensityCloud, gap: float) -> BeamEchoes:

@@ -40,7 +40,7 @@ class RansacParameters(ParameterSet):
         0.5, "bins of a beam this near to each other are one echo; 0: every point counts", unit="m", low=0.0, high=10.0
     )
     min_echo_share: float = parameter(
-        0.15, "echoes of fewer bins than this share of the median echo's are noise", low=0.0, high=1.0
+        0.15, "echoes of fewer bins than this share of the usual echo's are noise", low=0.0, high=1.0
     )
     sonar_frame: str = parameter("sonar", "frame of the sonar, whose place tf knows", tunable=False)
     seed: int = parameter(1, "of the random hypotheses: same seed and scan, same shapes", low=0, high=2**31 - 1)
