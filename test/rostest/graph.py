@@ -49,6 +49,15 @@ class Inbox:
             self.messages.append(message)
             self._condition.notify_all()
 
+    def wait_for_link(self, timeout: float = 20.0) -> None:
+        """Wait until a publisher is connected, so that no message is missed from then on."""
+        ended = threading.Event()
+        for _ in range(int(timeout / 0.05)):
+            if self._subscriber.get_num_connections():
+                return
+            ended.wait(0.05)
+        raise AssertionError(f"{self._topic}: nobody publishes it after {timeout} s")
+
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = 20.0) -> Any:
         """Return the newest message once it fits; raises AssertionError after `timeout` seconds of wall time."""
         with self._condition:
