@@ -5,8 +5,8 @@ from pathlib import Path
 from typing import Dict, List
 
 import numpy as np
-
 import yaml
+
 from benchmarks.table import Row
 from benchmarks.world_distance import distances, nearest_shape
 from mlsm_manager.blocks import Blocks
