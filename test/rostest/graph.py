@@ -95,6 +95,21 @@ def wait_for_subscribers(topic: str, number: int, timeout: float = 20.0) -> None
     raise AssertionError(f"{topic}: not {number} listeners after {timeout} s")
 
 
+def wait_until(holds: Callable[[], bool], timeout: float = 20.0, required: bool = True) -> bool:
+    """Wait until a state holds that nobody tells of, and return whether it does.
+
+    Raises AssertionError after `timeout` seconds where it is `required`.
+    """
+    ended = threading.Event()
+    for _ in range(int(timeout / 0.02)):
+        if holds():
+            return True
+        ended.wait(0.02)
+    if required:
+        raise AssertionError(f"not after {timeout} s")
+    return False
+
+
 def play(bag: Path, rate: float) -> None:
     """Play a bag to its end."""
     command = ["rosbag", "play", "--quiet", "--clock", f"--rate={rate}", str(bag)]
