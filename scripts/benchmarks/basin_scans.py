@@ -7,7 +7,9 @@ import numpy as np
 
 from sonar_processing.beam import Beam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, SonarToCloudParameters
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.scan_assembler import ScanAssembler
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_simulator.echo_model import make_echo_model
 from sonar_simulator.poses import pose_matrix
 from sonar_simulator.ray_caster import RayCaster

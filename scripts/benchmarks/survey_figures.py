@@ -14,7 +14,9 @@ from mlsm_manager.mlsm import MultiLevelSurfaceMap
 from node_support.health import Health
 from sonar_processing.beam import Beam
 from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, SonarToCloudParameters
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.scan_assembler import ScanAssembler
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.threshold import Thresholder, ThresholderParameters
 from sonar_processing.tilt_scan import SonarControlParameters, TiltScan
 from sonar_simulator.echo_model import make_echo_model

@@ -6,6 +6,7 @@ from node_support.node import DiagnosticsPublisher, run
 from sonar_processing.host import ProcessingHost
 from sonar_processing.shape_detectors import CircleDetectorNode, LineDetectorNode, ShapeDetectorNode
 from sonar_processing.sonar_control import SonarControl
+from sonar_processing.sonar_image import SonarImage
 from sonar_processing.sonar_to_cloud import SonarToCloud
 from sonar_processing.stage_runner import StageRunner
 
@@ -59,6 +60,16 @@ def run_sonar_control() -> None:
         return node, DiagnosticsPublisher([node.health])
 
     run("sonar_control", construct)
+
+
+def run_sonar_image() -> None:
+    """Run sonar_image as a node of its own."""
+
+    def construct() -> tuple:
+        node = SonarImage()
+        return node, DiagnosticsPublisher([node.health])
+
+    run("sonar_image", construct)
 
 
 def run_host() -> None:

@@ -114,6 +114,21 @@ def _links(node: str, topic: str) -> int:
     return sum(1 for link in connections if link[2] == "o" and link[4] == topic and link[5])
 
 
+def wait_until(holds: Callable[[], bool], timeout: float = 20.0, required: bool = True) -> bool:
+    """Wait until a state holds that nobody tells of, and return whether it does.
+
+    Raises AssertionError after `timeout` seconds where it is `required`.
+    """
+    ended = threading.Event()
+    for _ in range(int(timeout / 0.02)):
+        if holds():
+            return True
+        ended.wait(0.02)
+    if required:
+        raise AssertionError(f"not after {timeout} s")
+    return False
+
+
 def play(bag: Path, rate: float) -> None:
     """Play a bag to its end, to all who listen: playback starts when every listener is connected to every topic."""
     command = ["rosbag", "play", "--quiet", "--clock", "--pause", f"--rate={rate}", str(bag), "__name:=player"]
