@@ -1,4 +1,4 @@
-"""Writes what is generated from the parameter dataclasses: the default yaml files and the tables in README.md."""
+"""Writes what is generated from the parameter dataclasses: the default yaml files and the tables of the documents."""
 
 import argparse
 import dataclasses
@@ -13,14 +13,19 @@ from imagenex_852_driver.emulator_parameters import EmulatorParameters
 from mlsm_manager.core_parameters import MlsmCoreParameters
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
+from sonar_processing.circles import CircleDetectorParameters
+from sonar_processing.echo_extraction import EchoExtractorParameters
+from sonar_processing.lines import LineDetectorParameters
 from sonar_processing.outliers import OutlierRemoverParameters
-from sonar_processing.scan_assembler import SonarToCloudParameters
+from sonar_processing.polar_image import SonarImageParameters
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.threshold import ThresholderParameters
+from sonar_processing.tilt_scan import SonarControlParameters
 from sonar_simulator.default_yaml import GROUPS, simulator_yaml
 from sonar_simulator.simulation import SimulatorParameters
 
 ROOT = Path(__file__).resolve().parent.parent
-README = ROOT / "README.md"
+DOCUMENTS = [ROOT / name for name in ("README.md", "docs/shapes.md", "docs/sonar_control.md")]
 _BLOCK = re.compile(r"(<!-- parameters: ([\w/]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -33,10 +38,15 @@ class LiveNode:
 
 
 LIVE_NODES: Dict[str, LiveNode] = {
+    "circle_detector": LiveNode(CircleDetectorParameters, "CircleDetector"),
+    "echo_extractor": LiveNode(EchoExtractorParameters, "EchoExtractor"),
     "imagenex_852_driver": LiveNode(DriverParameters, "Imagenex852"),
     "imagenex_852_emulator": LiveNode(EmulatorParameters, "Imagenex852Emulator"),
+    "line_detector": LiveNode(LineDetectorParameters, "LineDetector"),
     "mlsm_core": LiveNode(MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": LiveNode(OutlierRemoverParameters, "OutlierRemover"),
+    "sonar_control": LiveNode(SonarControlParameters, "SonarControl"),
+    "sonar_image": LiveNode(SonarImageParameters, "SonarImage"),
     "sonar_to_cloud": LiveNode(SonarToCloudParameters, "SonarToCloud"),
     "thresholder": LiveNode(ThresholderParameters, "Thresholder"),
 }
@@ -49,7 +59,7 @@ def generated() -> Dict[Path, str]:
     }
     texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
     texts[ROOT / "docs/thesis_names.md"] = thesis_names()
-    texts[README] = with_tables(README.read_text())
+    texts.update({path: with_tables(path.read_text()) for path in DOCUMENTS})
     return texts
 
 

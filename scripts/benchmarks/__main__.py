@@ -3,12 +3,14 @@
 import argparse
 from typing import Callable, Dict, List
 
-from benchmarks import map_figures, processing_figures
+from benchmarks import map_figures, processing_figures, shape_figures, survey_figures
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map": map_figures.rows,
     "processing": processing_figures.rows,
+    "shapes": shape_figures.rows,
+    "survey": survey_figures.rows,
 }
 
 
