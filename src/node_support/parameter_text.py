@@ -1,8 +1,9 @@
 """Writes what a `ParameterSet` says of itself: the commented default yaml and the table for the documentation."""
 
 import dataclasses
+import re
 from enum import Enum
-from typing import List, Type
+from typing import List, Mapping, Type
 
 from node_support.parameters import ParameterSet, describe
 
@@ -47,6 +48,18 @@ def markdown_table(parameters: Type[ParameterSet]) -> str:
         ]  # fmt: skip
         rows.append("| " + " | ".join(cells) + " |")
     return "\n".join(rows) + "\n"
+
+
+def with_tables(text: str, nodes: Mapping[str, Type[ParameterSet]]) -> str:
+    """Return a documentation text with the table of each node behind its mark `<!-- parameters: NODE -->`.
+
+    A table that stands there already is replaced. Raises KeyError for a mark of a node that is not in `nodes`.
+    """
+
+    def marked(match: "re.Match[str]") -> str:
+        return f"{match.group(1)}\n\n{markdown_table(nodes[match.group(2)])}"
+
+    return re.sub(r"(<!-- parameters: (\w+) -->)\n(?:\n(?:\|.*\n)+)?", marked, text)
 
 
 def _yaml_value(value: object) -> str:

@@ -1,4 +1,4 @@
-"""Files that are generated from the parameter dataclasses agree with them."""
+"""Files that are generated from the parameter dataclasses (scripts/write_parameters) agree with them."""
 
 import importlib
 from pathlib import Path
@@ -9,7 +9,7 @@ import yaml
 from imagenex_852_driver.driver_parameters import DriverParameters
 from imagenex_852_driver.emulator_parameters import EmulatorParameters
 from mlsm_manager.core_parameters import MlsmCoreParameters
-from node_support.parameter_text import default_yaml
+from node_support.parameter_text import default_yaml, with_tables
 from node_support.parameters import describe
 from sonar_processing.echo_extraction import EchoExtractorParameters
 from sonar_processing.outliers import OutlierRemoverParameters
@@ -48,6 +48,12 @@ def test_the_default_yaml_makes_the_defaults(node):
 
 def test_the_simulators_default_yaml_says_what_its_dataclasses_say():
     assert _default_file("sonar_simulator") == simulator_yaml()
+
+
+@pytest.mark.parametrize("document", sorted(path.name for path in (ROOT / "docs").glob("*.md")))
+def test_the_tables_of_a_document_say_what_the_dataclasses_say(document):
+    text = (ROOT / "docs" / document).read_text()
+    assert text == with_tables(text, {node: parameters for node, (parameters, _) in NODES.items()})
 
 
 @pytest.fixture(params=sorted(NODES))

@@ -4,7 +4,7 @@ import pytest
 from example_parameters import ExampleParameters
 
 import yaml
-from node_support.parameter_text import default_yaml, markdown_table
+from node_support.parameter_text import default_yaml, markdown_table, with_tables
 
 
 @pytest.fixture
@@ -39,3 +39,21 @@ def test_a_row_holds_name_type_default_range_unit_thesis_name_and_meaning():
     assert "| `radius` * | float | `1.5` | a number from 0 to 10 | m | minRadius | how far |" in markdown_table(
         ExampleParameters
     )
+
+
+def test_a_document_gets_the_table_behind_its_mark():
+    text = "# A node\n\n<!-- parameters: example -->\n\nMore.\n"
+    filled = with_tables(text, {"example": ExampleParameters})
+    assert filled == text.replace("-->\n", "-->\n\n" + markdown_table(ExampleParameters))
+    assert with_tables(filled, {"example": ExampleParameters}) == filled
+
+
+def test_an_old_table_is_replaced():
+    text = "<!-- parameters: example -->\n\n| old |\n| --- |\n| 1 |\n\nMore.\n"
+    filled = with_tables(text, {"example": ExampleParameters})
+    assert filled == f"<!-- parameters: example -->\n\n{markdown_table(ExampleParameters)}\nMore.\n"
+
+
+def test_a_mark_of_an_unknown_node_is_an_error():
+    with pytest.raises(KeyError, match="nobody"):
+        with_tables("<!-- parameters: nobody -->\n", {})
