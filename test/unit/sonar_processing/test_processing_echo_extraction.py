@@ -106,6 +106,14 @@ def test_dense_points_stand_all_along_a_run(spacing, per_run):
     assert (echoes.bins.min(), echoes.bins.max() <= 177) == (150, True)
 
 
+@pytest.mark.parametrize("mode", ["MATCHED_FILTER", "LEADING_EDGE", "DENSE"])
+@pytest.mark.parametrize("at", [0, 1, 398, 399])
+def test_an_echo_at_either_end_of_the_range_lies_there(mode, at):
+    echoes = _echoes(wall_image([at] * 20 + [-100.0] * 40), mode=mode, min_range=0.0, spacing=9.0)
+    assert echoes.beams.tolist() == list(range(20))
+    assert np.abs(echoes.bins - at).max() < 3.5
+
+
 @given(st.integers(0, 2**32 - 1), st.sampled_from(list(ExtractionMode)), st.sampled_from([0.0, 0.3, 0.9]))
 def test_no_scan_breaks_it_and_every_echo_lies_in_the_scan(seed, mode, quantile):
     rng = np.random.default_rng(seed)
