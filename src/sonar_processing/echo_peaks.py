@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 _LEVELS_PER_STRENGTH = 64.0
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -53,9 +54,14 @@ def _level_tops(image: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _summit(image: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
-    """Return where between -0.5 and 0.5 bins the parabola through a peak and its neighbours is highest."""
+    """Return where between -0.5 and 0.5 bins the parabola through a peak and its neighbours is highest.
+
+    Beyond the first and the last bin nothing is heard.
+    """
     end = image.shape[1] - 1
-    left, top, right = (image[beams, np.clip(bins + side, 0, end)] for side in (-1, 0, 1))
+    top = image[beams, bins]
+    left = np.where(bins > 0, image[beams, np.maximum(bins - 1, 0)], 0.0)
+    right = np.where(bins < end, image[beams, np.minimum(bins + 1, end)], 0.0)
     bend = left - 2.0 * top + right
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = 0.5 * (left - right) / bend
@@ -97,8 +103,9 @@ def points_along_runs(image: np.ndarray, threshold: float, spacing: float) -> Pe
     change = np.diff(padded, axis=1)
     beams, starts = np.nonzero(change > 0)
     lengths = np.nonzero(change < 0)[1] - starts
-    counts = np.ceil(lengths / max(spacing, 1.0)).astype(np.int64)
+    spacing = max(spacing, 1.0)
+    counts = np.ceil(lengths / spacing - _ROUNDING).astype(np.int64)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    bins = np.repeat(starts, counts) + np.floor(within * max(spacing, 1.0))
+    bins = np.repeat(starts, counts) + np.floor(within * spacing + _ROUNDING)
     beams = np.repeat(beams, counts)
     return Peaks(beams, bins, image[beams, bins.astype(np.int64)])
