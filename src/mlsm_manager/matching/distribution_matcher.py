@@ -14,13 +14,15 @@ from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES, Plan
 from mlsm_manager.matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.scan import Scan
 from mlsm_manager.matching.score_field import ScoreField
-from mlsm_manager.matching.significance import significance
+from mlsm_manager.matching.significance import heard_share, lead_along, significance
 
 _WINDOW_DEVIATIONS = 3.0
 _OBJECTION_SHARE = 0.01
 _MOST_RATES = 9
 _LEAST_VARIANCE = 1e-12
 _FIELD_CELLS = 2.0
+_DECIDED_BY_POINTS = 0.7
+_PLAUSIBLE_DEVIATIONS = 4.0
 
 
 class DistributionMatcher:
@@ -39,7 +41,7 @@ class DistributionMatcher:
             reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
             return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
         fits, refiner = self._fits(scan, motion, target, state)
-        status, reason = self._judge(fits, refiner, state)
+        status, reason = self._judge(fits, refiner, state, target)
         return _result(status, reason, motion, fits[0], start)
 
     def _fits(self, scan: Scan, motion: PlanarMotion, target: Blocks, state: PriorState) -> Tuple[List[Fit], Refiner]:
@@ -54,7 +56,8 @@ class DistributionMatcher:
         )
         refiner = Refiner(motion, weights, LocalDistributions(target), state)
         fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
-        return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain)), refiner
+        inflation = max(fits, key=lambda fit: fit.support).inflation
+        return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
 
     def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
         deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))
@@ -67,7 +70,7 @@ class DistributionMatcher:
             yaw_rates=np.arange(-rates, rates + 1) * step,
         )
 
-    def _judge(self, fits: List[Fit], refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
+    def _judge(self, fits: List[Fit], refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
         parameters, best = self.parameters, fits[0]
         if not best.converged:
             return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
@@ -80,21 +83,42 @@ class DistributionMatcher:
         jump = float(np.sqrt(2.0 * state.objection(best.theta)))
         if jump > parameters.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
-        return self._judge_certainty(fits)
+        agreement = self._agreement(best, refiner, target)
+        if agreement < parameters.min_agreement:
+            return MatchStatus.DIVERGED, f"scan and map agree by {agreement:.2f} only, another place perhaps"
+        return self._judge_certainty(fits, refiner, state)
 
-    def _judge_certainty(self, fits: List[Fit]) -> Tuple[MatchStatus, str]:
+    def _judge_certainty(self, fits: List[Fit], refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
         parameters, best = self.parameters, fits[0]
-        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
+        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
+        position = float(np.sqrt(values[-1]))
         if position > parameters.max_position_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
         yaw = float(np.sqrt(best.covariance[2, 2]))
         if yaw > parameters.max_yaw_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
         for other in fits[1:]:
-            lead = best.gain - other.gain
+            lead = best.gain(best.inflation) - other.gain(best.inflation)
             if separation(best.theta, other.theta) >= 0.5 and lead < parameters.min_gain_over_second:
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
+        return _judge_direction(best, vectors[:, -1], refiner, state)
+
+    def _agreement(self, fit: Fit, refiner: Refiner, target: Blocks) -> float:
+        """Return the mean of the share of the scan that is on the map and the share of the map that is heard."""
+        heard = heard_share(refiner.world(fit.theta), fit.theta[:2], target.mean[:, :2])
+        return (float(fit.inliers.mean()) + heard) / 2.0
+
+
+def _judge_direction(best: Fit, direction: np.ndarray, refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
+    """Refuse a fit that the points, not the prior, hold in its worst direction, but not better than beside it."""
+    prior = float(np.sqrt(direction @ np.linalg.inv(state.information)[:2, :2] @ direction))
+    after = float(np.sqrt(direction @ best.covariance[:2, :2] @ direction))
+    if after > _DECIDED_BY_POINTS * prior:
         return MatchStatus.CONVERGED, ""
+    lead = lead_along(refiner.matched, best.theta, direction, _PLAUSIBLE_DEVIATIONS * prior)
+    if lead <= 0:
+        return MatchStatus.AMBIGUOUS, f"beside it, in the worst direction, {-lead} points more lie on the map"
+    return MatchStatus.CONVERGED, ""
 
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:
@@ -129,5 +153,5 @@ def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, st
 
 def _unmatched(status: MatchStatus, reason: str, motion: PlanarMotion, state: PriorState, start: float) -> MatchResult:
     nothing = np.empty(0)
-    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, nothing.astype(bool), nothing, 0, False)
+    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, 1.0, 0.0, nothing.astype(bool), nothing, 0, False)
     return _result(status, reason, motion, fit, start)

@@ -36,18 +36,37 @@ class PriorState:
 class Fit:
     """Where Gauss-Newton ended.
 
-    theta: (8,). covariance: (8, 8), prior included. gain: by how many nats the points prefer this place to one where
-    they meet nothing, less the prior's objection. inliers: (n,) bool, points that lie on a surface of the map.
-    distances: (n,) m from the nearest block. converged: whether the last step was small.
+    theta: (8,). covariance: (8, 8), prior included. support: by how many nats the points, taken as independent, prefer
+    this place to one where they meet nothing; `inflation` of them are worth one. objection: nats by which the prior
+    argues against it. inliers: (n,) bool, points that lie on a surface of the map. distances: (n,) m from the nearest
+    block. converged: whether the last step was small.
     """
 
     theta: np.ndarray
     covariance: np.ndarray
-    gain: float
+    support: float
+    inflation: float
+    objection: float
     inliers: np.ndarray
     distances: np.ndarray
     iterations: int
     converged: bool
+
+    def gain(self, inflation: float) -> float:
+        """Return the nats for this place; fits are compared with one `inflation` for all of them."""
+        return self.support / inflation - self.objection
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """How the points meet the map: places (n, 2), metric (n, 2, 2), residuals and what each point is worth."""
+
+    world: np.ndarray
+    nearest: np.ndarray
+    distances: np.ndarray
+    metric: np.ndarray
+    residual: np.ndarray
+    squared: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -100,28 +119,36 @@ class Refiner:
 
     def matched(self, theta: np.ndarray) -> np.ndarray:
         """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
-        return self._on_surface(self._normal(theta, SCALES[-1]))
+        meeting = self._meeting(self._motion.path(theta))
+        return (meeting.squared < INLIER**2) & (meeting.distances < _GATE * SCALES[-1])
+
+    def world(self, theta: np.ndarray) -> np.ndarray:
+        """Return the points (n, 2) in map when the state is `theta`."""
+        return self._motion.points(self._motion.path(theta))
 
     def _step(self, theta: np.ndarray, normal: _Normal, information: np.ndarray, inflation: float) -> np.ndarray:
         objection = self._prior.information @ (theta - self._prior.mean)
         return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
 
-    def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
-        path = self._motion.path(theta)
+    def _meeting(self, path: np.ndarray) -> _Meeting:
         world = self._motion.points(path)
         distances, nearest = self._target.nearest(world)
         residual = world - self._target.mean[nearest]
         metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(path))
-        weighted = np.einsum("nab,nb->na", metric, residual)
-        squared = np.einsum("na,na->n", residual, weighted)
-        importance = self._point_weights * self._target.weight[nearest] * self._map_share(nearest)
-        importance = importance * (distances < _GATE * scale)
-        weights = importance * geman_mcclure(squared, scale)
+        squared = np.einsum("na,nab,nb->n", residual, metric, residual)
+        return _Meeting(world, nearest, distances, metric, residual, squared)
+
+    def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
+        path = self._motion.path(theta)
+        meeting = self._meeting(path)
+        importance = self._point_weights * self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
+        importance = importance * (meeting.distances < _GATE * scale)
+        weights = importance * geman_mcclure(meeting.squared, scale)
         jacobian = self._motion.point_jacobian(path, theta)
-        lever = (metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
+        lever = (meeting.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
         information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
-        gradient = np.einsum("nas,na->ns", lever, residual)
-        return _Normal(information, gradient, world, squared, importance, distances)
+        gradient = np.einsum("nas,na->ns", lever, meeting.residual)
+        return _Normal(information, gradient, meeting.world, meeting.squared, importance, meeting.distances)
 
     def _map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return (n,) the share of the points' information that is left after the map's own noise.
@@ -150,8 +177,11 @@ class Refiner:
         inflation = self._design_effect(normal)
         covariance = np.linalg.inv(normal.information / inflation + self._prior.information)
         saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(normal.squared, SCALES[-1])
-        gain = float((normal.importance * saved).sum()) / inflation - self._prior.objection(theta)
-        return Fit(theta, covariance, gain, self._on_surface(normal), normal.distances, iterations, converged)
+        support = float((normal.importance * saved).sum())
+        return Fit(
+            theta, covariance, support, inflation, self._prior.objection(theta), self._on_surface(normal),
+            normal.distances, iterations, converged,
+        )  # fmt: skip
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:

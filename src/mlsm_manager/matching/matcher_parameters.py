@@ -16,7 +16,7 @@ class DistributionMatcherParameters(ParameterSet):
         0.384, "how far from the expected heading a scan is searched, at most", unit="rad", low=0.0, high=3.1416
     )
     search_cell: float = parameter(0.5, "step of the search", unit="m", low=0.05, high=10.0)
-    candidates: int = parameter(4, "places that the search hands to the refinement", low=1, high=100)
+    candidates: int = parameter(6, "places that the search hands to the refinement", low=1, high=100)
     beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
     min_points: int = parameter(15, "a scan with fewer points on the map tells nothing", low=3, high=10000)
     max_position_deviation: float = parameter(
@@ -32,6 +32,10 @@ class DistributionMatcherParameters(ParameterSet):
     min_significance: float = parameter(
         5.0, "standard deviations by which the matched share must beat what any place would give", low=0.0, high=100.0
     )
+    min_agreement: float = parameter(
+        0.75, "mean of the share of the scan that lies on the map and the share of the map in reach that is heard",
+        low=0.0, high=1.0,
+    )  # fmt: skip
     max_jump: float = parameter(
         4.0, "a pose farther than this from the expected one, in the prior's standard deviations, is rejected",
         low=1.0, high=100.0,
