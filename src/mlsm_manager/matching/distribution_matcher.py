@@ -21,8 +21,6 @@ _OBJECTION_SHARE = 0.01
 _MOST_RATES = 9
 _LEAST_VARIANCE = 1e-12
 _FIELD_CELLS = 2.0
-_DECIDED_BY_POINTS = 0.7
-_PLAUSIBLE_DEVIATIONS = 4.0
 
 
 class DistributionMatcher:
@@ -86,9 +84,9 @@ class DistributionMatcher:
         agreement = self._agreement(best, refiner, target)
         if agreement < parameters.min_agreement:
             return MatchStatus.DIVERGED, f"scan and map agree by {agreement:.2f} only, another place perhaps"
-        return self._judge_certainty(fits, refiner, state)
+        return self._judge_certainty(fits, refiner)
 
-    def _judge_certainty(self, fits: List[Fit], refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
+    def _judge_certainty(self, fits: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
         parameters, best = self.parameters, fits[0]
         values, vectors = np.linalg.eigh(best.covariance[:2, :2])
         position = float(np.sqrt(values[-1]))
@@ -101,24 +99,15 @@ class DistributionMatcher:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if separation(best.theta, other.theta) >= 0.5 and lead < parameters.min_gain_over_second:
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
-        return _judge_direction(best, vectors[:, -1], refiner, state)
+        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, vectors[:, -1])
+        if lead < parameters.min_gain_over_second:
+            return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
+        return MatchStatus.CONVERGED, ""
 
     def _agreement(self, fit: Fit, refiner: Refiner, target: Blocks) -> float:
         """Return the mean of the share of the scan that is on the map and the share of the map that is heard."""
         heard = heard_share(refiner.world(fit.theta), fit.theta[:2], target.mean[:, :2])
         return (float(fit.inliers.mean()) + heard) / 2.0
-
-
-def _judge_direction(best: Fit, direction: np.ndarray, refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
-    """Refuse a fit that the points, not the prior, hold in its worst direction, but not better than beside it."""
-    prior = float(np.sqrt(direction @ np.linalg.inv(state.information)[:2, :2] @ direction))
-    after = float(np.sqrt(direction @ best.covariance[:2, :2] @ direction))
-    if after > _DECIDED_BY_POINTS * prior:
-        return MatchStatus.CONVERGED, ""
-    lead = lead_along(refiner.matched, best.theta, direction, _PLAUSIBLE_DEVIATIONS * prior)
-    if lead <= 0:
-        return MatchStatus.AMBIGUOUS, f"beside it, in the worst direction, {-lead} points more lie on the map"
-    return MatchStatus.CONVERGED, ""
 
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:

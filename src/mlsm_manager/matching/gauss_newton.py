@@ -122,6 +122,12 @@ class Refiner:
         meeting = self._meeting(self._motion.path(theta))
         return (meeting.squared < INLIER**2) & (meeting.distances < _GATE * SCALES[-1])
 
+    def gain(self, theta: np.ndarray, inflation: float) -> float:
+        """Return what `Fit.gain` would be if a fit ended at `theta`."""
+        meeting = self._meeting(self._motion.path(theta))
+        importance = self._importance(meeting, SCALES[-1])
+        return _support(importance, meeting.squared) / inflation - self._prior.objection(theta)
+
     def world(self, theta: np.ndarray) -> np.ndarray:
         """Return the points (n, 2) in map when the state is `theta`."""
         return self._motion.points(self._motion.path(theta))
@@ -141,14 +147,17 @@ class Refiner:
     def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
         path = self._motion.path(theta)
         meeting = self._meeting(path)
-        importance = self._point_weights * self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
-        importance = importance * (meeting.distances < _GATE * scale)
+        importance = self._importance(meeting, scale)
         weights = importance * geman_mcclure(meeting.squared, scale)
         jacobian = self._motion.point_jacobian(path, theta)
         lever = (meeting.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
         information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
         gradient = np.einsum("nas,na->ns", lever, meeting.residual)
         return _Normal(information, gradient, meeting.world, meeting.squared, importance, meeting.distances)
+
+    def _importance(self, meeting: _Meeting, scale: float) -> np.ndarray:
+        share = self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
+        return self._point_weights * share * (meeting.distances < _GATE * scale)
 
     def _map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return (n,) the share of the points' information that is left after the map's own noise.
@@ -176,12 +185,16 @@ class Refiner:
         normal = self._normal(theta, SCALES[-1])
         inflation = self._design_effect(normal)
         covariance = np.linalg.inv(normal.information / inflation + self._prior.information)
-        saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(normal.squared, SCALES[-1])
-        support = float((normal.importance * saved).sum())
+        support = _support(normal.importance, normal.squared)
         return Fit(
             theta, covariance, support, inflation, self._prior.objection(theta), self._on_surface(normal),
             normal.distances, iterations, converged,
         )  # fmt: skip
+
+
+def _support(importance: np.ndarray, squared: np.ndarray) -> float:
+    saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(squared, SCALES[-1])
+    return float((importance * saved).sum())
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:

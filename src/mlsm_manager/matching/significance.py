@@ -37,18 +37,15 @@ def significance(matched: Matched, theta: np.ndarray, seed: int = 0) -> float:
     return float((matched(theta).mean() - shares.mean()) / max(shares.std(), _LEAST_DEVIATION))
 
 
-def lead_along(matched: Matched, theta: np.ndarray, direction: np.ndarray, reach: float) -> int:
-    """Return how many more points lie on the map at `theta` (8,) than at the best place beside it.
+def lead_along(gain: Callable[[np.ndarray], float], theta: np.ndarray, direction: np.ndarray) -> float:
+    """Return by how much the gain at `theta` (8,) beats that of the best place beside it.
 
-    Those places lie 1.5 m to `reach` (10 m at most) away, to both sides along `direction` (2,), a unit vector in map.
+    Those places lie 1.5 m to 10 m away, to both sides along `direction` (2,), a unit vector in map.
     """
-    shifts = np.arange(_LEAST_SHIFT, min(reach, _GREATEST_SHIFT) + _SHIFT_STEP / 2.0, _SHIFT_STEP)
-    best = 0
-    for shift in np.concatenate([-shifts, shifts]):
-        beside = np.array(theta)
-        beside[:2] += shift * direction
-        best = max(best, int(np.count_nonzero(matched(beside))))
-    return int(np.count_nonzero(matched(theta))) - best
+    shifts = np.arange(_LEAST_SHIFT, _GREATEST_SHIFT + _SHIFT_STEP / 2.0, _SHIFT_STEP)
+    beside = np.tile(theta, (2 * len(shifts), 1))
+    beside[:, :2] += np.concatenate([-shifts, shifts])[:, np.newaxis] * direction
+    return gain(theta) - max(gain(state) for state in beside)
 
 
 def heard_share(points: np.ndarray, position: np.ndarray, blocks: np.ndarray) -> float:
