@@ -61,7 +61,7 @@ def guarded(health: Health, callback: Callable[..., None]) -> Callable[..., None
         except rospy.ROSInterruptException:
             pass
         except Exception as error:
-            if rospy.is_shutdown():
+            if rospy.core.is_shutdown_requested():
                 return
             health.problem("internal errors", f"{type(error).__name__}: {error}; please report this")
             rospy.logerr_throttle(10.0, traceback.format_exc())
