@@ -7,6 +7,7 @@ from typing import Any, Mapping, Sequence, Tuple
 import numpy as np
 
 from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_simulator.motion import VehicleState
 from sonar_simulator.poses import pose_matrix
 
 # The greatest slope of the minimum-jerk law, reached half way: peak speed over mean speed.
@@ -101,6 +102,10 @@ class VehicleScript:
     def duration(self) -> float:
         """Time from the first move's start to the last one's end, s."""
         return float(self._ends[-1])
+
+    def state(self, time: float) -> VehicleState:
+        """Return the vehicle's state at `time` s, in any order of times."""
+        return VehicleState(self.pose(time), self.twist(time), self.is_still(time))
 
     def pose(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_world_base at `time` [s]; x forward, y left, z up."""
