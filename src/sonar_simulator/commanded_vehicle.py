@@ -23,7 +23,7 @@ class VehicleParameters(ParameterSet):
     heave_speed: float = parameter(0.4, "greatest speed up and down", unit="m/s", low=0.0, high=20.0)
     turn_rate_deg: float = parameter(30.0, "greatest turn rate", unit="deg/s", low=0.0, high=360.0)
     response_time: float = parameter(
-        0.6, "time constant of the speed: 80 % of a new command is reached after 3 of them", unit="s", low=0.02, high=60.0
+        0.6, "time constant of the speed; 80 % of a new command is reached after 3", unit="s", low=0.02, high=60.0
     )
     command_timeout: float = parameter(
         0.5, "the vehicle stops when no command came for so long, simulated time", unit="s", low=0.01, high=3600.0
@@ -60,7 +60,7 @@ class CommandedVehicle:
         last command stays until it times out.
         """
         if not np.isfinite(twist).all():
-            raise RefusedInput("velocity commands refused", f"{np.round(twist, 3).tolist()}: every value must be finite")
+            raise RefusedInput("velocity commands refused", f"{twist.tolist()}: every value must be finite")
         wanted = np.asarray(twist, dtype=np.float64)[[0, 1, 2, 5]]
         limits = self._parameters.limits()
         self._wanted = np.clip(wanted, -limits, limits)

@@ -12,10 +12,9 @@ from tf2_msgs.msg import TFMessage
 
 from sonar_processing.transforms import pose_from_matrix
 from sonar_simulator.simulation import Moment, Ping
+from sonar_simulator.simulation_setup import BASE_FRAME, SONAR_FRAME
 from underwater_map_construction.msg import SonarScanLine
 
-SONAR_FRAME = "sonar"
-BASE_FRAME = "base_link"
 ODOM_FRAME = "odom"
 WORLD_FRAME = "map"
 SERVO_JOINT = "sonar_servo_joint"
@@ -23,7 +22,7 @@ SERVO_JOINT = "sonar_servo_joint"
 TOPICS = {
     "/tf": TFMessage,
     "joint_states": JointState,
-    "cmd_vel": Twist,
+    "velocity": Twist,
     "odom": Odometry,
     "ground_truth": Odometry,
     "sonar/raw": SonarScanLine,
@@ -33,14 +32,14 @@ TOPICS = {
 
 def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List[Tuple[str, Message]]:
     """Return (topic, message) pairs, the transform first and the beam last; max_range [m] is the sonar's."""
-    odom_pose = pose_from_matrix(moment.T_odom_base)
-    twist = _twist(moment.twist)
+    odom_pose, velocity = pose_from_matrix(moment.odometry.T_odom_base), _twist(moment.odometry.twist)
+    true_pose, true_velocity = pose_from_matrix(moment.truth.T_world_base), _twist(moment.truth.twist)
     messages = [
         ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
         ("joint_states", joint_state(moment.tilt, stamp)),
-        ("cmd_vel", twist),
-        ("odom", _odometry(odom_pose, twist, stamp, ODOM_FRAME)),
-        ("ground_truth", _odometry(pose_from_matrix(moment.T_world_base), Twist(), stamp, WORLD_FRAME)),
+        ("velocity", velocity),
+        ("odom", _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
+        ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
     ]
     if moment.ping is not None:
         messages.append(("sonar/raw", _beam(moment.ping, moment.tilt, stamp, max_range)))

@@ -4,23 +4,28 @@ import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
 
-from sonar_simulator.simulation import Moment
+from sonar_simulator.simulation import Drive, Moment
 from sonar_simulator.simulator_messages import TOPICS, joint_state, moment_messages
 
 _QUEUE_SIZE = 100
+_VELOCITY = "velocity"
+_COMMANDS = "cmd_vel"
 
 
 class SimulatorPublisher:
-    """The simulator's topics. Its world is the frame `map`, which the odometry's error moves away from `odom`."""
+    """The simulator's topics. Its world is the frame `map`, which the odometry's error moves away from `odom`.
 
-    def __init__(self, max_range: float) -> None:
+    A vehicle that follows a script gets its commands from nobody: then the velocity is on cmd_vel as well, where the
+    rest of the graph expects it.
+    """
+
+    def __init__(self, max_range: float, drive: Drive) -> None:
+        """`max_range`: of the sonar, m."""
         self._max_range = max_range
         self._clock = rospy.Publisher("/clock", Clock, queue_size=_QUEUE_SIZE)
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
-        self._publishers = {
-            topic: rospy.Publisher(topic, kind, queue_size=_QUEUE_SIZE, tcp_nodelay=True)
-            for topic, kind in TOPICS.items()
-        }
+        self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS.items()}
+        self._commands = _publisher(_COMMANDS, TOPICS[_VELOCITY]) if drive is Drive.SCRIPT else None
 
     @property
     def has_listener(self) -> bool:
@@ -45,3 +50,9 @@ class SimulatorPublisher:
         self.publish_clock(stamp)
         for topic, message in moment_messages(moment, stamp, self._max_range):
             self._publishers[topic].publish(message)
+            if topic == _VELOCITY and self._commands is not None:
+                self._commands.publish(message)
+
+
+def _publisher(topic: str, kind: type) -> rospy.Publisher:
+    return rospy.Publisher(topic, kind, queue_size=_QUEUE_SIZE, tcp_nodelay=True)
