@@ -4,7 +4,7 @@ from typing import Dict, Type
 
 from node_support.parameter_text import yaml_keys
 from node_support.parameters import ParameterSet
-from sonar_simulator.laser_cone import LaserConeParameters
+from sonar_simulator.echo_model import ECHO_MODELS
 from sonar_simulator.odometry import OdometryParameters
 from sonar_simulator.simulation import SimulatorParameters
 from sonar_simulator.sonar_head import SonarParameters
@@ -12,7 +12,7 @@ from sonar_simulator.sonar_head import SonarParameters
 GROUPS: Dict[str, Type[ParameterSet]] = {
     "sonar": SonarParameters,
     "odometry": OdometryParameters,
-    "echo": LaserConeParameters,
+    **{name: kind.parameters for name, kind in ECHO_MODELS.items()},
 }
 
 

@@ -44,7 +44,7 @@ class Simulator:
         self._parameters = SimulatorParameters.from_mapping(values)
         self._sonar_parameters = SonarParameters.from_mapping(groups["sonar"])
         self._odometry_parameters = OdometryParameters.from_mapping(groups["odometry"])
-        model = make_echo_model(self._parameters.echo_model, groups["echo"])
+        model = make_echo_model(self._parameters.echo_model, groups.get(self._parameters.echo_model, {}))
         rng = np.random.default_rng(self._parameters.seed)
         self._script = _loaded(load_script, self._parameters.script)
         self._sonar = Sonar(RayCaster(self._load_world()), self._sonar_parameters.pattern(), model, rng)
