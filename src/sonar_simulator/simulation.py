@@ -19,9 +19,7 @@ class SimulatorParameters(ParameterSet):
     script: str = parameter(
         "yaml/basin_tour.yaml", "moves of the vehicle; relative to the package's folder", tunable=False
     )
-    echo_model: str = parameter(
-        "laser_cone", "how contacts of rays become echoes: one of the groups below", tunable=False
-    )
+    echo_model: str = parameter("laser_cone", "how ray distances become echoes", tunable=False)
     seed: int = parameter(1, "of all random numbers: same seed, same beams", low=0, high=2**31 - 1, tunable=False)
     real_time_factor: float = parameter(
         1.0, "simulated seconds per second of wall time", low=0.01, high=1000.0, tunable=False
