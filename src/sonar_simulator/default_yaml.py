@@ -1,7 +1,6 @@
 """The text of yaml/sonar_simulator_default.yaml: the simulator's own keys and one group for each of its parts."""
 
 from node_support.parameter_text import yaml_keys
-from sonar_simulator.laser_cone import LaserConeParameters
 from sonar_simulator.simulation import SimulatorParameters
 from sonar_simulator.simulation_setup import GROUPS
 
@@ -9,7 +8,7 @@ from sonar_simulator.simulation_setup import GROUPS
 def simulator_yaml() -> str:
     """Return the commented defaults of the simulator, all read at start-up only."""
     lines = ["# Defaults of sonar_simulator, read when it starts.", *yaml_keys(SimulatorParameters, live=False)]
-    for name, parameters in {**GROUPS, "echo": LaserConeParameters}.items():
+    for name, parameters in GROUPS.items():
         lines += ["", f"{name}:"]
         lines += [f"  {line}" if line else "" for line in yaml_keys(parameters, live=False)[1:]]
     return "\n".join(lines) + "\n"

@@ -2,13 +2,13 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Mapping, Union
+from typing import Any, Callable, Dict, Mapping, Type
 
 import numpy as np
 
 from node_support.parameters import ParameterError, ParameterSet
 from sonar_simulator.commanded_vehicle import CommandedVehicle, VehicleParameters
-from sonar_simulator.echo_model import make_echo_model
+from sonar_simulator.echo_model import ECHO_MODELS, make_echo_model
 from sonar_simulator.odometry import Odometry, OdometryParameters
 from sonar_simulator.ray_caster import RayCaster
 from sonar_simulator.robot_description import DescriptionError, RobotDescription
@@ -23,33 +23,38 @@ from sonar_simulator.world import World
 BASE_FRAME = "base_link"
 SONAR_FRAME = "sonar"
 
-GROUPS: Dict[str, type] = {
+GROUPS: Dict[str, Type[ParameterSet]] = {
     "sonar": SonarParameters,
     "servo": ServoParameters,
     "vehicle": VehicleParameters,
     "odometry": OdometryParameters,
+    **{name: kind.parameters for name, kind in ECHO_MODELS.items()},
 }
-"""The parameters that come in groups; the group `echo` belongs to the echo model that is chosen."""
+"""The parameters that come in groups; of the echo models' groups the one that `echo_model` names is used."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """All parameters of a simulation, validated; those of the echo model are judged when it is made."""
+    """All parameters of a simulation, validated; `echo` are those of the echo model that is used."""
 
     simulator: SimulatorParameters
     sonar: SonarParameters
     servo: ServoParameters
     vehicle: VehicleParameters
     odometry: OdometryParameters
-    echo: Mapping[str, Any]
+    echo: ParameterSet
 
     @classmethod
     def from_mapping(cls, values: Mapping[str, Any]) -> "Settings":
         """Build from the simulator's own keys and one mapping for each group; raises ParameterError."""
         own = dict(values)
-        echo = _mapping("echo", own.pop("echo", {}))
         groups = {name: _group(kind, name, own.pop(name, {})) for name, kind in GROUPS.items()}
-        return cls(simulator=SimulatorParameters.from_mapping(own), echo=echo, **groups)
+        simulator = SimulatorParameters.from_mapping(own)
+        if simulator.echo_model not in ECHO_MODELS:
+            raise ParameterError(f"echo_model = {simulator.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
+        echo = groups[simulator.echo_model]
+        parts = {name: group for name, group in groups.items() if name not in ECHO_MODELS}
+        return cls(simulator=simulator, echo=echo, **parts)
 
 
 @dataclass(frozen=True)
@@ -70,7 +75,7 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
     `warn` receives what the world could not give. Raises ParameterError.
     """
     parameters = settings.simulator
-    model = _blaming("echo", lambda: make_echo_model(parameters.echo_model, settings.echo))
+    model = make_echo_model(parameters.echo_model, settings.echo.to_mapping())
     script = _loaded(lambda: load_script(folder / Path(parameters.script).expanduser()))
     T_base_sonar = _loaded(lambda: robot.mount(BASE_FRAME, SONAR_FRAME))
     world = _loaded(lambda: _load_world(folder / Path(parameters.world).expanduser(), warn))
@@ -106,18 +111,10 @@ def _loaded(load: Callable[[], Any]) -> Any:
         raise ParameterError(str(error)) from error
 
 
-def _group(kind: type, name: str, values: Any) -> ParameterSet:
-    return _blaming(name, lambda: kind.from_mapping(_mapping(name, values)))
-
-
-def _blaming(group: str, make: Callable[[], Any]) -> Any:
-    try:
-        return make()
-    except ParameterError as error:
-        raise ParameterError(f"{group}: {error}") from error
-
-
-def _mapping(name: str, values: Union[Mapping[str, Any], Any]) -> Mapping[str, Any]:
+def _group(kind: Type[ParameterSet], name: str, values: Any) -> ParameterSet:
     if not isinstance(values, Mapping):
         raise ParameterError(f"{name} = {values!r}: must be keys and values")
-    return values
+    try:
+        return kind.from_mapping(values)
+    except ParameterError as error:
+        raise ParameterError(f"{name}: {error}") from error
