@@ -2,6 +2,7 @@
 
 import xml.etree.ElementTree as ET
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Dict, List, Tuple
 
 import numpy as np
@@ -36,6 +37,14 @@ class RobotDescription:
         for element in root.findall("joint"):
             joint = _joint(element)
             self._joints[joint.child] = joint
+
+    @classmethod
+    def from_file(cls, path: Path) -> "RobotDescription":
+        """Read a URDF file; raises DescriptionError."""
+        try:
+            return cls(path.read_text(encoding="utf-8"))
+        except (OSError, UnicodeDecodeError) as error:
+            raise DescriptionError(f"{path}: {getattr(error, 'strerror', None) or 'not a text'}") from error
 
     @property
     def fixed_joints(self) -> List[Joint]:

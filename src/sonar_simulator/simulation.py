@@ -55,14 +55,15 @@ class Ping:
 class Moment:
     """All there is to know at one time [s since the start].
 
-    tilt: angle of the sonar's servo, rad. head_angle: where the head looks, rad, if it sends a beam now; `ping` is that
-    beam once it was heard.
+    tilt: angle of the sonar's servo, rad. is_tick: whether it is a moment of the steady rate. head_angle: where the
+    head looks, rad, if it sends a beam now; `ping` is that beam once it was heard.
     """
 
     time: float
     truth: VehicleState
     odometry: Estimate
     tilt: float
+    is_tick: bool = True
     head_angle: Optional[float] = None
     ping: Optional[Ping] = None
 
@@ -106,11 +107,11 @@ class Simulation:
                 waiting, beams = [], 0
         yield from self._heard(waiting)
 
-    def moment(self, time: float, head_angle: Optional[float] = None) -> Moment:
+    def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
         """Return the state at `time`, not before that of the last call, with a beam still to be heard."""
         self._command_tilt(time)
         truth = self._motion.state(time)
-        return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), head_angle)
+        return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), is_tick, head_angle)
 
     def _unheard(self, tick_rate: float) -> Iterator[Moment]:
         tick, beam = 0, 0
@@ -119,9 +120,10 @@ class Simulation:
             if min(tick_time, beam_time) > self.duration:
                 return
             if beam_time <= tick_time:
-                yield self.moment(beam_time, self._head.angle(beam))
+                both = beam_time == tick_time
+                yield self.moment(beam_time, both, self._head.angle(beam))
                 beam += 1
-                tick += int(beam_time == tick_time)
+                tick += int(both)
             else:
                 yield self.moment(tick_time)
                 tick += 1

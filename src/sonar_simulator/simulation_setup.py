@@ -20,6 +20,7 @@ from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle import ScriptError
 from sonar_simulator.world import World
 
+PACKAGE = "underwater_map_construction"
 BASE_FRAME = "base_link"
 SONAR_FRAME = "sonar"
 
@@ -55,6 +56,12 @@ class Settings:
         echo = groups[simulator.echo_model]
         parts = {name: group for name, group in groups.items() if name not in ECHO_MODELS}
         return cls(simulator=simulator, echo=echo, **parts)
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return plain values, as `from_mapping` takes them; of the echo models the one that is used."""
+        groups = {name: getattr(self, name) for name in GROUPS if name not in ECHO_MODELS}
+        groups[self.simulator.echo_model] = self.echo
+        return {**self.simulator.to_mapping(), **{name: group.to_mapping() for name, group in groups.items()}}
 
 
 @dataclass(frozen=True)

@@ -31,16 +31,24 @@ TOPICS = {
 
 
 def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List[Tuple[str, Message]]:
-    """Return (topic, message) pairs, the transform first and the beam last; max_range [m] is the sonar's."""
-    odom_pose, velocity = pose_from_matrix(moment.odometry.T_odom_base), _twist(moment.odometry.twist)
-    true_pose, true_velocity = pose_from_matrix(moment.truth.T_world_base), _twist(moment.truth.twist)
+    """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
+
+    Transform and joint come with every moment, so that a beam can be placed at its own stamp; the rest comes with
+    ticks only, at the steady rate of an instrument.
+    """
+    odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
     messages = [
         ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
         ("joint_states", joint_state(moment.tilt, stamp)),
-        ("velocity", velocity),
-        ("odom", _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
-        ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
     ]
+    if moment.is_tick:
+        velocity, true_velocity = _twist(moment.odometry.twist), _twist(moment.truth.twist)
+        true_pose = pose_from_matrix(moment.truth.T_world_base)
+        messages += [
+            ("velocity", velocity),
+            ("odom", _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
+            ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
+        ]
     if moment.ping is not None:
         messages.append(("sonar/raw", _beam(moment.ping, moment.tilt, stamp, max_range)))
     return messages

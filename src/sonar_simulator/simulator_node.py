@@ -17,10 +17,9 @@ from node_support.parameters import ParameterError
 from sonar_simulator.pace import Pace
 from sonar_simulator.robot_description import DescriptionError, RobotDescription
 from sonar_simulator.simulation import Drive, Moment
-from sonar_simulator.simulation_setup import Settings, make_setup
+from sonar_simulator.simulation_setup import PACKAGE, Settings, make_setup
 from sonar_simulator.simulator_publisher import SimulatorPublisher
 
-PACKAGE = "underwater_map_construction"
 START_TIME = 1000.0
 _WAIT_STEP = 0.05
 

@@ -25,7 +25,9 @@ ROS_SIDE = {
         "cloud_publisher", "conversions", "host", "nodes", "sonar_to_cloud", "stage_runner", "transform_filter",
         "transforms",
     },
-    "sonar_simulator": {"nodes", "simulator_messages", "simulator_node", "simulator_publisher"},
+    "sonar_simulator": {
+        "bag_tool", "bag_writer", "nodes", "simulator_messages", "simulator_node", "simulator_publisher",
+    },
 }  # fmt: skip
 IMPORT_WITHOUT_ROS = """
 import importlib, sys
