@@ -48,4 +48,5 @@ class Collision(ContactEcho):
         all_beams = np.concatenate([beam, np.repeat(beam, self.parameters.increments)])
         counts = self.counts(len(ranges), all_beams, np.concatenate([met, added]))
         fullest = np.maximum(counts.max(axis=1, keepdims=True), 1)
-        return (self.parameters.saturation * counts // fullest).astype(np.uint8)
+        # Rounded up: a single contact is heard beside any number of others.
+        return (-(-self.parameters.saturation * counts // fullest)).astype(np.uint8)

@@ -10,6 +10,7 @@ from sonar_simulator.collision import Collision, CollisionParameters
 from sonar_simulator.contacts import Contacts
 from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.mirrors import Mirrors
+from sonar_simulator.physical import Physical, PhysicalParameters
 
 
 class EchoModel(Protocol):
@@ -36,6 +37,7 @@ class EchoModelKind(NamedTuple):
 ECHO_MODELS: Dict[str, EchoModelKind] = {
     "laser_cone": EchoModelKind(LaserConeParameters, LaserCone),
     "collision": EchoModelKind(CollisionParameters, Collision),
+    "physical": EchoModelKind(PhysicalParameters, Physical),
 }
 
 

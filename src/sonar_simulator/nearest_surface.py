@@ -9,11 +9,12 @@ from typing import Tuple
 
 import numpy as np
 
+from sonar_simulator.triangle_groups import TriangleGroups
 from sonar_simulator.world import World
 
 # A segment cut to nothing by rounding alone still counts: m.
 _TOLERANCE = 1e-9
-# Bounding spheres are compared in float32.
+# Planes of triangles that are no farther than this beyond the limit still count: m.
 _MARGIN = 1e-3
 _NEXT_CORNER = np.array([1, 2, 0])
 
@@ -26,12 +27,7 @@ class NearestSurface:
         normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
         self._faces = np.flatnonzero(np.einsum("ij,ij->i", normals, normals) > 0.0)
         self._corners = corners[self._faces]
-        centres = (self._corners.min(axis=1) + self._corners.max(axis=1)) / 2.0
-        radii = np.linalg.norm(self._corners - centres[:, np.newaxis], axis=2).max(axis=1, initial=0.0)
-        self._middle = centres.mean(axis=0) if len(centres) else np.zeros(3)
-        self._centres = (centres - self._middle).astype(np.float32)
-        self._radii = (radii + _MARGIN).astype(np.float32)
-        self._squares = np.einsum("ij,ij->i", self._centres, self._centres)
+        self._groups = TriangleGroups(self._corners)
 
     def find(
         self, origins: np.ndarray, rotations: np.ndarray, planes: np.ndarray, limits: np.ndarray
@@ -41,7 +37,8 @@ class NearestSurface:
         origins: (n, 3) where the beams start, world frame, m. rotations: (n, 3, 3) R_world_beam.
         planes: (k, 3) inward unit normals of the beam's sides, beam frame. limits: (n,) m, look no farther.
         """
-        beam, face = self._candidates(origins, rotations, planes, limits)
+        sides = planes[:: max(1, len(planes) // 4)]
+        beam, face = self._groups.reached(origins, np.einsum("nij,kj->kni", rotations, sides), limits)
         triangles = (self._corners[face] - origins[beam, np.newaxis]) @ rotations[beam]
         beam, face, triangles = _inside(beam, face, triangles, planes, limits)
         points = _nearest_points(triangles, planes)
@@ -54,21 +51,6 @@ class NearestSurface:
         result[chosen] = points[order[first]]
         faces[chosen] = self._faces[face[order[first]]]
         return result, faces
-
-    def _candidates(
-        self, origins: np.ndarray, rotations: np.ndarray, planes: np.ndarray, limits: np.ndarray
-    ) -> Tuple[np.ndarray, np.ndarray]:
-        """Return (beam, face) pairs whose bounding sphere reaches into the beam; four of its planes decide."""
-        origins = (origins - self._middle).astype(np.float32)
-        reach = np.minimum(limits, 1e15).astype(np.float32)[:, np.newaxis] + self._radii
-        squares = np.einsum("ij,ij->i", origins, origins)
-        distances = self._squares + squares[:, np.newaxis] - 2.0 * (origins @ self._centres.T)
-        near = distances <= reach * reach * (1.0 + _MARGIN) + _MARGIN
-        for plane in planes[:: max(1, len(planes) // 4)]:
-            normals = (rotations @ plane).astype(np.float32)
-            offsets = np.einsum("ij,ij->i", normals, origins)
-            near &= normals @ self._centres.T >= offsets[:, np.newaxis] - self._radii
-        return np.nonzero(near)
 
 
 def _inside(

@@ -5,10 +5,10 @@ from functools import cached_property
 from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
-from scipy.spatial import ConvexHull
+from scipy.spatial import ConvexHull, QhullError
 
 from sonar_simulator import primitives
-from sonar_simulator.materials import DEFAULT_MATERIAL, Material
+from sonar_simulator.materials import DEFAULT_MATERIAL, Colour, Material
 
 # A shape this many times wider than high, both ways, is ground: it has no outline to draw among walls.
 _GROUND_RATIO = 10.0
@@ -24,6 +24,7 @@ class Shape:
     pose: (4, 4) T_world_shape; a primitive is centred on its own origin.
     material: what its surface is of.
     mesh: of a "mesh", its vertices (n, 3) in m before scaling and faces (m, 3).
+    colour: for pictures, red, green, blue, alpha from 0 to 1; None: as its material.
     """
 
     name: str
@@ -32,6 +33,7 @@ class Shape:
     size: Tuple[float, ...]
     material: Material = DEFAULT_MATERIAL
     mesh: Optional[primitives.Mesh] = None
+    colour: Optional[Colour] = None
 
     def triangles(self) -> primitives.Mesh:
         """Return vertices (n, 3) in the world frame, m, and faces (m, 3) as indices into them."""
@@ -97,5 +99,10 @@ def _is_ground(vertices: np.ndarray) -> bool:
 
 
 def _outline(points: np.ndarray) -> np.ndarray:
-    corners = ConvexHull(points).vertices
+    try:
+        corners = ConvexHull(points).vertices
+    except QhullError:
+        # Upright and flat: a line from above.
+        ends = points[np.argsort(points @ np.ptp(points, axis=0))[[0, -1]]]
+        return ends[[0, 1, 0]]
     return points[np.append(corners, corners[0])]
