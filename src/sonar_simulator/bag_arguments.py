@@ -30,7 +30,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
     )
     parser.add_argument("--script", help="moves of the vehicle; default: the tour of the package's world")
     parser.add_argument("--out", required=True, type=Path, help="bag to write; an existing one is replaced")
-    parser.add_argument("--parameters", type=Path, help="yaml file of the simulator's parameters")
+    parser.add_argument("--parameters", type=Path, help="yaml file of the simulator's parameters; default: the world's")
     parser.add_argument(
         "--set", action="append", default=[], metavar="KEY=VALUE", help="one parameter; group.key=value"
     )
@@ -45,7 +45,9 @@ def settings_of(options: argparse.Namespace, package: Path) -> Dict[str, Any]:
 
     `package` is the package's folder, where its worlds, tours and the parameters of the demo are.
     """
-    values = _file_values(options.parameters) if options.parameters else {}
+    own = package / "yaml" / f"sonar_simulator_{options.world}.yaml"
+    chosen = options.parameters or (own if own.is_file() else None)
+    values = _file_values(chosen) if chosen else {}
     for text in options.set:
         _set(values, text)
     shipped = package / "worlds" / f"{options.world}.sdf"

@@ -13,12 +13,13 @@ from sonar_simulator.odometry import Odometry, OdometryParameters
 from sonar_simulator.ray_caster import RayCaster
 from sonar_simulator.robot_description import DescriptionError, RobotDescription
 from sonar_simulator.script_file import load_script
-from sonar_simulator.sdf import WorldError, load_sdf
 from sonar_simulator.servo import Servo, ServoParameters
 from sonar_simulator.simulation import Drive, Simulation, SimulatorParameters
 from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle import ScriptError
 from sonar_simulator.world import World
+from sonar_simulator.world_error import WorldError
+from sonar_simulator.world_file import load_world
 
 PACKAGE = "underwater_map_construction"
 BASE_FRAME = "base_link"
@@ -105,7 +106,7 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
 
 
 def _load_world(path: Path, warn: Callable[[str], None]) -> World:
-    loaded = load_sdf(path)
+    loaded = load_world(path)
     for warning in loaded.warnings:
         warn(warning)
     return loaded.world
