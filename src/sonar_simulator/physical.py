@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from scipy.ndimage import uniform_filter1d
@@ -16,6 +17,14 @@ from sonar_simulator.mirrors import Mirrors
 _CAST_WIDTH = 1.6
 # Nothing is nearer than the transducer's own face, m.
 _NEAREST = 0.05
+_NO_TARGET = -100.0
+
+
+class Detector(Enum):
+    """What a head's strengths say."""
+
+    AMPLITUDE = "amplitude"
+    DECIBELS = "decibels"
 
 
 @dataclass(frozen=True)
@@ -53,19 +62,23 @@ class PhysicalParameters(ParameterSet):
         0.2, "the head's gain over range: absorption made good, per metre each way", unit="dB/m", low=0.0, high=2.55,
         thesis_name="absorption / 100",
     )  # fmt: skip
-    quiet_level_db: float = parameter(
-        70.0, "level that is strength 0 at gain 0, at 1 m", unit="dB", low=-100.0, high=200.0
+    detector: Detector = parameter(Detector.AMPLITUDE, "what strengths are in proportion to")
+    full_level_db: float = parameter(
+        110.0, "level at 1 m that is the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
     )
     dynamic_range_db: float = parameter(
-        40.0, "from strength 0 to the greatest strength", unit="dB", low=1.0, high=150.0
+        40.0, "from strength 0 to the greatest strength, of a detector in decibels", unit="dB", low=1.0, high=150.0
     )
     mirror_bounces: int = parameter(1, "mirrors that sound is followed off, on its way there", low=0, high=5)
     surface_mirror: bool = parameter(False, "the water's surface, z = 0, is one of the mirrors")
     surface_loss_db: float = parameter(1.0, "what its waves take away", unit="dB", low=0.0, high=60.0)
+    vehicle_target_db: float = parameter(
+        -100.0, "target strength of the vehicle itself, which sends echoes out again", unit="dB", low=-100.0, high=20.0
+    )
 
 
 class Physical:
-    """Intensities by the sonar equation, speckle and noise as complex amplitudes, strengths in dB as a head gives them.
+    """Intensities by the sonar equation, speckle and noise as complex amplitudes, strengths as a head gives them.
 
     A ray stands for a cone of water of solid angle share x beam. Its patch of surface grows with the square of the
     range, what arrives there and what comes back each fall with it: one square is left (spreading), and a target that
@@ -85,7 +98,7 @@ class Physical:
         self._kernel = _pulse_kernel(self._pulse / self._resolution)
         self._middles = (np.arange(parameters.bins) + 0.5) * self._resolution
         self._background = self._water() + self._ringing()
-        self._receiver_gain = self._tvg() + parameters.gain_db - parameters.quiet_level_db
+        self._receiver_gain = _ratio(self._tvg() + parameters.gain_db - parameters.full_level_db)
 
     def pattern(self, fan: BeamPattern) -> RayPattern:
         """Return as many rays as `fan` has over the main lobe, which is wider than its openings at 3 dB."""
@@ -100,9 +113,8 @@ class Physical:
         parts = rng.standard_normal((2, *mean.shape), dtype=np.float32)
         parts = self._as_long_as_the_pulse(parts) * np.sqrt(random / 2.0)
         parts[0] += np.sqrt(mean * (1.0 - settings.speckle))
-        levels = 10.0 * np.log10(np.maximum(np.square(parts).sum(axis=0), 1e-30)) + self._receiver_gain
-        scaled = np.rint(levels * (settings.saturation / settings.dynamic_range_db))
-        return np.clip(scaled, 0, settings.saturation).astype(np.uint8)
+        scaled = settings.saturation * self._detected(np.square(parts).sum(axis=0) * self._receiver_gain)
+        return np.clip(np.rint(scaled), 0, settings.saturation).astype(np.uint8)
 
     def intensities(self, contacts: Contacts) -> np.ndarray:
         """Return the mean intensities (beams, bins) of the echoes alone, over the receiver's noise."""
@@ -117,7 +129,22 @@ class Physical:
         patch *= self._lobe(contacts.directions[beam, contact], ranges) / np.square(ranges)
         cells = beam * self.bins + np.maximum(index[beam, contact], 0)
         sums = np.bincount(cells, weights=patch, minlength=beams * self.bins).reshape(beams, self.bins)
-        return self._spread_by_pulse(sums * _ratio(self.parameters.source_level_db))
+        return self._with_second_echoes(self._spread_by_pulse(sums * _ratio(self.parameters.source_level_db)))
+
+    def _with_second_echoes(self, first: np.ndarray) -> np.ndarray:
+        """Add what the vehicle sends out again: it comes back after the ranges of two echoes."""
+        if self.parameters.vehicle_target_db <= _NO_TARGET:
+            return first
+        spectrum = np.fft.rfft(first, 2 * self.bins, axis=1)
+        second = np.fft.irfft(np.square(spectrum), 2 * self.bins, axis=1)[:, : self.bins]
+        share = _ratio(self.parameters.vehicle_target_db - self.parameters.source_level_db)
+        return first + share * np.maximum(second, 0.0)
+
+    def _detected(self, power: np.ndarray) -> np.ndarray:
+        """Return powers over that of the greatest strength as shares of it."""
+        if self.parameters.detector is Detector.AMPLITUDE:
+            return np.sqrt(power)
+        return 1.0 + 10.0 * np.log10(np.maximum(power, 1e-30)) / self.parameters.dynamic_range_db
 
     def _lobe(self, directions: np.ndarray, ranges: np.ndarray) -> np.ndarray:
         """Return what beam pattern, there and back, and absorption leave of (n,) rays."""
