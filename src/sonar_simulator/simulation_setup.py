@@ -50,7 +50,7 @@ class Settings:
     def from_mapping(cls, values: Mapping[str, Any]) -> "Settings":
         """Build from the simulator's own keys and one mapping for each group; raises ParameterError."""
         own = dict(values)
-        groups = {name: _group(kind, name, own.pop(name, {})) for name, kind in GROUPS.items()}
+        groups = {name: kind.from_group(name, own.pop(name, {})) for name, kind in GROUPS.items()}
         simulator = SimulatorParameters.from_mapping(own)
         if simulator.echo_model not in ECHO_MODELS:
             raise ParameterError(f"echo_model = {simulator.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
@@ -117,12 +117,3 @@ def _loaded(load: Callable[[], Any]) -> Any:
         return load()
     except (WorldError, ScriptError, DescriptionError) as error:
         raise ParameterError(str(error)) from error
-
-
-def _group(kind: Type[ParameterSet], name: str, values: Any) -> ParameterSet:
-    if not isinstance(values, Mapping):
-        raise ParameterError(f"{name} = {values!r}: must be keys and values")
-    try:
-        return kind.from_mapping(values)
-    except ParameterError as error:
-        raise ParameterError(f"{name}: {error}") from error

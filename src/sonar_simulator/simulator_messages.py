@@ -8,6 +8,7 @@ from genpy import Message
 from geometry_msgs.msg import Pose, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from sonar_processing.transforms import pose_from_matrix
@@ -50,7 +51,8 @@ def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List
             ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
         ]
     if moment.ping is not None:
-        messages.append(("sonar/raw", _beam(moment.ping, moment.tilt, stamp, max_range)))
+        header = Header(stamp=stamp, frame_id=SONAR_FRAME)
+        messages.append(("sonar/raw", scan_line(moment.ping, moment.tilt, header, max_range)))
     return messages
 
 
@@ -72,16 +74,16 @@ def joint_state(tilt: float, stamp: rospy.Time) -> JointState:
     return message
 
 
-def _beam(ping: Ping, tilt: float, stamp: rospy.Time, max_range: float) -> SonarScanLine:
-    message = SonarScanLine()
-    message.header.stamp = stamp
-    message.header.frame_id = SONAR_FRAME
-    message.angle = ping.angle
-    message.intensities = ping.strengths.tobytes()
-    message.maxrange_meters = max_range
-    message.range_resolution = max_range / len(ping.strengths)
-    message.sensorAngle = tilt
-    return message
+def scan_line(ping: Ping, tilt: float, header: Header, max_range: float) -> SonarScanLine:
+    """Return the message of a beam; `tilt` [rad] is that of the sonar's servo, `max_range` [m] the last bin's end."""
+    return SonarScanLine(
+        header=header,
+        angle=ping.angle,
+        intensities=ping.strengths.tobytes(),
+        maxrange_meters=max_range,
+        range_resolution=max_range / len(ping.strengths),
+        sensorAngle=tilt,
+    )
 
 
 def _twist(values: np.ndarray) -> Twist:

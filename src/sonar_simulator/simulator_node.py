@@ -4,7 +4,7 @@ import itertools
 import math
 import threading
 from pathlib import Path
-from typing import Callable
+from typing import Callable, Iterator
 
 import numpy as np
 import rospkg
@@ -35,6 +35,7 @@ class Simulator:
         self._parameters = settings.simulator
         self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
         self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive)
+        self._publisher.publish_world(self._setup.world)
         self._start_time = START_TIME
         self._now = 0.0
         self._lock = threading.Lock()
@@ -66,22 +67,22 @@ class Simulator:
         if self._parameters.wait_for_listener:
             self._wait(lambda: self._publisher.has_listener)
         simulation, rate = self._setup.simulation, self._parameters.clock_rate
-        self._pace = Pace(self._parameters.real_time_factor, self._ended.wait)
+        pace = Pace(self._parameters.real_time_factor, self._ended.wait)
         moments = simulation.moments(rate)
-        while self._play(moments):
+        while self._play(moments, pace):
             self._publisher.publish_progress(self._now / simulation.duration)
         self._publisher.publish_progress(1.0)
         rest = (simulation.moment(tick / rate) for tick in itertools.count(math.floor(self._now * rate) + 1))
-        while self._play(rest):
+        while self._play(rest, pace):
             pass
 
-    def _play(self, moments) -> bool:
+    def _play(self, moments: Iterator[Moment], pace: Pace) -> bool:
         """Publish the next moment when its time has come; return False when there is none or the node ends."""
         with self._lock, self.health.timed():
             moment = next(moments, None)
         if moment is None or self._ended.is_set():
             return False
-        self._keep_pace(moment)
+        self._keep_pace(moment, pace)
         if self._ended.is_set():
             return False
         self._publisher.publish(moment, self._stamp(moment.time))
@@ -90,14 +91,13 @@ class Simulator:
         self.health.count("beams out", int(moment.ping is not None))
         return True
 
-    def _keep_pace(self, moment: Moment) -> None:
-        before = self._pace.lost
-        self._pace.wait_for(moment.time)
-        if self._pace.lost > before:
+    def _keep_pace(self, moment: Moment, pace: Pace) -> None:
+        lost = pace.lost
+        pace.wait_for(moment.time)
+        if pace.lost > lost:
             factor = self._parameters.real_time_factor
-            self.health.problem(
-                "delays", f"{self._pace.lost:.1f} s in all; the machine cannot keep up with real_time_factor {factor:g}"
-            )
+            detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with real_time_factor {factor:g}"
+            self.health.problem("delays", detail)
 
     def _wait(self, ready: Callable[[], bool]) -> None:
         """Let the clock run until something is ready: robot_state_publisher, for one, stands still without it."""

@@ -3,9 +3,12 @@
 import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
+from visualization_msgs.msg import Marker
 
 from sonar_simulator.simulation import Drive, Moment
-from sonar_simulator.simulator_messages import TOPICS, joint_state, moment_messages
+from sonar_simulator.simulator_messages import TOPICS, WORLD_FRAME, joint_state, moment_messages
+from sonar_simulator.world import World
+from sonar_simulator.world_marker import world_marker
 
 _QUEUE_SIZE = 100
 _VELOCITY = "velocity"
@@ -24,6 +27,7 @@ class SimulatorPublisher:
         self._max_range = max_range
         self._clock = rospy.Publisher("/clock", Clock, queue_size=_QUEUE_SIZE)
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
+        self._world = rospy.Publisher("~world", Marker, queue_size=1, latch=True)
         self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS.items()}
         self._commands = _publisher(_COMMANDS, TOPICS[_VELOCITY]) if drive is Drive.SCRIPT else None
 
@@ -40,6 +44,10 @@ class SimulatorPublisher:
         """Send what a robot's description needs to stand still: the time, and the servo at 0."""
         self.publish_clock(stamp)
         self._publishers["joint_states"].publish(joint_state(0.0, stamp))
+
+    def publish_world(self, world: World) -> None:
+        """Show the world, once for all who come."""
+        self._world.publish(world_marker(world, WORLD_FRAME))
 
     def publish_progress(self, share: float) -> None:
         """Tell which share of the script is done; 1 at its end."""

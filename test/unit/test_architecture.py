@@ -26,7 +26,8 @@ ROS_SIDE = {
         "transforms",
     },
     "sonar_simulator": {
-        "bag_tool", "bag_writer", "nodes", "simulator_messages", "simulator_node", "simulator_publisher",
+        "bag_tool", "bag_writer", "gazebo_messages", "gazebo_node", "nodes", "simulator_messages", "simulator_node",
+        "simulator_publisher", "world_marker",
     },
 }  # fmt: skip
 IMPORT_WITHOUT_ROS = """

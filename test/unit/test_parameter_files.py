@@ -15,7 +15,7 @@ from sonar_processing.outliers import OutlierRemoverParameters
 from sonar_processing.scan_assembler import SonarToCloudParameters
 from sonar_processing.stages import STAGES
 from sonar_processing.threshold import ThresholderParameters
-from sonar_simulator.default_yaml import simulator_yaml
+from sonar_simulator.default_yaml import gazebo_sonar_yaml, simulator_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 NODES = {
@@ -44,6 +44,10 @@ def test_the_default_yaml_makes_the_defaults(node):
 
 def test_the_simulators_default_yaml_says_what_its_dataclasses_say():
     assert _default_file("sonar_simulator") == simulator_yaml()
+
+
+def test_the_default_yaml_of_gazebo_sonar_says_what_its_dataclasses_say():
+    assert _default_file("gazebo_sonar") == gazebo_sonar_yaml()
 
 
 @pytest.fixture(params=sorted(NODES))
