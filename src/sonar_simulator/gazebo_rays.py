@@ -119,8 +119,10 @@ def _rows(bearings: np.ndarray) -> int:
     span = np.ptp(bearings)
     if span > math.pi:
         raise RefusedInput("scans refused", "points all around the sensor do not tell their rows: set ray_rows")
-    back = np.abs(np.diff(bearings)) > 0.5 * span if span > _NO_BEARING else np.ones(len(bearings) - 1)
-    return int(np.count_nonzero(back)) + 1
+    if span <= _NO_BEARING:
+        return len(bearings)
+    steps = np.diff(bearings)
+    return int(np.count_nonzero(steps * np.sign(steps[0]) < -0.5 * span)) + 1
 
 
 def _cut(ranges: np.ndarray, nothing_range: float) -> np.ndarray:

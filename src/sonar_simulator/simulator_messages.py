@@ -37,12 +37,9 @@ def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List
     Transform and joint come with every moment, so that a beam can be placed at its own stamp; the rest comes with
     ticks only, at the steady rate of an instrument.
     """
-    odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
-    messages = [
-        ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
-        ("joint_states", joint_state(moment.tilt, stamp)),
-    ]
+    messages = placing_messages(moment, stamp)
     if moment.is_tick:
+        odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
         velocity, true_velocity = _twist(moment.odometry.twist), _twist(moment.truth.twist)
         true_pose = pose_from_matrix(moment.truth.T_world_base)
         messages += [
@@ -54,6 +51,15 @@ def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List
         header = Header(stamp=stamp, frame_id=SONAR_FRAME)
         messages.append(("sonar/raw", scan_line(moment.ping, moment.tilt, header, max_range)))
     return messages
+
+
+def placing_messages(moment: Moment, stamp: rospy.Time) -> List[Tuple[str, Message]]:
+    """Return the (topic, message) pairs that place vehicle and sonar, the transform first."""
+    odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
+    return [
+        ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
+        ("joint_states", joint_state(moment.tilt, stamp)),
+    ]
 
 
 def transform_message(pose: Pose, stamp: rospy.Time, parent: str, child: str) -> TransformStamped:

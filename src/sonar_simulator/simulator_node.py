@@ -4,7 +4,7 @@ import itertools
 import math
 import threading
 from pathlib import Path
-from typing import Callable, Iterator
+from typing import Iterator
 
 import numpy as np
 import rospkg
@@ -22,6 +22,7 @@ from sonar_simulator.simulator_publisher import SimulatorPublisher
 
 START_TIME = 1000.0
 _WAIT_STEP = 0.05
+_LISTENER_TIME = 0.5
 
 
 class Simulator:
@@ -65,7 +66,7 @@ class Simulator:
 
     def _run(self) -> None:
         if self._parameters.wait_for_listener:
-            self._wait(lambda: self._publisher.has_listener)
+            self._wait_for_listener()
         simulation, rate = self._setup.simulation, self._parameters.clock_rate
         pace = Pace(self._parameters.real_time_factor, self._ended.wait)
         moments = simulation.moments(rate)
@@ -99,11 +100,13 @@ class Simulator:
             detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with real_time_factor {factor:g}"
             self.health.problem("delays", detail)
 
-    def _wait(self, ready: Callable[[], bool]) -> None:
-        """Let the clock run until something is ready: robot_state_publisher, for one, stands still without it."""
-        while not (ready() or self._ended.wait(_WAIT_STEP)):
+    def _wait_for_listener(self) -> None:
+        """Let the clock run until somebody takes the beams, and until he has had time to learn of tf as well."""
+        start, waited = self._setup.simulation.moment(0.0), 0.0
+        while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
+            waited += _WAIT_STEP if self._publisher.has_listener else 0.0
+            self._publisher.publish_rest(start, rospy.Time.from_sec(self._start_time))
             self._start_time += _WAIT_STEP
-            self._publisher.publish_rest(rospy.Time.from_sec(self._start_time))
 
     def _stamp(self, seconds: float) -> rospy.Time:
         return rospy.Time.from_sec(self._start_time + seconds)

@@ -6,7 +6,7 @@ from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker
 
 from sonar_simulator.simulation import Drive, Moment
-from sonar_simulator.simulator_messages import TOPICS, WORLD_FRAME, joint_state, moment_messages
+from sonar_simulator.simulator_messages import TOPICS, WORLD_FRAME, moment_messages, placing_messages
 from sonar_simulator.world import World
 from sonar_simulator.world_marker import world_marker
 
@@ -40,10 +40,11 @@ class SimulatorPublisher:
         """Set everybody's time."""
         self._clock.publish(Clock(clock=stamp))
 
-    def publish_rest(self, stamp: rospy.Time) -> None:
-        """Send what a robot's description needs to stand still: the time, and the servo at 0."""
+    def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
+        """Send what places a sonar that waits: the time, the vehicle where it stands at a moment, and its servo."""
         self.publish_clock(stamp)
-        self._publishers["joint_states"].publish(joint_state(0.0, stamp))
+        for topic, message in placing_messages(moment, stamp):
+            self._publishers[topic].publish(message)
 
     def publish_world(self, world: World) -> None:
         """Show the world, once for all who come."""
