@@ -40,7 +40,7 @@ class SimulatorParameters(ParameterSet):
     clock_rate: float = parameter(
         20.0, "ticks of /clock, odometry and tf", unit="1/s", low=1.0, high=1000.0, tunable=False
     )
-    wait_for_listener: bool = parameter(True, "begin when somebody subscribes to the beams", tunable=False)
+    wait_for_listener: bool = parameter(True, "SCRIPT: begin when somebody subscribes to the beams", tunable=False)
 
 
 @dataclass(frozen=True)

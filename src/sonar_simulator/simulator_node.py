@@ -65,7 +65,7 @@ class Simulator:
         self.health.count("velocity commands limited", int(limited))
 
     def _run(self) -> None:
-        if self._parameters.wait_for_listener:
+        if self._parameters.wait_for_listener and self._parameters.drive is Drive.SCRIPT:
             self._wait_for_listener()
         simulation, rate = self._setup.simulation, self._parameters.clock_rate
         pace = Pace(self._parameters.real_time_factor, self._ended.wait)
