@@ -20,12 +20,13 @@ from sonar_simulator.echo_model import make_echo_model
 from sonar_simulator.odometry import Odometry, OdometryParameters
 from sonar_simulator.ray_caster import RayCaster
 from sonar_simulator.script_file import load_script
-from sonar_simulator.sdf import WorldError, load_sdf
 from sonar_simulator.simulation import Simulation, SimulatorParameters
 from sonar_simulator.simulator_messages import BASE_FRAME, SONAR_FRAME
 from sonar_simulator.simulator_publisher import SimulatorPublisher
 from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle import ScriptError
+from sonar_simulator.world_error import WorldError
+from sonar_simulator.world_file import load_world
 
 PACKAGE = "underwater_map_construction"
 START_TIME = 1000.0
@@ -53,7 +54,7 @@ class Simulator:
         threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
 
     def _load_world(self) -> object:
-        loaded = _loaded(load_sdf, self._parameters.world)
+        loaded = _loaded(load_world, self._parameters.world)
         for warning in loaded.warnings:
             rospy.logwarn("%s", warning)
         return loaded.world
