@@ -3,12 +3,13 @@
 import argparse
 from typing import Callable, Dict, List
 
-from benchmarks import map_figures, processing_figures, vehicle_figures
+from benchmarks import map_figures, processing_figures, simulation_figures, vehicle_figures
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map": map_figures.rows,
     "processing": processing_figures.rows,
+    "simulation": simulation_figures.rows,
     "vehicle": vehicle_figures.rows,
 }
 

@@ -14,8 +14,15 @@ class RayPattern(Protocol):
     def rays(self) -> int:
         """Number of rays in one beam."""
 
+    @property
+    def rays_inside(self) -> int:
+        """How many of them, the first ones, run between the planes."""
+
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam, each beam's drawn anew."""
+
+    def shares(self) -> np.ndarray:
+        """Return (rays,) the share of the beam's solid angle that each ray stands for."""
 
     def planes(self) -> np.ndarray:
         """Return (k, 3) unit normals, inward, of the planes through the sonar that bound the beam."""
@@ -38,6 +45,11 @@ class BeamPattern:
         """Number of rays in one beam."""
         return self.rows * self.columns
 
+    @property
+    def rays_inside(self) -> int:
+        """How many of them run between the planes: all."""
+        return self.rays
+
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam.
 
@@ -50,6 +62,10 @@ class BeamPattern:
         slopes = np.stack([np.ones_like(bearing), np.tan(bearing), np.tan(elevation)], axis=-1)
         slopes /= np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
         return slopes.reshape(beams, self.rays, 3)
+
+    def shares(self) -> np.ndarray:
+        """Return (rays,) equal shares."""
+        return np.full(self.rays, 1.0 / self.rays)
 
     def planes(self) -> np.ndarray:
         """Return (4, 3) inward normals: right, left, lower and upper side."""

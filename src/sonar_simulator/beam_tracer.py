@@ -23,6 +23,7 @@ class BeamTracer:
         self._mirrors = mirrors
         self._nearest = NearestSurface(caster.world)
         self._planes = pattern.planes()
+        self._shares = pattern.shares()
 
     def contacts(
         self, T_world_sonar: np.ndarray, angles: np.ndarray, max_range: float, rng: np.random.Generator
@@ -36,13 +37,12 @@ class BeamTracer:
         sampled = self._pattern.sample(len(angles), rng)
         directions = (sampled @ rotations.transpose(0, 2, 1)).reshape(-1, 3)
         starts = np.repeat(origins, self._pattern.rays, axis=0)
-        share = 1.0 / max(1, self._pattern.rays)
         ways = legs(self._caster, starts, directions, self._mirrors, max_range)
-        met = [self._contacts(leg, sampled, share) for leg in ways]
-        limits = np.minimum(met[0].ranges.min(axis=1), max_range)
-        return Contacts.joined([self._leading(origins, rotations, limits, share * _LEADING_SHARE), *met])
+        met = [self._contacts(leg, sampled, self._shares) for leg in ways]
+        limits = np.minimum(met[0].ranges[:, : self._pattern.rays_inside].min(axis=1), max_range)
+        return Contacts.joined([self._leading(origins, rotations, limits), *met])
 
-    def _contacts(self, leg: Leg, directions: np.ndarray, share: float) -> Contacts:
+    def _contacts(self, leg: Leg, directions: np.ndarray, shares: np.ndarray) -> Contacts:
         """Return the ends of a leg as contacts of rays that left along beam-frame `directions` (beams, rays, 3)."""
         world, shape = self._caster.world, directions.shape[:2]
         cosines = np.abs(np.einsum("ij,ij->i", leg.directions, world.normals[leg.faces]))
@@ -51,12 +51,12 @@ class BeamTracer:
             cosines=np.minimum(cosines, 1.0).reshape(shape),
             material=world.face_material[leg.faces].reshape(shape),
             directions=directions,
-            shares=np.full(shape, share),
+            shares=np.broadcast_to(shares, shape),
             losses=leg.left.reshape(shape),
             materials=world.materials,
         )
 
-    def _leading(self, origins: np.ndarray, rotations: np.ndarray, limits: np.ndarray, share: float) -> Contacts:
+    def _leading(self, origins: np.ndarray, rotations: np.ndarray, limits: np.ndarray) -> Contacts:
         points, faces = self._nearest.find(origins, rotations, self._planes, limits)
         above = origins[:, 2] + np.einsum("ni,ni->n", rotations[:, 2], np.where(np.isfinite(points), points, 0.0)) > 0.0
         faces = np.where(self._mirrors.surface & above, -1, faces)
@@ -65,4 +65,5 @@ class BeamTracer:
         scale = np.where(found, np.maximum(ranges, 1e-12), 1.0)[:, np.newaxis]
         directions = np.where(found[:, np.newaxis], points / scale, _AHEAD)
         in_world = np.einsum("nij,nj->ni", rotations, directions)
-        return self._contacts(Leg(ranges, faces, in_world, np.ones(len(origins))), directions[:, np.newaxis], share)
+        leg = Leg(ranges, faces, in_world, np.ones(len(origins)))
+        return self._contacts(leg, directions[:, np.newaxis], self._shares[:1] * _LEADING_SHARE)

@@ -19,6 +19,11 @@ class ConePattern:
     opening: float
     rays: int
 
+    @property
+    def rays_inside(self) -> int:
+        """How many of them run between the planes: all."""
+        return self.rays
+
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam: a sunflower, turned anew for each beam."""
         number = np.arange(self.rays)
@@ -26,6 +31,10 @@ class ConePattern:
         radius = math.tan(self.opening / 2.0) * np.sqrt((number + rng.random((beams, self.rays))) / self.rays)
         slopes = np.stack([np.ones_like(turn), radius * np.cos(turn), radius * np.sin(turn)], axis=-1)
         return slopes / np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
+
+    def shares(self) -> np.ndarray:
+        """Return (rays,) equal shares."""
+        return np.full(self.rays, 1.0 / self.rays)
 
     def planes(self) -> np.ndarray:
         """Return (16, 3) inward normals; four of them bound the cone below, above, right and left."""

@@ -47,7 +47,8 @@ def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
         raise WorldError(f"{path}: {error.strerror or error}") from error
     except Exception as error:
         # The readers of the formats fail each in their own way on files that are not what their name says.
-        raise WorldError(f"{path}: not a mesh: {type(error).__name__}: {error}") from error
+        reason = " ".join(str(error).split())
+        raise WorldError(f"{path}: not a mesh: {type(error).__name__}: {reason}") from error
     parts = []
     for node in scene.graph.nodes_geometry:
         T_scene_node, name = scene.graph[node]

@@ -51,7 +51,7 @@ def legs(
     for bounce in range(mirrors.bounces + 1):
         on_way = np.flatnonzero((left > _FAINT) & (gone < max_range))
         distances, faces, surface = _met(caster, origins[on_way], directions[on_way], mirrors)
-        yield _leg(on_way, gone + 0.0, np.where(surface, np.inf, distances), faces, directions.copy(), left.copy())
+        yield _leg(on_way, gone, np.where(surface, np.inf, distances), faces, directions.copy(), left.copy())
         if bounce == mirrors.bounces:
             return
         normals = np.where(surface[:, np.newaxis], _UP, world.normals[faces])

@@ -5,7 +5,7 @@ begins at the nearest point of all surfaces inside its pyramid, and that point f
 visible, for whatever hid it would be nearer and in the beam too.
 """
 
-from typing import Tuple
+from typing import Iterator, Tuple
 
 import numpy as np
 
@@ -16,6 +16,8 @@ from sonar_simulator.world import World
 _TOLERANCE = 1e-9
 # Planes of triangles that are no farther than this beyond the limit still count: m.
 _MARGIN = 1e-3
+# So many sides of a cone at most are looked at where no more cut a triangle.
+_FEW = 5
 _NEXT_CORNER = np.array([1, 2, 0])
 
 
@@ -41,7 +43,9 @@ class NearestSurface:
         beam, face = self._groups.reached(origins, np.einsum("nij,kj->kni", rotations, sides), limits)
         triangles = (self._corners[face] - origins[beam, np.newaxis]) @ rotations[beam]
         beam, face, triangles = _inside(beam, face, triangles, planes, limits)
-        points = _nearest_points(triangles, planes)
+        points = np.empty((len(beam), 3))
+        for pairs, cutting in _cutting_planes(triangles, planes):
+            points[pairs] = _nearest_points(triangles[pairs], cutting)
         squares = np.einsum("ij,ij->i", points, points)
         order = np.lexsort((squares, beam))
         order = order[np.isfinite(squares[order])]
@@ -64,8 +68,20 @@ def _inside(
     return beam[kept], face[kept], triangles[kept]
 
 
+def _cutting_planes(triangles: np.ndarray, planes: np.ndarray) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+    """Yield pair numbers (q,) and planes (q, j, 3) that hold all that cut these triangles: of a cone's sides few do."""
+    if len(planes) <= _FEW:
+        yield np.arange(len(triangles)), np.broadcast_to(planes, (len(triangles), *planes.shape))
+        return
+    depths = (triangles @ planes.T).min(axis=1)
+    cut_by_few = (depths < 0.0).sum(axis=1) <= _FEW
+    few, many = np.flatnonzero(cut_by_few), np.flatnonzero(~cut_by_few)
+    yield few, planes[np.argpartition(depths[few], _FEW - 1, axis=1)[:, :_FEW]]
+    yield many, np.broadcast_to(planes, (len(many), *planes.shape))
+
+
 def _nearest_points(triangles: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return the (p, 3) points of triangles (p, 3, 3) inside the planes that are nearest to the origin, inf if none.
+    """Return the (p, 3) points of triangles (p, 3, 3) inside their planes (p, k, 3) nearest to the origin, inf if none.
 
     The part of a triangle inside the beam is a convex polygon. Its nearest point is the foot of the perpendicular, or
     lies on a side: on an edge of the triangle or on one of the planes.
@@ -76,8 +92,8 @@ def _nearest_points(triangles: np.ndarray, planes: np.ndarray) -> np.ndarray:
     edges = triangles[:, _NEXT_CORNER] - triangles
     edge_normals = _cross(normals[:, np.newaxis], edges)
     edge_normals /= np.sqrt(_dot(edge_normals, edge_normals))[..., np.newaxis]
-    sides = np.concatenate([edge_normals, np.broadcast_to(planes, (len(triangles), *planes.shape))], axis=1)
-    offsets = np.concatenate([_dot(edge_normals, triangles), np.zeros((len(triangles), len(planes)))], axis=1)
+    sides = np.concatenate([edge_normals, planes], axis=1)
+    offsets = np.concatenate([_dot(edge_normals, triangles), np.zeros(planes.shape[:2])], axis=1)
     feet = heights[:, np.newaxis] * normals
     within = (_dot(sides, feet[:, np.newaxis]) >= offsets - _TOLERANCE).all(axis=1)
     points = np.where(within[:, np.newaxis], feet, np.inf)

@@ -12,12 +12,15 @@ from sonar_simulator.acoustics import SOUND_SPEED, Scattering, absorption
 from sonar_simulator.beam_pattern import BeamPattern, RayPattern
 from sonar_simulator.contacts import Contacts
 from sonar_simulator.mirrors import Mirrors
+from sonar_simulator.side_lobes import FanWithSideLobes
 
 # Rays are cast over this many times the openings: what lies farther out is 15 dB down, there and back.
 _CAST_WIDTH = 1.6
 # Nothing is nearer than the transducer's own face, m.
 _NEAREST = 0.05
-_NO_TARGET = -100.0
+# Levels at or below this are not there, dB.
+_NONE = -100.0
+_BEHIND = 1000.0
 
 
 class Detector(Enum):
@@ -40,6 +43,10 @@ class PhysicalParameters(ParameterSet):
     horizontal_opening_deg: float = parameter(
         2.5, "width of the beam where it is 3 dB down", unit="deg", low=0.1, high=90.0
     )
+    side_lobe_db: float = parameter(
+        -100.0, "side lobes over all bearings, there and back", unit="dB", low=-100.0, high=0.0
+    )
+    side_rays: int = parameter(60, "rays over all bearings for the side lobes, if there are any", low=0, high=10000)
     frequency_khz: float = parameter(675.0, "of the sound: sets the absorption", unit="kHz", low=10.0, high=3000.0)
     temperature: float = parameter(15.0, "of the water", unit="C", low=-2.0, high=40.0)
     salinity: float = parameter(35.0, "of the water, 0 in a tank", unit="per mille", low=0.0, high=42.0)
@@ -103,7 +110,9 @@ class Physical:
     def pattern(self, fan: BeamPattern) -> RayPattern:
         """Return as many rays as `fan` has over the main lobe, which is wider than its openings at 3 dB."""
         openings = self.parameters.vertical_opening_deg, self.parameters.horizontal_opening_deg
-        return BeamPattern(*(math.radians(opening * _CAST_WIDTH) for opening in openings), fan.rows, fan.columns)
+        lobe = BeamPattern(*(math.radians(opening * _CAST_WIDTH) for opening in openings), fan.rows, fan.columns)
+        side_rays = self.parameters.side_rays if self.parameters.side_lobe_db > _NONE else 0
+        return FanWithSideLobes(lobe, side_rays) if side_rays else lobe
 
     def echoes(self, contacts: Contacts, rng: np.random.Generator) -> np.ndarray:
         """Return strengths (beams, bins) uint8."""
@@ -133,7 +142,7 @@ class Physical:
 
     def _with_second_echoes(self, first: np.ndarray) -> np.ndarray:
         """Add what the vehicle sends out again: it comes back after the ranges of two echoes."""
-        if self.parameters.vehicle_target_db <= _NO_TARGET:
+        if self.parameters.vehicle_target_db <= _NONE:
             return first
         spectrum = np.fft.rfft(first, 2 * self.bins, axis=1)
         second = np.fft.irfft(np.square(spectrum), 2 * self.bins, axis=1)[:, : self.bins]
@@ -150,8 +159,9 @@ class Physical:
         """Return what beam pattern, there and back, and absorption leave of (n,) rays."""
         half_height = math.sin(math.radians(self.parameters.vertical_opening_deg) / 2.0)
         half_width = math.sin(math.radians(self.parameters.horizontal_opening_deg) / 2.0)
-        off_axis = np.square(directions[:, 1] / half_width) + np.square(directions[:, 2] / half_height)
-        decibels = 6.0 * off_axis + 2.0 * self._absorption * ranges
+        across = 6.0 * np.square(directions[:, 1] / half_width) + _BEHIND * (directions[:, 0] < 0.0)
+        across = np.minimum(across, -self.parameters.side_lobe_db)
+        decibels = across + 6.0 * np.square(directions[:, 2] / half_height) + 2.0 * self._absorption * ranges
         return np.exp(decibels * (-math.log(10.0) / 10.0))
 
     def _spread_by_pulse(self, sums: np.ndarray) -> np.ndarray:
