@@ -7,8 +7,8 @@ from typing import Dict, NamedTuple, Optional
 
 import numpy as np
 import rosbag
-
 import yaml
+
 from sonar_simulator.echo_model import make_echo_model
 from sonar_simulator.poses import pose_matrix
 from sonar_simulator.ray_caster import RayCaster

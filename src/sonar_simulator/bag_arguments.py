@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any, Dict, List, Mapping, Sequence
 
 import yaml
+
 from node_support.parameters import ParameterError
 
 COMPRESSIONS = ("none", "lz4", "bz2")

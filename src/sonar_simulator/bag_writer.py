@@ -6,11 +6,11 @@ from typing import Callable
 
 import rosbag
 import rospy
+import yaml
 from geometry_msgs.msg import Pose
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
-import yaml
 from node_support.files import whole_file
 from sonar_processing.transforms import pose_from_matrix
 from sonar_simulator.robot_description import RobotDescription

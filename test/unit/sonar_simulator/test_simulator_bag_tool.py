@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rosbag
-
 import yaml
+
 from sonar_simulator.bag_tool import main
 from sonar_simulator.script_file import load_script
 
