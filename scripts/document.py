@@ -1,4 +1,4 @@
-"""Writes what is generated from the parameter dataclasses: default yaml files, tables in README.md and docs."""
+"""Writes what is generated from the parameter dataclasses: the default yaml files and the tables of the documents."""
 
 import argparse
 import dataclasses
@@ -13,9 +13,14 @@ from imagenex_852_driver.emulator_parameters import EmulatorParameters
 from mlsm_manager.core_parameters import MlsmCoreParameters
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
+from sonar_processing.circles import CircleDetectorParameters
+from sonar_processing.echo_extraction import EchoExtractorParameters
+from sonar_processing.lines import LineDetectorParameters
 from sonar_processing.outliers import OutlierRemoverParameters
-from sonar_processing.scan_assembler import SonarToCloudParameters
+from sonar_processing.polar_image import SonarImageParameters
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.threshold import ThresholderParameters
+from sonar_processing.tilt_scan import SonarControlParameters
 from sonar_simulator.default_yaml import gazebo_sonar_yaml, simulator_yaml
 from sonar_simulator.gazebo_parameters import GazeboSonarParameters
 from sonar_simulator.simulation import SimulatorParameters
@@ -35,10 +40,15 @@ class LiveNode:
 
 
 LIVE_NODES: Dict[str, LiveNode] = {
+    "circle_detector": LiveNode(CircleDetectorParameters, "CircleDetector"),
+    "echo_extractor": LiveNode(EchoExtractorParameters, "EchoExtractor"),
     "imagenex_852_driver": LiveNode(DriverParameters, "Imagenex852"),
     "imagenex_852_emulator": LiveNode(EmulatorParameters, "Imagenex852Emulator"),
+    "line_detector": LiveNode(LineDetectorParameters, "LineDetector"),
     "mlsm_core": LiveNode(MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": LiveNode(OutlierRemoverParameters, "OutlierRemover"),
+    "sonar_control": LiveNode(SonarControlParameters, "SonarControl"),
+    "sonar_image": LiveNode(SonarImageParameters, "SonarImage"),
     "sonar_to_cloud": LiveNode(SonarToCloudParameters, "SonarToCloud"),
     "thresholder": LiveNode(ThresholderParameters, "Thresholder"),
 }

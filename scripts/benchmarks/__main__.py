@@ -3,7 +3,14 @@
 import argparse
 from typing import Callable, Dict, List
 
-from benchmarks import map_figures, processing_figures, simulation_figures, vehicle_figures
+from benchmarks import (
+    map_figures,
+    processing_figures,
+    shape_figures,
+    simulation_figures,
+    survey_figures,
+    vehicle_figures,
+)
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
@@ -11,6 +18,8 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "processing": processing_figures.rows,
     "simulation": simulation_figures.rows,
     "vehicle": vehicle_figures.rows,
+    "shapes": shape_figures.rows,
+    "survey": survey_figures.rows,
 }
 
 

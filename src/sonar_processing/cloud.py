@@ -16,6 +16,7 @@ class IntensityCloud:
         positive while it was moving (thesis 4.5.1).
     stamp_ns: stamp of the newest beam, nanoseconds.
     height: rows (beams) of an organised cloud, 1 otherwise.
+    organized: whether rows are beams and columns are bins; always so with more than one row.
     """
 
     points: np.ndarray
@@ -23,6 +24,7 @@ class IntensityCloud:
     stamp_ns: int
     frame_id: str
     height: int = 1
+    organized: bool = False
 
     def __post_init__(self) -> None:
         points, stamps = len(self.points), len(self.time_stamps)
@@ -37,7 +39,7 @@ class IntensityCloud:
     @property
     def is_organized(self) -> bool:
         """Whether rows are beams and columns are bins."""
-        return self.height > 1
+        return self.organized or self.height > 1
 
     @property
     def valid(self) -> np.ndarray:

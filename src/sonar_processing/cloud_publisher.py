@@ -4,7 +4,7 @@ import rospy
 from sensor_msgs.msg import PointCloud2
 
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.conversions import StampedIntensityCloudArrays, cloud_to_message, point_cloud
+from sonar_processing.conversions import StampedIntensityCloudArrays, cloud_to_message, points_to_message
 
 QUEUE_SIZE = 10
 
@@ -15,6 +15,11 @@ class CloudPublisher:
     def __init__(self, topic: str) -> None:
         self._stamped = rospy.Publisher(topic, StampedIntensityCloudArrays, queue_size=QUEUE_SIZE)
         self._plain = PointsPublisher(f"{topic}/cloud")
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody listens."""
+        return self._stamped.get_num_connections() > 0 or self._plain.is_read
 
     def publish(self, cloud: IntensityCloud) -> None:
         """Send the cloud to those who listen."""
@@ -37,4 +42,4 @@ class PointsPublisher:
     def publish(self, cloud: IntensityCloud) -> None:
         """Send the points to those who listen."""
         if self.is_read:
-            self._publisher.publish(point_cloud(cloud.points, cloud.stamp_ns, cloud.frame_id, cloud.height))
+            self._publisher.publish(points_to_message(cloud))

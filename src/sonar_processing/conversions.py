@@ -1,21 +1,26 @@
 """Messages to arrays and back, by the buffer and never point by point."""
 
+import math
 from functools import lru_cache
 from typing import List, Optional, Sequence, Tuple
 
 import genpy
 import numpy as np
 from rospy.numpy_msg import numpy_msg
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from node_support.refused_input import RefusedInput
 from sonar_processing.beam import Beam
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.laser_turn import LaserTurn
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 StampedIntensityCloudArrays = numpy_msg(StampedIntensityCloud)
 """StampedIntensityCloud whose time stamps are a numpy array, as subscribers and publishers here use it."""
+
+LaserScanArrays = numpy_msg(LaserScan)
+"""LaserScan whose ranges and intensities are numpy arrays."""
 
 POINT_FIELDS = ("x", "y", "z", "intensity")
 _FLOAT_BYTES = 4
@@ -41,13 +46,17 @@ def beam_from_message(message: SonarScanLine) -> Beam:
 
 
 def cloud_from_message(message: StampedIntensityCloud) -> IntensityCloud:
-    """Return the cloud of a StampedIntensityCloud; raises RefusedInput for one that cannot be used."""
+    """Return the cloud of a StampedIntensityCloud; raises RefusedInput for one that cannot be used.
+
+    A cloud of one row that says it may hold points that are not finite is organised: a single beam.
+    """
     return IntensityCloud(
         points=points_from_message(message.cloud),
         time_stamps=np.asarray(message.timeStamps, dtype=np.float64),
         stamp_ns=message.header.stamp.to_nsec(),
         frame_id=message.header.frame_id,
         height=max(message.cloud.height, 1),
+        organized=not message.cloud.is_dense,
     )
 
 
@@ -101,8 +110,32 @@ def cloud_to_message(cloud: IntensityCloud, points: Optional[PointCloud2] = None
     """Return the StampedIntensityCloud of a cloud; `points` is its PointCloud2 where that exists already."""
     return StampedIntensityCloudArrays(
         header=header(cloud.stamp_ns, cloud.frame_id),
-        cloud=points or point_cloud(cloud.points, cloud.stamp_ns, cloud.frame_id, cloud.height),
+        cloud=points or points_to_message(cloud),
         timeStamps=np.ascontiguousarray(cloud.time_stamps, dtype="<f8"),
+    )
+
+
+def points_to_message(cloud: IntensityCloud) -> PointCloud2:
+    """Return the PointCloud2 of a cloud; an organised one says that it may hold points that are not finite."""
+    message = point_cloud(cloud.points, cloud.stamp_ns, cloud.frame_id, cloud.height)
+    message.is_dense = message.is_dense and not cloud.is_organized
+    return message
+
+
+def laser_scan_message(turn: LaserTurn, stamp_ns: int, frame_id: str) -> LaserScan:
+    """Return a turn as LaserScan: all rays hold at `stamp_ns`, so there is no time between them."""
+    increment = turn.angle_increment
+    return LaserScanArrays(
+        header=header(stamp_ns, frame_id),
+        angle_min=-math.pi,
+        angle_max=-math.pi + (turn.ranges.size - 1) * increment,
+        angle_increment=increment,
+        time_increment=0.0,
+        scan_time=turn.duration,
+        range_min=turn.range_min,
+        range_max=turn.range_max,
+        ranges=turn.ranges,
+        intensities=turn.intensities,
     )
 
 

@@ -7,28 +7,30 @@ import rospy
 from node_support.health import Health
 from node_support.parameters import ParameterError
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.sonar_image import SonarImage
 from sonar_processing.sonar_to_cloud import SonarToCloud
 from sonar_processing.stage_runner import StageRunner
 from sonar_processing.stages import STAGES
 
-DEFAULT_CHAIN = ["thresholder", "outlier_remover"]
+DEFAULT_CHAIN = ["thresholder", "outlier_remover", "echo_extractor"]
+Deliver = Callable[[IntensityCloud], None]
 
 
-class ProcessingHost:
-    """Hosts the stages named by `~chain`, each with the parameters and topics it has as a node of its own."""
+class StageChain:
+    """Stages one after the other; each gets what the one before made."""
 
-    def __init__(self, deliver: Optional[Callable[[IntensityCloud], None]] = None) -> None:
-        """`deliver` receives what leaves the last stage. Raises ParameterError for a bad parameter of any stage."""
+    def __init__(self, runners: List[StageRunner], deliver: Optional[Deliver] = None) -> None:
+        """`deliver` receives what leaves the last stage."""
+        self._runners = runners
         self._deliver = deliver
-        self._runners = [StageRunner(name, rospy.resolve_name(name)) for name in _chain()]
-        self._source = SonarToCloud(rospy.resolve_name("sonar_to_cloud"), self._process)
 
     @property
-    def healths(self) -> List[Health]:
-        """The health of every stage, in the order of the chain."""
-        return [self._source.health] + [runner.health for runner in self._runners]
+    def is_wanted(self) -> bool:
+        """Whether anybody takes anything that the stages make."""
+        return bool(self._runners and self._deliver) or any(runner.is_read for runner in self._runners)
 
-    def _process(self, scan: IntensityCloud) -> None:
+    def process(self, scan: IntensityCloud) -> None:
+        """Take a cloud through all stages."""
         cloud: Optional[IntensityCloud] = scan
         for runner in self._runners:
             cloud = runner.process(cloud)
@@ -36,6 +38,28 @@ class ProcessingHost:
                 return
         if self._deliver is not None:
             self._deliver(cloud)
+
+
+class ProcessingHost:
+    """Hosts the stages named by `~chain` and sonar_image, with the parameters and topics they have as nodes.
+
+    Stages that take polar scans run beside the others, and only while somebody wants what they make.
+    """
+
+    def __init__(self, deliver: Optional[Deliver] = None, deliver_echoes: Optional[Deliver] = None) -> None:
+        """`deliver` receives what leaves the last stage of clouds, `deliver_echoes` the last of polar scans.
+
+        Raises ParameterError for a bad parameter of any stage.
+        """
+        runners = [StageRunner(name, rospy.resolve_name(name)) for name in _chain()]
+        clouds = StageChain([runner for runner in runners if not runner.takes_polar_scans], deliver)
+        polar = StageChain([runner for runner in runners if runner.takes_polar_scans], deliver_echoes)
+        self._source = SonarToCloud(rospy.resolve_name("sonar_to_cloud"), clouds.process, polar)
+        self._image = SonarImage(rospy.resolve_name("sonar_image"))
+        self.healths: List[Health] = [
+            self._source.health, *[runner.health for runner in runners], self._image.health
+        ]  # fmt: skip
+        """The health of everything that is hosted."""
 
 
 def _chain() -> List[str]:

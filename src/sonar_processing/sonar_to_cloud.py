@@ -1,78 +1,91 @@
 """The ROS side of sonar_to_cloud: beams, tf and the velocity in, scans out (thesis 4.5.1, 6.5.2)."""
 
-import math
 from typing import Callable, Optional
-
-import numpy as np
-import rospy
-from geometry_msgs.msg import Twist
 
 from node_support.live_parameters import LiveParameters
 from node_support.node import guarded, make_health
-from sonar_processing.beam import Beam
+from sonar_processing.beam_subscriber import subscribe_to_beams
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.cloud_publisher import CloudPublisher, PointsPublisher
 from sonar_processing.conversions import beam_from_message
-from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, SonarToCloudParameters
+from sonar_processing.motion import Motion
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.scan_assembler import ScanAssembler
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.transform_filter import TransformFilter
+from sonar_processing.turn_collector import TurnCollector
+from sonar_processing.turn_publisher import CloudTaker, TurnPublisher
+from sonar_processing.velocity_subscriber import subscribe_to_velocity
 from underwater_map_construction.msg import SonarScanLine
 
-_BEAM_BUFFER_BYTES = 2**20
+Deliver = Callable[[IntensityCloud], None]
 
 
 class SonarToCloud:
-    """Subscribes to beams, publishes scans and hands them to `deliver` where stages share the process."""
+    """Subscribes to beams, publishes scans and hands them on where stages share the process."""
 
-    def __init__(self, namespace: str = "~", deliver: Optional[Callable[[IntensityCloud], None]] = None) -> None:
-        """Raises ParameterError for a bad parameter in `namespace`."""
+    def __init__(
+        self, namespace: str = "~", deliver: Optional[Deliver] = None, polar_taker: Optional[CloudTaker] = None
+    ) -> None:
+        """`deliver` takes scans, `polar_taker` organised clouds of whole turns.
+
+        Raises ParameterError for a bad parameter in `namespace`.
+        """
         self.health = make_health("sonar_to_cloud")
         self._deliver = deliver
-        self._is_moving = False
+        self._motion = Motion()
+        self._turn = TurnCollector()
         self._live = LiveParameters(
             SonarToCloudParameters, namespace, "SonarToCloud", self.health, self._use_parameters
         )
         self._scans = CloudPublisher("sonar/scan/sonarCloud")
         self._laser_scans = PointsPublisher("sonar/scan/laserCloud")
         self._newest_beam = PointsPublisher("sonar/beam")
-        self._filter = TransformFilter(self._live.current.target_frame, self.health, self._forget_scan)
+        self._turns = TurnPublisher(self.health, polar_taker)
+        parameters = self._live.current
+        self._filter = TransformFilter(parameters.target_frame, self.health, self._forget_scan)
         self._filter.registerCallback(guarded(self.health, self._place))
-        rospy.Subscriber("cmd_vel", Twist, guarded(self.health, self._take_velocity), queue_size=10)
-        rospy.Subscriber(
-            "sonar/raw",
-            SonarScanLine,
-            guarded(self.health, self._take_beam),
-            queue_size=200,
-            buff_size=_BEAM_BUFFER_BYTES,
-            tcp_nodelay=True,
-        )
+        subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._motion, self.health)
+        subscribe_to_beams(guarded(self.health, self._take_beam))
 
     def _use_parameters(self, parameters: SonarToCloudParameters) -> None:
         self._assembler = ScanAssembler(parameters)
 
     def _forget_scan(self) -> None:
         self._assembler.clear()
-
-    def _take_velocity(self, twist: Twist) -> None:
-        speed = math.hypot(twist.linear.x, twist.linear.y, twist.linear.z)
-        turn_rate = math.hypot(twist.angular.x, twist.angular.y, twist.angular.z)
-        parameters = self._live.current
-        self._is_moving = speed > parameters.still_speed or turn_rate > parameters.still_turn_rate
+        self._turn.clear()
 
     def _take_beam(self, message: SonarScanLine) -> None:
         self.health.count("beams in")
         beam = beam_from_message(message)
         self.health.count("points in", beam.intensities.size)
-        self._filter.add(beam)
+        self._filter.add(beam, self._is_moving(beam.stamp_ns))
 
-    def _place(self, beam: Beam, T_target_sonar: np.ndarray) -> None:
-        placed = PlacedBeam(beam, T_target_sonar, self._is_moving)
+    def _is_moving(self, stamp_ns: int) -> bool:
+        parameters = self._live.current
+        if not self._motion.was_heard:
+            self.health.show("velocity", f"never heard on {parameters.velocity_topic}: all beams count as still")
+            return False
+        moving, age = self._motion.is_moving(parameters), self._motion.age(stamp_ns)
+        self.health.show("velocity", "moving" if moving else "still")
+        if moving and age > parameters.velocity_timeout:
+            self.health.problem(
+                "beams of an old velocity", f"{parameters.velocity_topic} is silent for {age:.1f} s while moving"
+            )
+        return moving
+
+    def _place(self, placed: PlacedBeam) -> None:
+        parameters = self._live.current
         with self.health.timed():
             if self._newest_beam.is_read:
                 self._newest_beam.publish(self._assembler.project(placed))
             scan = self._assembler.add(placed)
+            turn = self._turn.add(placed)
         self.health.count("beams placed")
         if scan is not None:
             self._publish(scan)
+        if turn is not None:
+            self._turns.publish(turn, parameters)
 
     def _publish(self, scan: IntensityCloud) -> None:
         self.health.count("scans")

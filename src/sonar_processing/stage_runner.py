@@ -12,6 +12,7 @@ from node_support.refused_input import RefusedInput
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.cloud_publisher import CloudPublisher
 from sonar_processing.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.figure_publisher import FigurePublisher
 from sonar_processing.stages import STAGES
 
 CLOUD_BUFFER_BYTES = 2**24
@@ -28,9 +29,20 @@ class StageRunner:
             self._type.parameters, namespace, self._type.config_name, self.health, self._use_parameters
         )
         self._publisher = CloudPublisher(self._type.output_topic)
+        self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self._type.figures]
 
     def _use_parameters(self, parameters: ParameterSet) -> None:
         self._stage = self._type.build(parameters)
+
+    @property
+    def takes_polar_scans(self) -> bool:
+        """Whether the stage works beside the chain of clouds."""
+        return self._type.takes_polar_scans
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody listens to any of the stage's topics."""
+        return self._publisher.is_read or any(figure.is_read for figure in self._figures)
 
     def subscribe(self) -> None:
         """Take clouds from the stage's input topic."""
@@ -44,9 +56,10 @@ class StageRunner:
         """Run the stage, publish its result and return it; None when it could not be used (counted)."""
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
+        stage = self._stage
         try:
             with self.health.timed():
-                result = self._stage(cloud)
+                result = stage(cloud)
         except RefusedInput as refused:
             self.health.problem(refused.kind, str(refused))
             return None
@@ -57,6 +70,8 @@ class StageRunner:
         self.health.count("clouds out")
         self.health.count("points out", int(np.count_nonzero(result.valid)))
         self._publisher.publish(result)
+        for figure in self._figures:
+            figure.publish(self._type.figures[figure.name](stage))
         return result
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Optional
 
 import numpy as np
 
@@ -69,6 +70,8 @@ class Thresholder:
 
     def __init__(self, parameters: ThresholderParameters) -> None:
         self.parameters = parameters
+        self.newest_threshold: Optional[float] = None
+        """The threshold of the newest cloud; None before the first and for a cloud without a finite point."""
 
     def __call__(self, cloud: IntensityCloud) -> IntensityCloud:
         """Return the cloud's strong points; a cloud without a finite point comes back without points.
@@ -77,8 +80,9 @@ class Thresholder:
         """
         valid = cloud.valid
         if not valid.any():
+            self.newest_threshold = None
             return cloud.select(valid)
-        threshold = self.threshold(cloud.points[valid, 3])
+        self.newest_threshold = threshold = self.threshold(cloud.points[valid, 3])
         with np.errstate(invalid="ignore"):
             return cloud.select(valid & (cloud.points[:, 3] > threshold))
 

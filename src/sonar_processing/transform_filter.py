@@ -2,11 +2,10 @@
 
 import threading
 from collections import deque
-from typing import Callable, Deque, List, Optional, Tuple
+from typing import Callable, Deque, List, NamedTuple, Optional
 
 import genpy
 import message_filters
-import numpy as np
 import rospy
 import tf2_ros
 
@@ -14,11 +13,17 @@ from node_support.health import Health
 from node_support.node import guarded
 from node_support.refused_input import RefusedInput
 from sonar_processing.beam import Beam
+from sonar_processing.placed_beam import PlacedBeam
 from sonar_processing.transforms import matrix_from_message
 
 QUEUE_SIZE = 120
 JUMP_BACK = 1.0
 _WAIT = 0.5
+
+
+class _WaitingBeam(NamedTuple):
+    beam: Beam
+    is_moving: bool
 
 
 class _NotifyingListener(tf2_ros.TransformListener):
@@ -36,7 +41,7 @@ class _NotifyingListener(tf2_ros.TransformListener):
 
 
 class TransformFilter(message_filters.SimpleFilter):
-    """Calls back with (beam, T_target_sonar), in the order of the stamps, as soon as tf knows both frames.
+    """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
     At most `QUEUE_SIZE` beams wait. A beam is dropped and counted when the queue is full, when it is older than one
     that was delivered, or when tf can place a later beam of its frame but not this one. A stamp more than
@@ -49,7 +54,7 @@ class TransformFilter(message_filters.SimpleFilter):
         self._health = health
         self._on_time_jump = guarded(health, on_time_jump)
         self._condition = threading.Condition()
-        self._queue: Deque[Beam] = deque()
+        self._queue: Deque[_WaitingBeam] = deque()
         self._newest_ns: Optional[int] = None
         self._jumped = False
         self._buffer = tf2_ros.Buffer(debug=False)
@@ -57,16 +62,16 @@ class TransformFilter(message_filters.SimpleFilter):
         self._take = guarded(health, self._deliver_ready)
         threading.Thread(target=self._work, daemon=True).start()
 
-    def add(self, beam: Beam) -> None:
-        """Queue a beam; returns at once."""
+    def add(self, beam: Beam, is_moving: bool = False) -> None:
+        """Queue a beam and whether the vehicle moved when it came; returns at once."""
         with self._condition:
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
             if len(self._queue) >= QUEUE_SIZE:
-                oldest = self._queue.popleft()
+                oldest = self._queue.popleft().beam
                 self._drop(oldest, self._obstacle(oldest) or f"{QUEUE_SIZE} newer beams wait, the machine is too slow")
             self._newest_ns = beam.stamp_ns
-            self._queue.append(beam)
+            self._queue.append(_WaitingBeam(beam, is_moving))
             self._condition.notify()
 
     def _take_older(self, beam: Beam) -> None:
@@ -95,23 +100,26 @@ class TransformFilter(message_filters.SimpleFilter):
             ready = self._pop_ready()
         if jumped:
             self._on_time_jump()
-        for beam, T_target_sonar in ready:
-            self.signalMessage(beam, T_target_sonar)
+        for placed in ready:
+            self.signalMessage(placed)
 
-    def _pop_ready(self) -> List[Tuple[Beam, np.ndarray]]:
-        beams = list(self._queue)
+    def _pop_ready(self) -> List[PlacedBeam]:
+        queued = list(self._queue)
         # From the newest back: what tf brings meanwhile can then only help the older ones.
-        placeable = [not self._obstacle(beam) for beam in reversed(beams)][::-1]
-        newest = {beam.frame_id: index for index, beam in enumerate(beams) if placeable[index]}
-        waiting = [index for index, beam in enumerate(beams) if index > newest.get(beam.frame_id, -1)]
-        self._queue = deque(beams[index] for index in waiting)
+        placeable = [not self._obstacle(entry.beam) for entry in reversed(queued)][::-1]
+        newest = {entry.beam.frame_id: index for index, entry in enumerate(queued) if placeable[index]}
+        waits = [index > newest.get(entry.beam.frame_id, -1) for index, entry in enumerate(queued)]
+        self._queue = deque(entry for entry, wait in zip(queued, waits) if wait)
         ready = []
-        for beam in [beam for index, beam in enumerate(beams) if index not in waiting]:
-            obstacle = self._obstacle(beam)
+        for entry in (entry for entry, wait in zip(queued, waits) if not wait):
+            obstacle = self._obstacle(entry.beam)
             if obstacle:
-                self._drop(beam, obstacle)
-            else:
-                ready.append((beam, self._placed(beam)))
+                self._drop(entry.beam, obstacle)
+                continue
+            try:
+                ready.append(self._placed(entry))
+            except RefusedInput as refused:
+                self._health.problem(refused.kind, str(refused))
         return ready
 
     def _drop(self, beam: Beam, reason: str) -> None:
@@ -122,9 +130,10 @@ class TransformFilter(message_filters.SimpleFilter):
         can, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))
         return "" if can else reason or "unknown to tf"
 
-    def _placed(self, beam: Beam) -> np.ndarray:
+    def _placed(self, entry: _WaitingBeam) -> PlacedBeam:
+        beam = entry.beam
         stamped = self._buffer.lookup_transform_core(self._target_frame, beam.frame_id, _time(beam))
-        return matrix_from_message(stamped.transform)
+        return PlacedBeam(beam, matrix_from_message(stamped.transform), entry.is_moving)
 
 
 def _time(beam: Beam) -> rospy.Time:

@@ -30,6 +30,12 @@ def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
     return cloud_to_message(IntensityCloud(points, np.full(len(points), -10.0), 10 * 10**9, frame))
 
 
+def dense(cloud: StampedIntensityCloud) -> StampedIntensityCloud:
+    """Return the cloud saying that all its points are finite, whatever they are."""
+    cloud.cloud.is_dense = True
+    return cloud
+
+
 class BadClouds(unittest.TestCase):
     """Sends to each stage on its own input."""
 
@@ -71,7 +77,7 @@ class BadClouds(unittest.TestCase):
         points = wall()
         points[7, 0] = np.nan
         points[8, 2] = np.inf
-        self.send_to_all(message(points))
+        self.send_to_all(dense(message(points)))
         self.expect_for_all("points that are not finite", 2)
         cloud = message(wall())
         cloud.timeStamps = np.array(cloud.timeStamps)

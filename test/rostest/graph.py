@@ -61,6 +61,15 @@ class Inbox:
             self.messages.append(message)
             self._condition.notify_all()
 
+    def wait_for_link(self, timeout: float = 20.0) -> None:
+        """Wait until a publisher is connected, so that no message is missed from then on."""
+        ended = threading.Event()
+        for _ in range(int(timeout / 0.05)):
+            if self._subscriber.get_num_connections():
+                return
+            ended.wait(0.05)
+        raise AssertionError(f"{self._topic}: nobody publishes it after {timeout} s")
+
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = 20.0) -> Any:
         """Return the newest message once it fits; raises AssertionError after `timeout` seconds of wall time."""
         with self._condition:
@@ -112,6 +121,21 @@ def _links(node: str, topic: str) -> int:
     slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
     _, _, connections = slave.getBusInfo("/graph_test")
     return sum(1 for link in connections if link[2] == "o" and link[4] == topic and link[5])
+
+
+def wait_until(holds: Callable[[], bool], timeout: float = 20.0, required: bool = True) -> bool:
+    """Wait until a state holds that nobody tells of, and return whether it does.
+
+    Raises AssertionError after `timeout` seconds where it is `required`.
+    """
+    ended = threading.Event()
+    for _ in range(int(timeout / 0.02)):
+        if holds():
+            return True
+        ended.wait(0.02)
+    if required:
+        raise AssertionError(f"not after {timeout} s")
+    return False
 
 
 def play(bag: Path, rate: float) -> None:

@@ -22,8 +22,9 @@ ROS_SIDE = {
     "mlsm_manager": {"map_publisher", "map_transform", "markers", "mlsm_core", "nodes"},
     "node_support": {"live_parameters", "node", "reconfigure_description"},
     "sonar_processing": {
-        "cloud_publisher", "conversions", "host", "nodes", "sonar_to_cloud", "stage_runner", "transform_filter",
-        "transforms",
+        "beam_subscriber", "cloud_publisher", "conversions", "figure_publisher", "host", "nodes", "shape_detectors",
+        "shape_messages", "sonar_control", "sonar_image", "sonar_places", "sonar_to_cloud", "stage_runner",
+        "transform_filter", "transforms", "turn_publisher", "velocity_subscriber",
     },
     "sonar_simulator": {
         "bag_tool", "bag_writer", "gazebo_messages", "gazebo_node", "nodes", "simulator_messages", "simulator_node",

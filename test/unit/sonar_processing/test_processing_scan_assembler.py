@@ -8,7 +8,9 @@ from clouds import SECOND, beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.scan_assembler import PlacedBeam, ScanAssembler, ScanMode, SonarToCloudParameters
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.scan_assembler import ScanAssembler
+from sonar_processing.sonar_to_cloud_parameters import ScanMode, SonarToCloudParameters
 
 STEP = math.radians(3.0)
 
@@ -57,8 +59,19 @@ def test_a_missed_beam_does_not_lengthen_the_scan(missed):
     assert _scan_ends(angles) == [119, 239]
 
 
-def test_a_missed_last_beam_is_made_up_for_by_the_first_of_the_next_turn():
-    assert _scan_ends(np.delete(STEP * np.arange(200), 119)) == [120]
+@pytest.mark.parametrize("lost", [[119], [118, 119], [100, 117, 118, 119]])
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_first_beam_of_a_turn_ends_the_one_before_whose_last_beams_were_lost(lost, direction):
+    angles = np.delete(direction * STEP * np.arange(240), lost)
+    assembler = _assembler(scan_size=3600)
+    scans = [assembler.add(_placed(angle=angle, seconds=number)) for number, angle in enumerate(angles, 1)]
+    lengths = [np.unique(scan.time_stamps).size for scan in scans if scan is not None]
+    assert lengths == [120 - len(lost), 120]
+
+
+def test_the_continuous_modes_go_on_over_the_end_of_a_turn():
+    assembler = _assembler(mode="LASERCONT", scan_size=3600)
+    assert [len(assembler.add(_placed(angle=count * STEP))) for count in range(250)][-1] == 250
 
 
 def test_steps_that_vary_still_make_a_full_turn():
@@ -191,6 +204,20 @@ def test_an_organised_scan_has_a_row_per_beam_and_nan_for_removed_points():
     assert (scan.height, len(scan)) == (2, 6)
     assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False] * 2
     assert scan.time_stamps.tolist() == [-1, -1, -1, -2, -2, -2]
+
+
+def test_an_organised_scan_of_one_beam_keeps_its_bins():
+    scan = _assembler(scan_size=1, keep_organized=True, min_range=1.0).add(_placed())
+    assert scan.is_organized
+    assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False]
+
+
+def test_an_organised_laser_scan_has_a_point_per_beam():
+    assembler = _assembler(mode="LASER", scan_size=2, keep_organized=True)
+    assembler.add(_placed(strengths=(0, 0, 0)))
+    scan = assembler.add(_placed())
+    assert (scan.height, len(scan)) == (2, 2)
+    assert scan.valid.tolist() == [False, True]
 
 
 def test_beams_of_different_bin_counts_cannot_be_organised():

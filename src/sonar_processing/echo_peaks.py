@@ -1,0 +1,106 @@
+"""Peaks, edges and runs of the rows of a polar image."""
+
+from dataclasses import dataclass, replace
+from typing import Tuple
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+
+_LEVELS_PER_STRENGTH = 64.0
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True)
+class Peaks:
+    """Places in a polar image: beams (n,) int, bins (n,) float64 (bin i has its centre at i), heights (n,) float32."""
+
+    beams: np.ndarray
+    bins: np.ndarray
+    heights: np.ndarray
+
+    def select(self, keep: np.ndarray) -> "Peaks":
+        """Return those where `keep` (n,) holds."""
+        return Peaks(self.beams[keep], self.bins[keep], self.heights[keep])
+
+
+def find_peaks(image: np.ndarray, apart: int) -> Peaks:
+    """Return the local maxima above zero of each row, none of them within `apart` bins of a higher one.
+
+    image: (beams, bins) float32. Peaks are placed between the bins by a parabola, level ones in their middle. Levels
+    closer than 1/64 count as equal, so that rounding makes no peaks on a saturated echo.
+    """
+    beams, first, last = _level_tops(image)
+    middle = (first + last) // 2
+    heights = image[beams, middle]
+    highest_near = maximum_filter1d(image, 2 * apart + 1, axis=1, mode="constant")[beams, middle]
+    keep = (heights > 0.0) & (heights >= highest_near - 1.0 / _LEVELS_PER_STRENGTH)
+    beams, first, last, middle = beams[keep], first[keep], last[keep], middle[keep]
+    bins = np.where(first == last, middle + _summit(image, beams, middle), (first + last) / 2.0)
+    return Peaks(beams, bins, heights[keep])
+
+
+def _level_tops(image: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return row, first and last bin of every stretch of equal bins that is higher than what lies beside it."""
+    rows, columns = image.shape
+    levels = np.full((rows, columns + 2), -1, dtype=np.int32)
+    levels[:, 1:-1] = np.rint(image * _LEVELS_PER_STRENGTH)
+    step = np.diff(levels.ravel())
+    changes = np.flatnonzero(step)
+    rises = step[changes] > 0
+    tops = np.flatnonzero(rises[:-1] & ~rises[1:])
+    beams, first = np.divmod(changes[tops] + 1, columns + 2)
+    last = changes[tops + 1] - beams * (columns + 2)
+    return beams, first - 1, last - 1
+
+
+def _summit(image: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
+    """Return where between -0.5 and 0.5 bins the parabola through a peak and its neighbours is highest."""
+    end = image.shape[1] - 1
+    left, top, right = (image[beams, np.clip(bins + side, 0, end)] for side in (-1, 0, 1))
+    bend = left - 2.0 * top + right
+    with np.errstate(divide="ignore", invalid="ignore"):
+        offset = 0.5 * (left - right) / bend
+    return np.where(bend < 0.0, np.clip(offset, -0.5, 0.5), 0.0)
+
+
+def leading_edges(image: np.ndarray, peaks: Peaks) -> Peaks:
+    """Return where each peak's echo rises through half of the peak's height; one place per echo, its highest peak."""
+    bins = np.rint(peaks.bins).astype(np.int64)
+    half = peaks.heights / 2.0
+    walking = np.arange(len(bins))
+    while walking.size:
+        before = np.maximum(bins[walking] - 1, 0)
+        higher = (bins[walking] > 0) & (image[peaks.beams[walking], before] >= half[walking])
+        walking = walking[higher]
+        bins[walking] -= 1
+    below = image[peaks.beams, np.maximum(bins - 1, 0)]
+    above = image[peaks.beams, bins]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        edges = np.where(bins > 0, bins - (above - half) / (above - below), 0.0)
+    return _highest_of_each(replace(peaks, bins=edges), bins)
+
+
+def _highest_of_each(peaks: Peaks, bins: np.ndarray) -> Peaks:
+    order = np.lexsort([-peaks.heights, bins, peaks.beams])
+    beams, bins = peaks.beams[order], bins[order]
+    first = np.ones(len(order), dtype=bool)
+    first[1:] = (np.diff(beams) != 0) | (np.diff(bins) != 0)
+    return peaks.select(order[first])
+
+
+def points_along_runs(image: np.ndarray, threshold: float, spacing: float) -> Peaks:
+    """Return places `spacing` bins apart along every run of bins that reach `threshold`, the first at its beginning.
+
+    A run of n bins gives ceil(n / spacing) places, centred on the bins they lie in.
+    """
+    padded = np.zeros((image.shape[0], image.shape[1] + 2), dtype=np.int8)
+    padded[:, 1:-1] = image >= max(threshold, np.finfo(np.float32).tiny)
+    change = np.diff(padded, axis=1)
+    beams, starts = np.nonzero(change > 0)
+    lengths = np.nonzero(change < 0)[1] - starts
+    spacing = max(spacing, 1.0)
+    counts = np.ceil(lengths / spacing - _ROUNDING).astype(np.int64)
+    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
+    bins = np.repeat(starts, counts) + np.floor(within * spacing + _ROUNDING)
+    beams = np.repeat(beams, counts)
+    return Peaks(beams, bins, image[beams, bins.astype(np.int64)])
