@@ -2,12 +2,12 @@
 
 from typing import Optional
 
-import numpy as np
 import rospy
 from sensor_msgs.msg import JointState
 
 from node_support.node import guarded, make_health
 from sonar_processing.conversions import header
+from sonar_processing.placed_beam import PlacedBeam
 from sonar_processing.transform_filter import TransformFilter
 from sonar_simulator.echo_model import make_echo_model
 from sonar_simulator.gazebo_beams import GazeboBeams, RayScan
@@ -71,9 +71,10 @@ class GazeboSonar:
         self._next_beam += 1
         self._publish(ping, scan)
 
-    def _turned(self, scan: RayScan, T_sonar_rays: np.ndarray) -> None:
+    def _turned(self, placed: PlacedBeam) -> None:
+        scan: RayScan = placed.beam
         with self.health.timed():
-            ping = self._beams.turned(scan, T_sonar_rays)
+            ping = self._beams.turned(scan, placed.T_target_sonar)
         self._publish(ping, scan)
 
     def _publish(self, ping: Ping, scan: RayScan) -> None:
