@@ -71,7 +71,7 @@ class PhysicalParameters(ParameterSet):
     )  # fmt: skip
     detector: Detector = parameter(Detector.AMPLITUDE, "what strengths are in proportion to")
     full_level_db: float = parameter(
-        110.0, "level at 1 m that is the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
+        90.0, "level at 1 m that is the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
     )
     dynamic_range_db: float = parameter(
         40.0, "from strength 0 to the greatest strength, of a detector in decibels", unit="dB", low=1.0, high=150.0

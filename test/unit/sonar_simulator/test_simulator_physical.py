@@ -83,14 +83,18 @@ def test_the_pulse_keeps_the_energy_of_an_echo():
 
 
 def test_strengths_of_an_amplitude_detector_double_with_6_db():
-    weak = make_echo_model("physical", {**STILL, "gain_db": 2.0}).echoes(_wall(20.0), np.random.default_rng(0))
-    strong = make_echo_model("physical", {**STILL, "gain_db": 8.02}).echoes(_wall(20.0), np.random.default_rng(0))
+    weak = make_echo_model("physical", {**STILL, "full_level_db": 104.0, "gain_db": 2.0}).echoes(
+        _wall(20.0), np.random.default_rng(0)
+    )
+    strong = make_echo_model("physical", {**STILL, "full_level_db": 104.0, "gain_db": 8.02}).echoes(
+        _wall(20.0), np.random.default_rng(0)
+    )
     assert 20 < weak.max() < 63
     assert strong.max() == pytest.approx(2 * weak.max(), abs=1)
 
 
 def test_strengths_of_a_decibel_detector_grow_by_the_gain():
-    values = {**STILL, "detector": "decibels", "dynamic_range_db": 63.5}
+    values = {**STILL, "detector": "decibels", "full_level_db": 115.0, "dynamic_range_db": 63.5}
     weak = make_echo_model("physical", {**values, "gain_db": 5.0}).echoes(_wall(20.0), np.random.default_rng(0))
     strong = make_echo_model("physical", {**values, "gain_db": 10.0}).echoes(_wall(20.0), np.random.default_rng(0))
     assert strong.max() - weak.max() == pytest.approx(10, abs=1)
