@@ -44,7 +44,11 @@ def draw_world(axis: Axes, world: World, place: tuple, max_range: float) -> None
     triangles = world_triangles(world)
     corners = triangles.points.reshape(-1, 3, 3) - np.array(place)
     order = np.argsort(corners[..., 2].mean(axis=1))
-    axis.add_collection(PolyCollection(corners[order, :, :2], facecolors=triangles.colours[::3][order], linewidths=0))
+    axis.add_collection(
+        PolyCollection(
+            corners[order, :, :2], facecolors=triangles.colours[::3][order], linewidths=0, antialiaseds=False
+        )
+    )
     axis.plot(0.0, 0.0, "r.")
     axis.set(xlim=(-max_range, max_range), ylim=(-max_range, max_range), aspect="equal", title="from above")
 

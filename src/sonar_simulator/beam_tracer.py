@@ -5,7 +5,6 @@ import numpy as np
 from sonar_simulator.beam_pattern import RayPattern, head_turns
 from sonar_simulator.contacts import Contacts
 from sonar_simulator.mirrors import Leg, Mirrors, legs
-from sonar_simulator.nearest_surface import NearestSurface
 from sonar_simulator.ray_caster import RayCaster
 
 # The nearest surface may be a sliver of the beam: its ray stands for a tenth of another ray.
@@ -21,7 +20,7 @@ class BeamTracer:
         self._caster = caster
         self._pattern = pattern
         self._mirrors = mirrors
-        self._nearest = NearestSurface(caster.world)
+        self._nearest = caster.nearest
         self._planes = pattern.planes()
         self._shares = pattern.shares()
 

@@ -52,7 +52,7 @@ class PhysicalParameters(ParameterSet):
     salinity: float = parameter(35.0, "of the water, 0 in a tank", unit="per mille", low=0.0, high=42.0)
     pulse_length_us: float = parameter(100.0, "length of the pulse", unit="us", low=1.0, high=1000.0)
     source_level_db: float = parameter(
-        100.0, "echo of a surface that fills the beam at 1 m and sends everything back", unit="dB", low=0.0, high=250.0
+        105.0, "echo of a surface that fills the beam at 1 m and sends everything back", unit="dB", low=0.0, high=250.0
     )
     noise_level_db: float = parameter(0.0, "noise of receiver and water", unit="dB", low=-300.0, high=100.0)
     volume_scattering_db: float = parameter(
@@ -69,7 +69,7 @@ class PhysicalParameters(ParameterSet):
         0.2, "the head's gain over range: absorption made good, per metre each way", unit="dB/m", low=0.0, high=2.55,
         thesis_name="absorption / 100",
     )  # fmt: skip
-    detector: Detector = parameter(Detector.AMPLITUDE, "what strengths are in proportion to")
+    detector: Detector = parameter(Detector.DECIBELS, "what strengths are in proportion to")
     full_level_db: float = parameter(
         110.0, "level at 1 m that is the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
     )

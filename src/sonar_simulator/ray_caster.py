@@ -1,9 +1,11 @@
 """Casts rays into a world."""
 
+from functools import cached_property
 from typing import Tuple
 
 import numpy as np
 
+from sonar_simulator.nearest_surface import NearestSurface
 from sonar_simulator.world import World
 
 # Embree answers 1e37 where a ray hits nothing.
@@ -26,6 +28,11 @@ class RayCaster:
         self._scene = EmbreeScene(robust=True)
         TriangleMesh(self._scene, world.vertices.astype(np.float32), world.faces.astype(np.int32))
         self.world = world
+
+    @cached_property
+    def nearest(self) -> NearestSurface:
+        """What finds the nearest surface inside a beam."""
+        return NearestSurface(self.world)
 
     def distances(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
         """Return (n,) float64 distances, m, inf where nothing is hit. Both sides of a surface are solid.

@@ -10,6 +10,7 @@ from sonar_simulator.materials import MATERIALS
 from sonar_simulator.physical import Physical, PhysicalParameters
 
 STILL = {"speckle": 0.0, "noise_level_db": -300.0, "volume_scattering_db": -300.0, "ringing": 0.0}
+AMPLITUDE = {"detector": "amplitude", "source_level_db": 100.0}
 
 
 def _model(**values):
@@ -83,14 +84,18 @@ def test_the_pulse_keeps_the_energy_of_an_echo():
 
 
 def test_strengths_of_an_amplitude_detector_double_with_6_db():
-    weak = make_echo_model("physical", {**STILL, "gain_db": 2.0}).echoes(_wall(20.0), np.random.default_rng(0))
-    strong = make_echo_model("physical", {**STILL, "gain_db": 8.02}).echoes(_wall(20.0), np.random.default_rng(0))
+    weak = make_echo_model("physical", {**STILL, **AMPLITUDE, "full_level_db": 104.0, "gain_db": 2.0}).echoes(
+        _wall(20.0), np.random.default_rng(0)
+    )
+    strong = make_echo_model("physical", {**STILL, **AMPLITUDE, "full_level_db": 104.0, "gain_db": 8.02}).echoes(
+        _wall(20.0), np.random.default_rng(0)
+    )
     assert 20 < weak.max() < 63
     assert strong.max() == pytest.approx(2 * weak.max(), abs=1)
 
 
 def test_strengths_of_a_decibel_detector_grow_by_the_gain():
-    values = {**STILL, "detector": "decibels", "dynamic_range_db": 63.5}
+    values = {**STILL, "detector": "decibels", "full_level_db": 125.0, "dynamic_range_db": 63.5}
     weak = make_echo_model("physical", {**values, "gain_db": 5.0}).echoes(_wall(20.0), np.random.default_rng(0))
     strong = make_echo_model("physical", {**values, "gain_db": 10.0}).echoes(_wall(20.0), np.random.default_rng(0))
     assert strong.max() - weak.max() == pytest.approx(10, abs=1)
@@ -104,7 +109,8 @@ def test_strengths_never_leave_0_to_127(gain, noise, seed):
 
 def test_speckle_is_a_rayleigh_amplitude():
     model = make_echo_model(
-        "physical", {**STILL, "speckle": 1.0, "saturation": 255, "gain_db": 18.0, "tvg_spreading": 0.0}
+        "physical",
+        {**STILL, **AMPLITUDE, "speckle": 1.0, "saturation": 255, "full_level_db": 96.0, "tvg_spreading": 0.0},
     )
     beams = Contacts.of_ranges(np.full((4000, 1), 20.05))
     strengths = model.echoes(beams, np.random.default_rng(0))[:, 200].astype(float)
@@ -113,7 +119,7 @@ def test_speckle_is_a_rayleigh_amplitude():
 
 
 def test_noise_is_there_without_any_surface_and_grows_with_the_heads_gain_over_range():
-    strengths = make_echo_model("physical", {"gain_db": 35.0}).echoes(
+    strengths = make_echo_model("physical", {**AMPLITUDE, "full_level_db": 90.0}).echoes(
         Contacts.of_ranges(np.full((50, 10), np.inf)), np.random.default_rng(0)
     )
     assert strengths[:, 450:].mean() > 2.0 * strengths[:, 200:250].mean() > 0.0
@@ -122,6 +128,8 @@ def test_noise_is_there_without_any_surface_and_grows_with_the_heads_gain_over_r
 def test_the_transducer_rings_up_to_the_range_asked_for():
     values = {
         **STILL,
+        **AMPLITUDE,
+        "full_level_db": 90.0,
         "ringing": 0.5,
         "max_range": 10.0,
         "ringing_level_db": 120.0,

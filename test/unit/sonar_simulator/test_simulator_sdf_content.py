@@ -97,6 +97,20 @@ def test_a_mesh_is_found_by_every_kind_of_uri(load, model_file, uri):
     assert (world.warnings, len(world.world.faces)) == ((), 4)
 
 
+def test_a_mesh_is_found_in_a_ros_package(load, tmp_path, monkeypatch):
+    pytest.importorskip("rospkg")
+    package = tmp_path / "boats"
+    package.mkdir()
+    (package / "package.xml").write_text(
+        '<package format="2"><name>boats</name><version>1.0.0</version><description>d</description>'
+        '<maintainer email="a@b.cd">m</maintainer><license>BSD</license></package>'
+    )
+    (package / "t.obj").write_text(TETRAHEDRON)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(package))
+    loaded = load(_collision("<geometry><mesh><uri>package://boats/t.obj</uri></mesh></geometry>"))
+    assert (loaded.warnings, len(loaded.world.faces)) == ((), 4)
+
+
 @pytest.mark.parametrize(
     ("mesh", "reason"),
     [
