@@ -34,12 +34,12 @@ class BasinScans:
         self._model = make_echo_model("laser_cone", {"spread": spread})
 
     def scan(self, T_world_sonar: np.ndarray, seed: int) -> IntensityCloud:
-        """Return the full turn heard from a (4, 4) pose, all bins, in the world frame."""
+        """Return the full turn heard from a (4, 4) pose, organised, in the world frame."""
         head = SonarHead(self._parameters.beams_per_turn, self._parameters.seconds_per_turn)
         angles = np.array([head.angle(beam) for beam in range(head.beams_per_turn)])
         sonar = Sonar(self._caster, self._parameters.pattern(), self._model, np.random.default_rng(seed))
         strengths = sonar.pings(np.repeat(T_world_sonar[np.newaxis], len(angles), axis=0), angles)
-        assembler = ScanAssembler(SonarToCloudParameters())
+        assembler = ScanAssembler(SonarToCloudParameters(keep_organized=True))
         scans = []
         for number, angle in enumerate(angles):
             stamp_ns = 10**12 + round(1e9 * head.time(number))

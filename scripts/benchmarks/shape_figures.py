@@ -2,7 +2,8 @@
 
 import math
 from dataclasses import dataclass
-from typing import List, Optional
+from functools import reduce
+from typing import List, Optional, Sequence
 
 import numpy as np
 
@@ -10,8 +11,11 @@ from benchmarks.basin_scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
 from benchmarks.table import Row, median_seconds
 from sonar_processing.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.echo_extraction import EchoExtractorParameters
+from sonar_processing.echo_extractor import EchoExtractor
 from sonar_processing.lines import Line, LineDetector, LineDetectorParameters
 from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.stages import Stage
 from sonar_processing.threshold import Thresholder, ThresholderParameters
 
 SEEDS = 100
@@ -52,18 +56,18 @@ def wall_errors(lines: List[Line], T_world_sonar: np.ndarray) -> List[WallErrors
     return result
 
 
-def wall_rows(spread: float) -> List[Row]:
+def wall_rows(spread: float, name: str, chain: Sequence[Stage]) -> List[Row]:
     """Measure walls from random places, seed by seed."""
     scans, detector = BasinScans(spread), LineDetector(LineDetectorParameters())
-    thresholder, remover = Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())
     seeds = []
     for seed in range(SEEDS):
         pose = anywhere(seed)
-        seeds.append(wall_errors(detector(remover(thresholder(scans.scan(pose, seed)))), pose))
+        cloud = reduce(lambda cloud, stage: stage(cloud), chain, scans.scan(pose, seed))
+        seeds.append(wall_errors(detector(cloud), pose))
     found = [error for errors in seeds for error in errors if error.distance is not None]
     good = sum(all(error.is_good for error in errors) for errors in seeds)
     worst = f"{max(e.distance for e in found):.2f} m, {math.degrees(max(e.angle for e in found)):.2f} deg"
-    name = f"echo spread {spread} m: "
+    name = f"{name}, spread {spread} m: "
     return [
         (f"{name}all walls within {WALL_REACH:.0f} m found to 0.15 m, 1 deg", f"{good} of {SEEDS} seeds", ">= 99"),
         (f"{name}walls found of those there", f"{len(found)} of {sum(map(len, seeds))}", ""),
@@ -82,7 +86,7 @@ def buoy_rows(spread: float) -> List[Row]:
         circles = detector(cloud, lambda times, place=pose[:2, 3]: np.tile(place, (len(times), 1)))
         errors.append(min((float(np.linalg.norm(circle.center - buoy)) for circle in circles), default=math.inf))
     good = sum(error <= DISTANCE_TOLERANCE for error in errors)
-    name = f"echo spread {spread} m: buoy of 0.5 m at 10 m"
+    name = f"thresholded, spread {spread} m: buoy of 0.5 m at 10 m"
     return [
         (f"{name}, error of its centre", f"{np.median(errors):.2f} m median", "0.15 m"),
         (f"{name} within 0.15 m", f"{good} of {SEEDS} seeds", ""),
@@ -115,5 +119,9 @@ def time_rows() -> List[Row]:
 
 def rows() -> List[Row]:
     """Return the figures of the shapes."""
-    found = [row for spread in SPREADS for row in wall_rows(spread) + buoy_rows(spread)]
+    found = []
+    for spread in SPREADS:
+        cleaned = [Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())]
+        extractor = EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))
+        found += wall_rows(spread, "cleaned", cleaned) + wall_rows(spread, "echoes", [extractor]) + buoy_rows(spread)
     return found + time_rows()

@@ -13,7 +13,7 @@ from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ransac import RansacParameters, best_hypothesis
 
 SonarPositions = Callable[[np.ndarray], np.ndarray]
-"""Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s]."""
+"""Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s], NaN where it is not known."""
 
 _NEXT_BEAM = 1.5
 _PENALTY = 4
@@ -124,7 +124,7 @@ class CircleDetector:
         strong = echoes.strong(self.parameters.min_echo_share)
         origins = sonar_positions(echoes.time_stamps) if len(strong) else np.empty((0, 2))
         free = np.zeros(len(echoes), dtype=bool)
-        free[strong] = True
+        free[strong] = np.isfinite(origins[strong]).all(axis=1)
         circles: List[Circle] = []
         while len(circles) < self.parameters.n_circles and np.count_nonzero(free) >= self.parameters.min_inliers:
             inliers = self._best_circle(echoes.points, origins, free, strong, rng)

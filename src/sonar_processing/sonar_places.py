@@ -1,6 +1,7 @@
 """Where the sonar was when the beams of a scan were taken, by tf."""
 
 import time
+from typing import Tuple
 
 import genpy
 import numpy as np
@@ -12,6 +13,7 @@ from sonar_processing.transform_filter import JUMP_BACK
 
 _CACHE = 300.0
 _PATIENCE = 0.5
+_WAIT_STEP = 0.02
 
 
 class SonarPlaces:
@@ -30,27 +32,32 @@ class SonarPlaces:
         self._newest = seconds
 
     def at(self, frame_id: str, times: np.ndarray) -> np.ndarray:
-        """Return (m, 2) x y [m] of the sonar in `frame_id` at `times` (m,) [s].
+        """Return (m, 2) x y [m] of the sonar in `frame_id` at `times` (m,) [s], NaN where tf does not know it.
 
-        Raises RefusedInput when tf does not know all of them within half a second.
+        Waits up to half a second for the newest. Raises RefusedInput when tf knows none of them.
         """
         distinct, index = np.unique(times, return_inverse=True)
-        places = np.array([self._place(frame_id, seconds) for seconds in distinct]).reshape(-1, 2)
+        self._wait_for(frame_id, distinct[-1])
+        places = np.array([self._place(frame_id, seconds) for seconds in distinct])
+        if np.isnan(places).all():
+            reason = self._obstacle(frame_id, distinct[-1])
+            raise RefusedInput("scans without sonar position", f"{self._frame} in {frame_id}: {reason}")
         return places[index]
 
-    def _place(self, frame_id: str, seconds: float) -> tuple:
-        stamp = genpy.Time.from_sec(seconds)
-        try:
-            found = self._lookup(frame_id, stamp).transform.translation
-        except tf2_ros.TransformException as error:
-            raise RefusedInput("scans without sonar position", f"{self._frame} in {frame_id}: {error}") from error
-        return found.x, found.y
+    def _wait_for(self, frame_id: str, seconds: float) -> None:
+        deadline = time.monotonic() + _PATIENCE
+        while self._obstacle(frame_id, seconds) and time.monotonic() < deadline:
+            if rospy.core.is_shutdown_requested():
+                return
+            time.sleep(_WAIT_STEP)
 
-    def _lookup(self, frame_id: str, stamp: genpy.Time) -> object:
-        if not self._buffer.can_transform_core(frame_id, self._frame, stamp)[0]:
-            deadline = time.monotonic() + _PATIENCE
-            while time.monotonic() < deadline and not rospy.core.is_shutdown_requested():
-                if self._buffer.can_transform_core(frame_id, self._frame, stamp)[0]:
-                    break
-                time.sleep(0.02)
-        return self._buffer.lookup_transform_core(frame_id, self._frame, stamp)
+    def _obstacle(self, frame_id: str, seconds: float) -> str:
+        known, reason = self._buffer.can_transform_core(frame_id, self._frame, genpy.Time.from_sec(seconds))
+        return "" if known else reason or "unknown to tf"
+
+    def _place(self, frame_id: str, seconds: float) -> Tuple[float, float]:
+        if self._obstacle(frame_id, seconds):
+            return np.nan, np.nan
+        stamp = genpy.Time.from_sec(seconds)
+        found = self._buffer.lookup_transform_core(frame_id, self._frame, stamp).transform.translation
+        return found.x, found.y

@@ -72,10 +72,12 @@ class Shapes(unittest.TestCase):
         self.expect_for_both("clouds refused", 1)
 
     def test_3_points_that_are_not_finite_are_left_out(self) -> None:
-        """One bad point costs one point."""
+        """One bad point costs one point, in a cloud that says that it has none."""
         points = scan()
         points[3, 0] = np.nan
-        self.clouds.publish(message(points))
+        cloud = message(points)
+        cloud.cloud.is_dense = True
+        self.clouds.publish(cloud)
         self.expect_for_both("points that are not finite", 1)
 
     def test_4_a_frame_that_tf_does_not_know_costs_circles_and_no_walls(self) -> None:

@@ -153,6 +153,11 @@ def test_circles_stand_beside_walls():
     np.testing.assert_allclose(circle.center, (4.0, -4.0), atol=0.15)
 
 
+def test_what_was_seen_from_an_unknown_place_is_no_circle():
+    detector = CircleDetector(CircleDetectorParameters())
+    assert detector(_cloud(_seen_circle((4.0, -4.0), 0.4)), lambda times: np.full((len(times), 2), np.nan)) == []
+
+
 def test_radii_in_the_wrong_order_are_refused():
     with pytest.raises(ParameterError, match="min_radius"):
         CircleDetectorParameters(min_radius=0.7)
