@@ -1,9 +1,8 @@
 """The tank of the real recording micron_static.bag, simulated, and how far the strengths of both are apart."""
 
-import math
 import os
 from pathlib import Path
-from typing import Dict, NamedTuple, Optional
+from typing import NamedTuple, Optional
 
 import numpy as np
 import rosbag
@@ -19,6 +18,8 @@ ROOT = Path(__file__).resolve().parents[2]
 # The range bands whose histograms are compared. Nearer than half a metre stands a part of the vehicle.
 BANDS = np.arange(0.5, 10.01, 0.5)
 BEAMS_PER_TURN = 200
+# Where the head stands in worlds/tank.sdf: its walls are built around the recording, its depth is fitted.
+HEAD_PLACE = pose_matrix((0.0, 0.0, -0.38), (0.0, 0.0, -0.126))
 
 
 class Beams(NamedTuple):
@@ -42,12 +43,10 @@ def recording() -> Optional[Beams]:
 def simulated(angles: np.ndarray, model_name: str = "physical", seed: int = 1) -> Beams:
     """Return what a model hears in worlds/tank.sdf with the parameters of yaml/sonar_simulator_tank.yaml."""
     parameters = yaml.safe_load((ROOT / "yaml/sonar_simulator_tank.yaml").read_text())
-    place: Dict[str, float] = parameters["head"]
-    pose = pose_matrix((place["x"], place["y"], place["z"]), (0.0, 0.0, math.radians(place["yaw_deg"])))
     caster = RayCaster(load_world(ROOT / "worlds/tank.sdf").world)
     model = make_echo_model(model_name, parameters[model_name])
     sonar = Sonar(caster, SonarParameters().pattern(), model, np.random.default_rng(seed))
-    return Beams(angles, sonar.pings(np.repeat(pose[np.newaxis], len(angles), axis=0), angles))
+    return Beams(angles, sonar.pings(np.repeat(HEAD_PLACE[np.newaxis], len(angles), axis=0), angles))
 
 
 def distances(one: Beams, other: Beams) -> np.ndarray:
