@@ -4,7 +4,7 @@ from typing import Tuple
 
 import numpy as np
 
-_GROUP = 16
+_GROUP = 8
 # Boxes are compared in float32, m.
 _MARGIN = 1e-3
 
