@@ -25,11 +25,11 @@ class Drive(Enum):
 class SimulatorParameters(ParameterSet):
     """What is simulated, how fast and from which seed."""
 
-    world: str = parameter("worlds/basin.sdf", "SDF file; relative to the package's folder", tunable=False)
+    world: str = parameter("worlds/basin.sdf", "SDF or mesh file; relative to the package's folder", tunable=False)
     script: str = parameter(
         "yaml/basin_tour.yaml", "moves of the vehicle; relative to the package's folder", tunable=False
     )
-    echo_model: str = parameter("laser_cone", "how ray distances become echoes", tunable=False)
+    echo_model: str = parameter("laser_cone", "how contacts become echoes: laser_cone, collision or physical", tunable=False)
     drive: Drive = parameter(
         Drive.SCRIPT, "what moves the vehicle: its script, or from the script's start on commands", tunable=False
     )
