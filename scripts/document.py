@@ -27,7 +27,7 @@ from sonar_simulator.simulation import SimulatorParameters
 from sonar_simulator.simulation_setup import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
-PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md")))
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 _BLOCK = re.compile(r"(<!-- parameters: ([\w/]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -61,7 +61,7 @@ def generated() -> Dict[Path, str]:
     }
     texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
     texts[ROOT / "yaml/gazebo_sonar_default.yaml"] = gazebo_sonar_yaml()
-    texts.update({page: with_tables(page.read_text()) for page in PAGES})
+    texts.update({path: with_tables(path.read_text()) for path in DOCUMENTS})
     texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     return texts
 
