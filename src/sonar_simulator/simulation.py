@@ -29,7 +29,9 @@ class SimulatorParameters(ParameterSet):
     script: str = parameter(
         "yaml/basin_tour.yaml", "moves of the vehicle; relative to the package's folder", tunable=False
     )
-    echo_model: str = parameter("laser_cone", "how contacts become echoes: laser_cone, collision or physical", tunable=False)
+    echo_model: str = parameter(
+        "laser_cone", "how contacts become echoes: laser_cone, collision or physical", tunable=False
+    )
     drive: Drive = parameter(
         Drive.SCRIPT, "what moves the vehicle: its script, or from the script's start on commands", tunable=False
     )
