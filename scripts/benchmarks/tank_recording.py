@@ -45,7 +45,7 @@ def simulated(angles: np.ndarray, model_name: str = "physical", seed: int = 1) -
     parameters = yaml.safe_load((ROOT / "yaml/sonar_simulator_tank.yaml").read_text())
     caster = RayCaster(load_world(ROOT / "worlds/tank.sdf").world)
     model = make_echo_model(model_name, parameters[model_name])
-    sonar = Sonar(caster, SonarParameters().pattern(), model, np.random.default_rng(seed))
+    sonar = Sonar(caster, SonarParameters(**parameters["sonar"]).pattern(), model, np.random.default_rng(seed))
     return Beams(angles, sonar.pings(np.repeat(HEAD_PLACE[np.newaxis], len(angles), axis=0), angles))
 
 

@@ -30,7 +30,7 @@ def bag_rows() -> List[Row]:
     with tempfile.TemporaryDirectory() as folder:
         out = Path(folder) / "survey.bag"
         for world, model in (("basin", "laser_cone"), ("tank", "laser_cone"), ("harbour", "laser_cone"),
-                             ("harbour", "physical")):  # fmt: skip
+                             ("tank", "physical"), ("harbour", "physical")):  # fmt: skip
             wall, busy = np.median([_bag_seconds(out, world, model) for _ in range(3)], axis=0)
             with rosbag.Bag(str(out)) as bag:
                 simulated = bag.get_end_time() - bag.get_start_time()
