@@ -1,5 +1,6 @@
 """The simulator: bags without a master, and the node's clock and load."""
 
+import hashlib
 import os
 import signal
 import socket
@@ -39,9 +40,25 @@ def bag_rows() -> List[Row]:
     return rows
 
 
-def _bag_seconds(out: Path, world: str, model: str) -> List[float]:
+def seed_rows() -> List[Row]:
+    """Write the tank's bag with two seeds, the first one twice, and compare bytes."""
+    with tempfile.TemporaryDirectory() as folder:
+        hashes = [_bag_hash(Path(folder) / f"{number}.bag", seed) for number, seed in enumerate((1, 1, 2))]
+    same, other = hashes[0] == hashes[1], hashes[0] == hashes[2]
+    figure = f"{'equal' if same else 'different'} bytes; another seed: {'equal' if other else 'different'}"
+    return [("simulate_bag, tank, physical, the same seed twice", figure, "equal; different")]
+
+
+def _bag_hash(out: Path, seed: int) -> str:
+    _bag_seconds(out, "tank", "physical", f"seed={seed}")
+    return hashlib.sha256(out.read_bytes()).hexdigest()
+
+
+def _bag_seconds(out: Path, world: str, model: str, *settings: str) -> List[float]:
     wall, busy = time.perf_counter(), time.process_time()
-    arguments = ["--world", world, "--out", str(out), "--set", f"echo_model={model}", "--quiet"]
+    arguments = ["--world", world, "--out", str(out), "--quiet"]
+    for setting in (f"echo_model={model}", *settings):
+        arguments += ["--set", setting]
     if simulate_bag(arguments):
         sys.exit("simulate_bag failed")
     return [time.perf_counter() - wall, time.process_time() - busy]
@@ -122,4 +139,4 @@ def _cpu_seconds(pid: int) -> float:
 
 def rows() -> List[Row]:
     """Return the figures of the simulated vehicle."""
-    return bag_rows() + live_rows()
+    return bag_rows() + seed_rows() + live_rows()
