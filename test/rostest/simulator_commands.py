@@ -71,6 +71,7 @@ class SimulatorCommands(unittest.TestCase):
         command = ["rosrun", PACKAGE, "sonar_simulator", "__ns:=/other", "_wait_for_listener:=false"]
         others = ["robot_description:=/robot_description", "/clock:=/other_clock", "/tf:=/other_tf"]
         process = subprocess.Popen([*command, "_real_time_factor:=0.01", *others])
+        self.addCleanup(process.kill)
         Inbox("/other_clock", rospy.AnyMsg).wait_for()
         start = time.monotonic()
         process.send_signal(signal.SIGINT)
