@@ -9,6 +9,7 @@ import numpy as np
 from mlsm_manager.mapping.correction_history import CorrectionHistory
 from mlsm_manager.matching.matcher import Matcher
 from mlsm_manager.matching.planar import composed, transformed
+from mlsm_manager.matching.planar_motion import ERRORS
 from mlsm_manager.matching.prediction import Belief, OdometryErrors, predicted, prior_of
 from mlsm_manager.matching.result import MatchResult
 from mlsm_manager.matching.scan import Scan, Track
@@ -124,7 +125,9 @@ class Mapper:
         self._history.add(times, poses, scan.track, holds=True)
         self.matched.insert(self._history.placed(scan)[0])
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
-        self.correction = prior_of(belief, scan.reference_pose).correction
+        # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
+        if belief.theta[ERRORS].any():
+            self.correction = prior_of(belief, scan.reference_pose).correction
         return ScanUpdate(scan, None, True, self.belief)
 
     def _reject(self, scan: Scan, result: MatchResult, belief: Belief) -> ScanUpdate:

@@ -26,6 +26,7 @@ from mlsm_manager.matching.scan import Scan
 POSE = slice(0, 3)
 RATE = slice(3, 6)
 MOTION = slice(6, 8)
+ERRORS = slice(3, 8)
 STATES = 8
 _LEAST_NODES = 33
 
