@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlsm_manager.matching.planar import composed, inverse, rotated
+from mlsm_manager.matching.planar import composed, inverse, rotated, wrapped
 from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES
 from mlsm_manager.matching.result import Prior
 from mlsm_manager.matching.scan import Track
@@ -37,6 +37,10 @@ class OdometryErrors(ParameterSet):
     motion_time: float = parameter(
         3600.0, "how long an error of scale or direction lasts", unit="s", low=0.1, high=1e9, tunable=False
     )
+    heading_deviation: float = parameter(
+        0.0, "how far its heading may be off at any time, where a compass holds it; 0: it may drift away",
+        unit="rad", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
 
     def covariance(self) -> np.ndarray:
         """Return (8, 8) of [pose, rate, motion] where the pose is known and nothing of the odometry's errors."""
@@ -70,6 +74,15 @@ def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors)
     transition = lasting[:, np.newaxis] * jacobian
     fresh = errors.covariance() * (1.0 - lasting**2)
     return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
+
+
+def held_to_heading(belief: Belief, heading: float, deviation: float) -> Belief:
+    """Return the belief after a compass said `heading` [rad] with standard `deviation`; 0 stands for no compass."""
+    if deviation == 0.0:
+        return belief
+    gain = belief.covariance[:, 2] / (belief.covariance[2, 2] + deviation**2)
+    theta = belief.theta + gain * float(wrapped(heading - belief.theta[2]))
+    return Belief(belief.time, theta, belief.covariance - np.outer(gain, belief.covariance[2]))
 
 
 def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
