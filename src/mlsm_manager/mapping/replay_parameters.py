@@ -38,6 +38,9 @@ class ReplayParameters(
     sonar_delay: float = parameter(
         0.85, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0
     )
+    range_scale: float = parameter(
+        1.0, "true range over the range that the sonar reports, as of another speed of sound", low=0.5, high=2.0
+    )
     edge_half_width: float = parameter(
         0.073, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
         unit="rad", low=0.0, high=0.3,

@@ -25,14 +25,19 @@ class SensorModel(ParameterSet):
         0.0, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0,
         tunable=False,
     )  # fmt: skip
+    range_scale: float = parameter(
+        1.0, "true range over the range that the sonar reports, as of another speed of sound", low=0.5, high=2.0,
+        tunable=False,
+    )  # fmt: skip
     edge_half_width: float = parameter(
         0.0, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
         unit="rad", low=0.0, high=0.3, tunable=False,
     )  # fmt: skip
 
     def applied(self, scan: Scan) -> Scan:
-        """Return the scan with stamps and points put right; see `restamped` and `at_beam_edge`."""
-        return at_beam_edge(restamped(scan, self.sonar_delay), self.edge_half_width)
+        """Return the scan with stamps and points put right; see `restamped`, `rescaled` and `at_beam_edge`."""
+        timed = rescaled(restamped(scan, self.sonar_delay), self.range_scale)
+        return at_beam_edge(timed, self.edge_half_width)
 
 
 def restamped(scan: Scan, delay: float) -> Scan:
@@ -46,6 +51,16 @@ def restamped(scan: Scan, delay: float) -> Scan:
     times = scan.times + delay
     points = transformed(scan.track.at(times), seen)
     return replace(scan, points=points, times=times, reference_time=scan.reference_time + delay)
+
+
+def rescaled(scan: Scan, scale: float) -> Scan:
+    """Return the scan with each point `scale` times as far from the vehicle in the plane."""
+    if scale == 1.0:
+        return scan
+    points = scan.points.copy()
+    origin = scan.track.at(scan.times)[:, :2]
+    points[:, :2] = origin + scale * (points[:, :2] - origin)
+    return replace(scan, points=points)
 
 
 def at_beam_edge(scan: Scan, half_width: float) -> Scan:
