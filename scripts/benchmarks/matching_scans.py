@@ -2,8 +2,9 @@
 
 import math
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
-from typing import Callable, Tuple
+from typing import Callable, Optional, Tuple
 
 import numpy as np
 
@@ -14,12 +15,21 @@ from sonar_simulator.beam_pattern import BeamPattern
 from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.poses import pose_matrix
 from sonar_simulator.ray_caster import RayCaster
+from sonar_simulator.sdf import load_sdf
 from sonar_simulator.sonar_head import Sonar, SonarHead
+from sonar_simulator.world import Shape, World
 
 ROOT = Path(__file__).resolve().parents[2]
 RAYS = {45: (15, 3), 500: (50, 10)}
 HEAD = SonarHead(beams_per_turn=120, seconds_per_turn=16.0)
 DEPTH = -2.0
+_FLOOR = Shape("floor", "box", pose_matrix((0.0, 0.0, -6.0)), (400.0, 400.0, 1.0))
+_WALL = Shape("wall", "box", pose_matrix((0.0, 15.5, -2.5)), (400.0, 1.0, 6.0))
+WORLDS: dict = {
+    "basin": lambda: load_sdf(str(ROOT / "worlds/basin.sdf")).world,
+    "empty sea": lambda: World.from_shapes("empty sea", [_FLOOR]),
+    "straight wall": lambda: World.from_shapes("straight wall", [_FLOOR, _WALL]),
+}
 Poses = Callable[[np.ndarray], np.ndarray]
 """From times (n,) to planar poses (n, 3)."""
 
@@ -35,32 +45,58 @@ class SonarKind:
         return f"{self.rays} rays, pulse {self.spread:g} m"
 
 
+KINDS = (SonarKind(500, 0.15), SonarKind(500, 1.0), SonarKind(45, 1.0))
+
+
+def still(pose: np.ndarray) -> Poses:
+    """Return the poses of a vehicle that stays at `pose` (3,)."""
+    return lambda times: np.tile(np.asarray(pose, dtype=np.float64), (len(times), 1))
+
+
 class ScanMaker:
     """Makes scans in one world with one sonar; the same seed makes the same scan."""
 
-    def __init__(self, caster: RayCaster, kind: SonarKind) -> None:
-        self._caster = caster
+    def __init__(self, world: str, kind: SonarKind) -> None:
+        self._caster = _caster(world)
         self._pattern = BeamPattern(math.radians(22.0), math.radians(2.5), *RAYS[kind.rays])
         self._model = LaserCone(LaserConeParameters(spread=kind.spread))
         self._extraction = EchoExtractorParameters(pulse_sigma=kind.spread, min_height=2.0)
 
-    def scan(self, true_pose: Poses, odometry: Poses, turn: int, moving: bool, seed: int) -> Scan:
+    def scan(
+        self, true_pose: Poses, odometry: Poses, seed: int, turn: int = 0, moving: bool = False,
+        track: Optional[Track] = None,
+    ) -> Scan:  # fmt: skip
         """Return the scan of head turn number `turn`, its points placed by the odometry."""
         numbers = turn * HEAD.beams_per_turn + np.arange(HEAD.beams_per_turn)
         times = np.array([HEAD.time(int(number)) for number in numbers])
         angles = np.array([HEAD.angle(int(number)) for number in numbers])
-        bearing, ranges, heights = self.echoes(true_pose(times), angles, seed)
+        beams, ranges, heights = self._echoes(true_pose(times), angles, seed)
         poses = odometry(times)
-        arms = ranges[:, np.newaxis] * np.column_stack([np.cos(angles[bearing]), np.sin(angles[bearing])])
-        places = poses[bearing, :2] + rotated(arms, poses[bearing, 2])
+        arms = ranges[:, np.newaxis] * np.column_stack([np.cos(angles[beams]), np.sin(angles[beams])])
+        places = poses[beams, :2] + rotated(arms, poses[beams, 2])
         points = np.column_stack([places, np.full(len(ranges), DEPTH), heights])
-        track_times = np.linspace(times[0] - 2.0, times[-1], 200)
-        track = Track(track_times, odometry(track_times))
-        return Scan(points, times[bearing], np.full(len(points), moving), track, float(times[-1]))
+        if track is None:
+            track = Track(times, poses)
+        return Scan(points, times[beams], np.full(len(points), moving), track, float(times[-1]))
 
-    def echoes(self, poses: np.ndarray, angles: np.ndarray, seed: int) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    def _echoes(self, poses: np.ndarray, angles: np.ndarray, seed: int) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return beam number, range [m] and height of the echoes heard from `poses` (b, 3) at head `angles` (b,)."""
         sonar = Sonar(self._caster, self._pattern, self._model, np.random.default_rng(seed))
         matrices = np.array([pose_matrix((x, y, DEPTH), (0.0, 0.0, yaw)) for x, y, yaw in poses])
         echoes = extract_echoes(sonar.pings(matrices, angles), sonar.range_resolution, self._extraction)
         return echoes.beams, (echoes.bins + 0.5) * sonar.range_resolution, echoes.heights
+
+
+def noise_scan(points: int, seed: int) -> Scan:
+    """Return a scan that hears `points` echoes anywhere within 50 m."""
+    rng = np.random.default_rng(seed)
+    times = np.sort(rng.uniform(0.0, 16.0, points))
+    places = rng.uniform(-50.0, 50.0, (points, 2))
+    cloud = np.column_stack([places, np.full(points, DEPTH), np.full(points, 50.0)])
+    track = Track(np.linspace(0.0, 16.0, 33), np.zeros((33, 3)))
+    return Scan(cloud, times, np.zeros(points, dtype=bool), track, 16.0)
+
+
+@lru_cache(maxsize=None)
+def _caster(world: str) -> RayCaster:
+    return RayCaster(WORLDS[world]())

@@ -1,0 +1,76 @@
+"""From how far a scan finds its place, and how long that takes."""
+
+from typing import List
+
+import numpy as np
+
+import yaml
+from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind, still
+from benchmarks.table import Row
+from mlsm_manager.blocks import Blocks
+from mlsm_manager.matching.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.planar import composed, inverse, wrapped
+from mlsm_manager.matching.result import Prior
+from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from sonar_simulator.vehicle import VehicleScript
+
+STARTS = 100
+_NEAR, _NEAR_YAW = 0.5, np.radians(3.0)
+_HELD = 1e-3
+_WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0))}
+
+
+def tour_map(maker: ScanMaker) -> Blocks:
+    """Return the map of the basin's tour: a still scan wherever the vehicle rests."""
+    surface_map = MultiLevelSurfaceMap(0.5)
+    for number, pose in enumerate(tour_stops()):
+        surface_map.insert(maker.scan(still(pose), still(pose), seed=number).points)
+    return surface_map.blocks
+
+
+def tour_stops() -> np.ndarray:
+    """Return (n, 3) the places where the vehicle of the basin's tour rests."""
+    script = yaml.safe_load((ROOT / "yaml/basin_tour.yaml").read_text())
+    vehicle = VehicleScript.from_yaml_data(script["moves"], script["start"])
+    times = np.arange(8.0, vehicle.duration, 48.0)
+    poses = [vehicle.pose(time) for time in times]
+    return np.array([[pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])] for pose in poses])
+
+
+def start_rows(kind: SonarKind) -> List[Row]:
+    """Return how many of the starts converge, narrow and wide."""
+    maker = ScanMaker("basin", kind)
+    target = tour_map(maker)
+    rows: List[Row] = []
+    for distance, angle, changes, limit in ((3.0, 20.0, {}, 50), (6.0, 45.0, _WIDE, 100)):
+        matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
+        outcomes = [_start(maker, target, matcher, distance, np.radians(angle), seed) for seed in range(STARTS)]
+        found, accepted, seconds = (np.array(column) for column in zip(*outcomes))
+        title = f"starts {distance:g} m and {angle:g} deg off, basin, {kind}"
+        rows.append((f"{title}: converge", f"{found.sum()} of {STARTS}", ">= 99"))
+        rows.append((f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {STARTS}", "0"))
+        rows.append((f"{title}: time", f"{1e3 * np.median(seconds):.0f} ms", f"<= {limit} ms"))
+    return rows
+
+
+def _start(
+    maker: ScanMaker, target: Blocks, matcher: DistributionMatcher, distance: float, angle: float, seed: int
+) -> tuple:
+    """Return whether the start led to the true place, whether the match was accepted, and its time in seconds."""
+    rng = np.random.default_rng(seed)
+    stops = tour_stops()
+    pose = stops[seed % len(stops)] + rng.uniform([-3.0, -3.0, -0.5], [3.0, 3.0, 0.5])
+    scan = maker.scan(still(pose), still(pose), seed=1000 + seed)
+    bearing = rng.uniform(-np.pi, np.pi)
+    expected = pose + np.array([distance * np.cos(bearing), distance * np.sin(bearing), rng.choice([-angle, angle])])
+    deviations = np.array([distance / 1.5, distance / 1.5, angle / 1.5, _HELD, _HELD, _HELD / 10.0, _HELD, _HELD])
+    prior = Prior(composed(expected, inverse(pose)), np.zeros(3), np.zeros(2), np.diag(deviations**2))
+    result = matcher.match(scan, target, prior)
+    near = np.hypot(*(result.pose - pose)[:2]) < _NEAR and abs(float(wrapped(result.pose[2] - pose[2]))) < _NEAR_YAW
+    return bool(near and result.accepted), result.accepted, result.seconds
+
+
+def rows() -> List[Row]:
+    """Return the figures of the starts."""
+    return [row for kind in KINDS for row in start_rows(kind)]
