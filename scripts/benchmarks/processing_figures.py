@@ -1,12 +1,13 @@
 """Messages, and the chain from beams to blocks."""
 
 from io import BytesIO
-from pathlib import Path
 from typing import List
 
 import numpy as np
 import rosbag
 
+from benchmarks import processing_graph
+from benchmarks.graph import ROOT
 from benchmarks.map_figures import RESOLUTION, scan
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.mlsm import MultiLevelSurfaceMap
@@ -17,14 +18,15 @@ from sonar_processing.conversions import (
     cloud_from_message,
     cloud_to_message,
 )
+from sonar_processing.echo_extraction import EchoExtractorParameters, extract_echoes
+from sonar_processing.echo_extractor import EchoExtractor
 from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.polar_scan import PolarScan
 from sonar_processing.scan_assembler import ScanAssembler
 from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.threshold import Thresholder, ThresholderParameters
 from sonar_processing.transforms import matrix_from_message
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def message_rows() -> List[Row]:
@@ -73,6 +75,23 @@ def chain_rows() -> List[Row]:
     return [(f"beams to blocks, {len(beams)} beams of 500 bins", f"{recorded / seconds:.0f} times real time", ">= 50")]
 
 
+def extraction_rows() -> List[Row]:
+    """Measure the echo extractor on a turn of the recorded tour of the basin, as it comes to the stage."""
+    beams = [beam_from_message(message) for message in processing_graph.recorded_beams()]
+    scan = PolarScan.of([PlacedBeam(beam, np.eye(4), is_moving=False) for beam in beams])
+    parameters = SonarToCloudParameters()
+    cloud, extractor = scan.cloud(parameters), EchoExtractor(EchoExtractorParameters())
+    strengths, echoes = scan.strengths, len(extractor(cloud))
+    core_seconds = median_seconds(lambda: extract_echoes(strengths, scan.range_resolution))
+    stage_seconds = median_seconds(lambda: extractor(cloud))
+    polar_seconds = median_seconds(lambda: scan.cloud(parameters))
+    return [
+        (f"{echoes} echoes of {strengths.size} bins", f"{1e3 * core_seconds:.2f} ms", "about 2 ms"),
+        ("the same as a stage, from cloud to cloud", f"{1e3 * stage_seconds:.2f} ms", ""),
+        (f"polar scan of {len(beams)} beams to an organised cloud", f"{1e3 * polar_seconds:.2f} ms", ""),
+    ]
+
+
 def rows() -> List[Row]:
     """Return the figures of the processing chain."""
-    return message_rows() + chain_rows()
+    return message_rows() + chain_rows() + extraction_rows() + processing_graph.rows()

@@ -47,7 +47,7 @@ class MultiLevelSurfaceMap:
 
     @property
     def blocks(self) -> Blocks:
-        """A copy of all blocks, in the order in which they first appeared."""
+        """A copy of all blocks, in no particular order."""
         rows = self._rows[: self._used]
         return Blocks(rows[rows[:, COUNT] > 0], self.resolution)
 

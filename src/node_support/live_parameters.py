@@ -1,7 +1,7 @@
 """Parameters of a running stage: read and validated at start-up, changed through dynamic_reconfigure."""
 
 import importlib
-from typing import Callable, Type
+from typing import Any, Callable, Mapping, Type
 
 import rospy
 from dynamic_reconfigure.server import Server
@@ -39,6 +39,11 @@ class LiveParameters:
         on_change(self.current)
         module = importlib.import_module(f"underwater_map_construction.cfg.{config_name}Config")
         self._server = _RefusingServer(module, self._request, "" if namespace == "~" else namespace)
+
+    def change(self, changes: Mapping[str, Any]) -> None:
+        """Change tunable parameters as dynamic_reconfigure would; raises ParameterError for what is not allowed."""
+        self.current.changed(changes)
+        self._server.update_configuration(dict(changes))
 
     def _request(self, config: dict, _level: int) -> dict:
         changes = {field.name: config[field.name] for field in self.current.tunable_fields()}

@@ -43,7 +43,9 @@ class Description:
         if kind is str:
             return "a text" if self.may_be_empty else "a text that is not empty"
         number = "an integer" if kind is int else "a number"
-        bounds = [f"{word} {bound:g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None]
+        bounds = [
+            f"{word} {bound:.12g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None
+        ]
         unit = f" {self.unit}" if self.unit else ""
         return " ".join([number, *bounds]) + unit
 

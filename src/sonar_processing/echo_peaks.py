@@ -7,6 +7,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 _LEVELS_PER_STRENGTH = 64.0
+_ROUNDING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -97,8 +98,9 @@ def points_along_runs(image: np.ndarray, threshold: float, spacing: float) -> Pe
     change = np.diff(padded, axis=1)
     beams, starts = np.nonzero(change > 0)
     lengths = np.nonzero(change < 0)[1] - starts
-    counts = np.ceil(lengths / max(spacing, 1.0)).astype(np.int64)
+    spacing = max(spacing, 1.0)
+    counts = np.ceil(lengths / spacing - _ROUNDING).astype(np.int64)
     within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    bins = np.repeat(starts, counts) + np.floor(within * max(spacing, 1.0))
+    bins = np.repeat(starts, counts) + np.floor(within * spacing + _ROUNDING)
     beams = np.repeat(beams, counts)
     return Peaks(beams, bins, image[beams, bins.astype(np.int64)])

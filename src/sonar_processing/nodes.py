@@ -1,7 +1,11 @@
 """The executables of this package."""
 
+from typing import Type
+
 from node_support.node import DiagnosticsPublisher, run
 from sonar_processing.host import ProcessingHost
+from sonar_processing.shape_detectors import CircleDetectorNode, LineDetectorNode, ShapeDetectorNode
+from sonar_processing.sonar_control import SonarControl
 from sonar_processing.sonar_image import SonarImage
 from sonar_processing.sonar_to_cloud import SonarToCloud
 from sonar_processing.stage_runner import StageRunner
@@ -26,6 +30,36 @@ def run_stage(name: str) -> None:
         return runner, DiagnosticsPublisher([runner.health])
 
     run(name, construct)
+
+
+def run_shape_detector(kind: Type[ShapeDetectorNode]) -> None:
+    """Run a detector of shapes."""
+
+    def construct() -> tuple:
+        node = kind()
+        return node, DiagnosticsPublisher([node.health])
+
+    run(kind.name, construct)
+
+
+def run_line_detector() -> None:
+    """Run line_detector."""
+    run_shape_detector(LineDetectorNode)
+
+
+def run_circle_detector() -> None:
+    """Run circle_detector."""
+    run_shape_detector(CircleDetectorNode)
+
+
+def run_sonar_control() -> None:
+    """Run sonar_control."""
+
+    def construct() -> tuple:
+        node = SonarControl()
+        return node, DiagnosticsPublisher([node.health])
+
+    run("sonar_control", construct)
 
 
 def run_sonar_image() -> None:

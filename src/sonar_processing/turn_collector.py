@@ -17,6 +17,10 @@ class TurnCollector:
         self._beams: Deque[PlacedBeam] = deque(maxlen=MOST_BEAMS)
         self._turn = HeadTurn()
 
+    def __len__(self) -> int:
+        """Return how many beams the unfinished turn holds."""
+        return len(self._beams)
+
     def clear(self) -> None:
         """Forget the unfinished turn."""
         self._beams.clear()

@@ -23,6 +23,7 @@ def subscribe_to_velocity(topic: str, kind: VelocityType, motion: Motion, health
     message_type, twist_of = _KINDS[kind]
 
     def take(message: Any) -> None:
+        health.count("velocities in")
         twist = twist_of(message)
         motion.take(_components(twist.linear), _components(twist.angular))
 

@@ -6,11 +6,13 @@ from node_support.parameter_text import yaml_keys
 from node_support.parameters import ParameterSet
 from sonar_simulator.laser_cone import LaserConeParameters
 from sonar_simulator.odometry import OdometryParameters
+from sonar_simulator.servo import ServoParameters
 from sonar_simulator.simulation import SimulatorParameters
 from sonar_simulator.sonar_head import SonarParameters
 
 GROUPS: Dict[str, Type[ParameterSet]] = {
     "sonar": SonarParameters,
+    "servo": ServoParameters,
     "odometry": OdometryParameters,
     "echo": LaserConeParameters,
 }

@@ -4,6 +4,7 @@ from pathlib import Path
 from typing import Union
 
 import yaml
+
 from sonar_simulator.vehicle import ScriptError, VehicleScript
 
 _KEYS = ("start", "moves")

@@ -7,6 +7,7 @@ import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.odometry import Odometry
+from sonar_simulator.servo import Servo, ServoParameters, tilted
 from sonar_simulator.sonar_head import Sonar, SonarHead
 from sonar_simulator.vehicle import VehicleScript
 
@@ -40,13 +41,17 @@ class Ping:
 
 @dataclass(frozen=True)
 class Moment:
-    """The state at one time [s since the start]. T_* are (4, 4); twist is (6,) in the body frame by odometry."""
+    """The state at one time [s since the start]. T_* are (4, 4); twist is (6,) in the body frame by odometry.
+
+    tilt: angle of the sonar's servo, rad.
+    """
 
     time: float
     T_world_base: np.ndarray
     T_odom_base: np.ndarray
     twist: np.ndarray
     ping: Optional[Ping]
+    tilt: float = 0.0
 
 
 class Simulation:
@@ -59,13 +64,16 @@ class Simulation:
         sonar: Sonar,
         head: SonarHead,
         T_base_sonar: np.ndarray,
+        servo: Optional[Servo] = None,
     ) -> None:
+        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` it stays there."""
         self.duration = script.duration
         self._script = script
         self._odometry = odometry
         self._sonar = sonar
         self._head = head
         self._T_base_sonar = T_base_sonar
+        self._servo = servo or Servo(ServoParameters())
 
     def moments(self, tick_rate: float) -> Iterator[Moment]:
         """Yield all moments from time 0 to the end of the script, in order of time."""
@@ -87,7 +95,9 @@ class Simulation:
         T_world_base = self._script.pose(time)
         still = self._script.is_still(time)
         twist = np.zeros(6) if still else self._odometry.twist(self._script.twist(time))
+        tilt = self._servo.angle(time)
         ping = None
         if head_angle is not None:
-            ping = Ping(head_angle, self._sonar.ping(T_world_base @ self._T_base_sonar, head_angle))
-        return Moment(time, T_world_base, self._odometry.pose(T_world_base), twist, ping)
+            T_world_sonar = T_world_base @ tilted(self._T_base_sonar, tilt)
+            ping = Ping(head_angle, self._sonar.ping(T_world_sonar, head_angle))
+        return Moment(time, T_world_base, self._odometry.pose(T_world_base), twist, ping, tilt)

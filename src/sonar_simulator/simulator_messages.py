@@ -7,6 +7,7 @@ import rospy
 from genpy import Message
 from geometry_msgs.msg import Pose, TransformStamped, Twist
 from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
 from sonar_processing.transforms import pose_from_matrix
@@ -17,9 +18,11 @@ SONAR_FRAME = "sonar"
 BASE_FRAME = "base_link"
 ODOM_FRAME = "odom"
 WORLD_FRAME = "map"
+SERVO_JOINT = "sonar_servo_joint"
 
 TOPICS = {
     "/tf": TFMessage,
+    "joint_states": JointState,
     "cmd_vel": Twist,
     "odom": Odometry,
     "ground_truth": Odometry,
@@ -34,12 +37,13 @@ def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List
     twist = _twist(moment.twist)
     messages = [
         ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
+        ("joint_states", joint_state(moment.tilt, stamp)),
         ("cmd_vel", twist),
         ("odom", _odometry(odom_pose, twist, stamp, ODOM_FRAME)),
         ("ground_truth", _odometry(pose_from_matrix(moment.T_world_base), Twist(), stamp, WORLD_FRAME)),
     ]
     if moment.ping is not None:
-        messages.append(("sonar/raw", _beam(moment.ping, stamp, max_range)))
+        messages.append(("sonar/raw", _beam(moment.ping, moment.tilt, stamp, max_range)))
     return messages
 
 
@@ -54,7 +58,14 @@ def transform_message(pose: Pose, stamp: rospy.Time, parent: str, child: str) ->
     return message
 
 
-def _beam(ping: Ping, stamp: rospy.Time, max_range: float) -> SonarScanLine:
+def joint_state(tilt: float, stamp: rospy.Time) -> JointState:
+    """Return where the sonar's servo stands, rad."""
+    message = JointState(name=[SERVO_JOINT], position=[tilt])
+    message.header.stamp = stamp
+    return message
+
+
+def _beam(ping: Ping, tilt: float, stamp: rospy.Time, max_range: float) -> SonarScanLine:
     message = SonarScanLine()
     message.header.stamp = stamp
     message.header.frame_id = SONAR_FRAME
@@ -62,6 +73,7 @@ def _beam(ping: Ping, stamp: rospy.Time, max_range: float) -> SonarScanLine:
     message.intensities = ping.strengths.tobytes()
     message.maxrange_meters = max_range
     message.range_resolution = max_range / len(ping.strengths)
+    message.sensorAngle = tilt
     return message
 
 

@@ -10,6 +10,7 @@ import numpy as np
 import rospkg
 import rospy
 import tf2_ros
+from std_msgs.msg import Float64
 
 from node_support.node import guarded, make_health
 from node_support.parameters import ParameterError
@@ -21,6 +22,7 @@ from sonar_simulator.odometry import Odometry, OdometryParameters
 from sonar_simulator.ray_caster import RayCaster
 from sonar_simulator.script_file import load_script
 from sonar_simulator.sdf import WorldError, load_sdf
+from sonar_simulator.servo import Servo, ServoParameters
 from sonar_simulator.simulation import Simulation, SimulatorParameters
 from sonar_simulator.simulator_messages import BASE_FRAME, SONAR_FRAME
 from sonar_simulator.simulator_publisher import SimulatorPublisher
@@ -48,9 +50,14 @@ class Simulator:
         rng = np.random.default_rng(self._parameters.seed)
         self._script = _loaded(load_script, self._parameters.script)
         self._sonar = Sonar(RayCaster(self._load_world()), self._sonar_parameters.pattern(), model, rng)
+        self._servo = Servo(ServoParameters.from_mapping(groups["servo"]))
         self._publisher = SimulatorPublisher(self._sonar.max_range)
+        rospy.Subscriber("sonar_servo/command", Float64, guarded(self.health, self._take_servo_command), queue_size=10)
         self._start_time = START_TIME
         threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
+
+    def _take_servo_command(self, command: Float64) -> None:
+        self._servo.command(command.data)
 
     def _load_world(self) -> object:
         loaded = _loaded(load_sdf, self._parameters.world)
@@ -66,6 +73,7 @@ class Simulator:
             self._sonar,
             SonarHead(head.beams_per_turn, head.seconds_per_turn),
             self._sonar_mount(),
+            self._servo,
         )
         if self._parameters.wait_for_listener:
             self._wait(lambda: self._publisher.has_listener)
@@ -87,11 +95,11 @@ class Simulator:
         while not ready() and time.monotonic() < deadline and not rospy.core.is_shutdown_requested():
             time.sleep(_WAIT_STEP)
             self._start_time += _WAIT_STEP
-            self._publisher.publish_clock(rospy.Time.from_sec(self._start_time))
+            self._publisher.publish_rest(rospy.Time.from_sec(self._start_time))
         return ready()
 
     def _sonar_mount(self) -> np.ndarray:
-        """Return T_base_sonar as the robot's description gives it."""
+        """Return T_base_sonar as the robot's description gives it, with the servo at 0."""
         buffer = tf2_ros.Buffer(debug=False)
         listener = tf2_ros.TransformListener(buffer)
         if not self._wait(lambda: buffer.can_transform_core(BASE_FRAME, SONAR_FRAME, rospy.Time(0))[0], MOUNT_TIMEOUT):

@@ -5,7 +5,7 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
 
 from sonar_simulator.simulation import Moment
-from sonar_simulator.simulator_messages import TOPICS, moment_messages
+from sonar_simulator.simulator_messages import TOPICS, joint_state, moment_messages
 
 _QUEUE_SIZE = 100
 
@@ -30,6 +30,11 @@ class SimulatorPublisher:
     def publish_clock(self, stamp: rospy.Time) -> None:
         """Set everybody's time."""
         self._clock.publish(Clock(clock=stamp))
+
+    def publish_rest(self, stamp: rospy.Time) -> None:
+        """Send what a robot's description needs to stand still: the time, and the servo at 0."""
+        self.publish_clock(stamp)
+        self._publishers["joint_states"].publish(joint_state(0.0, stamp))
 
     def publish_progress(self, share: float) -> None:
         """Tell which share of the script is done; 1 at its end."""

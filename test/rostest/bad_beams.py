@@ -9,7 +9,7 @@ import rospy
 import rostest
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, wait_for_publisher_links, wait_for_subscribers
 from sensor_msgs.msg import PointCloud2
 
 from underwater_map_construction.msg import SonarScanLine
@@ -33,6 +33,10 @@ class BadBeams(unittest.TestCase):
         mount.transform.rotation.w = 1.0
         cls.transforms.sendTransform(mount)
         wait_for_publisher_links(cls.beams, 1)
+        if "many" in sys.argv:
+            wait_for_subscribers("/sonar/scan/sonarCloud", 1)
+            wait_for_subscribers("/sonar/scan/thresholded", 1)
+        wait_for_subscribers("/sonar/scan/cleaned/cloud", 1)
         cls.time = 1000.0
 
     def send(self, frame: str = "sonar", **fields: object) -> None:

@@ -37,6 +37,10 @@ class Listener:
         while not self._subscriber.get_num_connections() and not rospy.is_shutdown():
             rospy.rostime.wallsleep(0.01)
 
+    def close(self) -> None:
+        """Take no more messages; a later publisher of this process must not mistake this for its reader."""
+        self._subscriber.unregister()
+
     def _take(self, message: Any) -> None:
         if not self._wanted(message):
             return

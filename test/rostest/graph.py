@@ -4,14 +4,17 @@ import os
 import subprocess
 import threading
 import unittest
+import xmlrpc.client
 from pathlib import Path
 from typing import Any, Callable, Dict, List
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
+import rosbag
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
+from std_srvs.srv import SetBool
 
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 TEST_DATA = PACKAGE_ROOT / "test/data"
@@ -49,6 +52,15 @@ class Inbox:
             self.messages.append(message)
             self._condition.notify_all()
 
+    def wait_for_link(self, timeout: float = 20.0) -> None:
+        """Wait until a publisher is connected, so that no message is missed from then on."""
+        ended = threading.Event()
+        for _ in range(int(timeout / 0.05)):
+            if self._subscriber.get_num_connections():
+                return
+            ended.wait(0.05)
+        raise AssertionError(f"{self._topic}: nobody publishes it after {timeout} s")
+
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = 20.0) -> Any:
         """Return the newest message once it fits; raises AssertionError after `timeout` seconds of wall time."""
         with self._condition:
@@ -84,21 +96,57 @@ class Diagnostics:
 
 
 def wait_for_subscribers(topic: str, number: int, timeout: float = 20.0) -> None:
-    """Wait until `number` nodes listen to a topic, as the master sees it."""
-    master = rosgraph.Master("/graph_test")
+    """Wait until `number` nodes listen to a topic and every publisher that it has is connected to all of them."""
     ended = threading.Event()
     for _ in range(int(timeout / 0.1)):
-        listeners = [nodes for name, nodes in master.getSystemState()[1] if name == topic]
-        if listeners and len(listeners[0]) >= number:
+        publishers, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
+        listeners = dict(subscribers).get(topic, [])
+        if len(listeners) >= number and all(_links(node, topic) >= number for node in dict(publishers).get(topic, [])):
             return
         ended.wait(0.1)
-    raise AssertionError(f"{topic}: not {number} listeners after {timeout} s")
+    raise AssertionError(f"{topic}: not {number} connected listeners after {timeout} s")
+
+
+def _links(node: str, topic: str) -> int:
+    """Return the number of established connections over which a node publishes a topic."""
+    slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
+    _, _, connections = slave.getBusInfo("/graph_test")
+    return sum(1 for link in connections if link[2] == "o" and link[4] == topic and link[5])
+
+
+def wait_until(holds: Callable[[], bool], timeout: float = 20.0, required: bool = True) -> bool:
+    """Wait until a state holds that nobody tells of, and return whether it does.
+
+    Raises AssertionError after `timeout` seconds where it is `required`.
+    """
+    ended = threading.Event()
+    for _ in range(int(timeout / 0.02)):
+        if holds():
+            return True
+        ended.wait(0.02)
+    if required:
+        raise AssertionError(f"not after {timeout} s")
+    return False
 
 
 def play(bag: Path, rate: float) -> None:
-    """Play a bag to its end."""
-    command = ["rosbag", "play", "--quiet", "--clock", f"--rate={rate}", str(bag)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, timeout=120)
+    """Play a bag to its end, to all who listen: playback starts when every listener is connected to every topic."""
+    command = ["rosbag", "play", "--quiet", "--clock", "--pause", f"--rate={rate}", str(bag), "__name:=player"]
+    player = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+    try:
+        rospy.wait_for_service("/player/pause_playback", timeout=20.0)
+        _, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
+        for topic in _topics(bag):
+            wait_for_subscribers(topic, len(dict(subscribers).get(topic, [])))
+        rospy.ServiceProxy("/player/pause_playback", SetBool)(False)
+        assert player.wait(timeout=120) == 0
+    finally:
+        player.kill()
+
+
+def _topics(bag: Path) -> List[str]:
+    with rosbag.Bag(str(bag)) as recorded:
+        return sorted(recorded.get_type_and_topic_info().topics)
 
 
 def rows(cloud: Any) -> np.ndarray:

@@ -1,6 +1,5 @@
 #!/usr/bin/env python3
 import math
-import os
 import shutil
 import signal
 import subprocess
@@ -12,16 +11,15 @@ import rosbag
 import rospy
 import rostest
 from driver_listener import PATIENCE, beams, diagnostics, values
+from graph import recording
 
 from imagenex_852_driver import log_file
 from imagenex_852_driver.log_record import LoggedPing
 from imagenex_852_driver.protocol import Reply, ReplyKind
 from underwater_map_construction.msg import SonarScanLine
 
-_HERE = Path(os.path.realpath(__file__)).parent
 PACKAGE = "underwater_map_construction"
 START = 1447000000.0
-HYDROBALL = Path(os.environ.get("UMC_DATA", _HERE.parents[2] / "shared" / "data")) / "hydroball.852"
 
 
 def tool(name, *arguments):
@@ -51,13 +49,12 @@ class TestLogs(unittest.TestCase):
                 writer.write(logged(index))
 
     def real_log(self):
-        if not HYDROBALL.exists():
-            self.skipTest(f"{HYDROBALL} is not there; set UMC_DATA to the folder of the recordings")
-        return HYDROBALL
+        return recording("hydroball.852")
 
     def play(self, path, *options):
         """Return the beams that play_852 publishes, and what it prints."""
         listener = beams()
+        self.addCleanup(listener.close)
         status, text = output_of(tool("play_852", path, "--rate", 200, "--wait-for-subscribers", *options))
         assert status == 0, text
         published = int(text.split(" beams published")[0].split()[-1])

@@ -3,12 +3,14 @@
 
 import sys
 import unittest
+from typing import Any, Dict
 
 import numpy as np
 import rospy
 import rostest
 from graph import TEST_DATA, Inbox, play, rows, wait_for_subscribers
-from sensor_msgs.msg import PointCloud2
+from sensor_msgs.msg import Image, LaserScan, PointCloud2
+from std_msgs.msg import Float32
 
 from underwater_map_construction.msg import StampedIntensityCloud
 
@@ -29,21 +31,47 @@ class OneAndManyProcesses(unittest.TestCase):
         layouts = ("one", "many")
         maps = {name: Inbox(f"/{name}/MLSM/cloud", PointCloud2) for name in layouts}
         scans = {name: Inbox(f"/{name}/sonar/scan/cleaned", StampedIntensityCloud) for name in layouts}
-        wait_for_subscribers("/sonar/raw", 2)
+        beside = {name: _beside(name) for name in layouts}
         wait_for_subscribers("/many/sonar/scan/cleaned", 2)
         wait_for_subscribers("/many/sonar/scan/thresholded", 1)
         wait_for_subscribers("/many/sonar/scan/sonarCloud", 1)
         wait_for_subscribers("/one/sonar/scan/cleaned", 1)
+        wait_for_subscribers("/many/sonar/scan/polar", 1)
+        wait_for_subscribers("/sonar/raw", 3)
         play(TEST_DATA / "basin.bag", rate=15)
-        cls.blocks = {}
+        cls.blocks, cls.beside = {}, {}
         for name in layouts:
             last = scans[name].wait_for(lambda _, inbox=scans[name]: len(inbox.messages) >= SCANS)
             stamp = last.header.stamp
             cls.blocks[name] = rows(maps[name].wait_for(lambda cloud, stamp=stamp: cloud.header.stamp == stamp))
+            cls.beside[name] = {what: newest(beside[name][what]) for what in beside[name]}
 
     def test_both_layouts_make_the_same_blocks(self) -> None:
         """Not one bit differs."""
         np.testing.assert_array_equal(self.blocks["one"], self.blocks["many"])
+
+    def test_both_layouts_make_the_same_echoes_laser_scans_thresholds_and_images(self) -> None:
+        """What is made beside the map, by the newest turn or beam."""
+        one, many = self.beside["one"], self.beside["many"]
+        np.testing.assert_array_equal(rows(one["echoes"].cloud), rows(many["echoes"].cloud))
+        np.testing.assert_array_equal(one["laserScan"].ranges, many["laserScan"].ranges)
+        self.assertEqual(one["threshold"].data, many["threshold"].data)
+        self.assertEqual((one["image"].width, one["image"].encoding), (501, "mono8"))
+
+    def test_echoes_of_the_walls_lie_on_them(self) -> None:
+        """Those that are not of the buoys and the gate."""
+        echoes = rows(self.beside["one"]["echoes"].cloud)
+        x, y = np.abs(echoes[:, :2].T.astype(np.float64))
+        off = np.abs(np.maximum(x - HALF_LENGTH, y - HALF_WIDTH))
+        of_walls = off < 2.0
+        self.assertGreater(np.count_nonzero(of_walls), 60)
+        self.assertGreater(np.mean(off[of_walls] < CELL), 0.85)
+
+    def test_a_laser_scan_has_a_ray_for_every_direction_of_the_head(self) -> None:
+        """And stands for the moment of its newest beam."""
+        scan = self.beside["one"]["laserScan"]
+        self.assertEqual((len(scan.ranges), scan.header.frame_id), (120, "sonar"))
+        self.assertEqual(scan.header.stamp, self.beside["one"]["echoes"].header.stamp)
 
     def test_every_wall_within_range_is_there(self) -> None:
         """Each 2 m of each wall that some scan saw at less than 50 m holds a block closer than a cell."""
@@ -71,6 +99,20 @@ class OneAndManyProcesses(unittest.TestCase):
         short_walls = (x - HALF_LENGTH)[(y < 20) & (np.abs(x - HALF_LENGTH) < 1.5)]
         self.assertLess(abs(np.median(long_walls)), CELL / 2)
         self.assertLess(abs(np.median(short_walls)), CELL / 2)
+
+
+def _beside(layout: str) -> Dict[str, Inbox]:
+    return {
+        "echoes": Inbox(f"/{layout}/sonar/scan/echoes", StampedIntensityCloud),
+        "laserScan": Inbox(f"/{layout}/sonar/scan/laserScan", LaserScan),
+        "threshold": Inbox(f"/{layout}/thresholder/threshold", Float32),
+        "image": Inbox(f"/{layout}/sonar/image", Image),
+    }
+
+
+def newest(inbox: Inbox) -> Any:
+    """Return what came after the last turn (images come more often)."""
+    return inbox.wait_for(lambda _: len(inbox.messages) >= SCANS)
 
 
 def walls() -> list:

@@ -24,8 +24,9 @@ ROS_SIDE = {
     },
     "node_support": {"live_parameters", "node", "reconfigure_description"},
     "sonar_processing": {
-        "beam_subscriber", "cloud_publisher", "conversions", "figure_publisher", "host", "nodes", "sonar_image",
-        "sonar_to_cloud", "stage_runner", "transform_filter", "transforms", "turn_publisher", "velocity_subscriber",
+        "beam_subscriber", "cloud_publisher", "conversions", "figure_publisher", "host", "nodes", "shape_detectors",
+        "shape_messages", "sonar_control", "sonar_image", "sonar_places", "sonar_to_cloud", "stage_runner",
+        "transform_filter", "transforms", "turn_publisher", "velocity_subscriber",
     },
     "sonar_simulator": {"nodes", "simulator_messages", "simulator_node", "simulator_publisher"},
 }  # fmt: skip

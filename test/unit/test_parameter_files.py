@@ -4,81 +4,55 @@ import importlib
 from pathlib import Path
 
 import pytest
-
 import yaml
-from imagenex_852_driver.driver_parameters import DriverParameters
-from imagenex_852_driver.emulator_parameters import EmulatorParameters
-from mlsm_manager.core_parameters import MlsmCoreParameters
-from node_support.parameter_text import default_yaml
+from document import LIVE_NODES, LiveNode, generated
+
 from node_support.parameters import describe
-from sonar_processing.echo_extraction import EchoExtractorParameters
-from sonar_processing.outliers import OutlierRemoverParameters
-from sonar_processing.polar_image import SonarImageParameters
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.stages import STAGES
-from sonar_processing.threshold import ThresholderParameters
-from sonar_simulator.default_yaml import simulator_yaml
 
 ROOT = Path(__file__).resolve().parents[2]
-NODES = {
-    "echo_extractor": (EchoExtractorParameters, "EchoExtractor"),
-    "imagenex_852_driver": (DriverParameters, "Imagenex852"),
-    "imagenex_852_emulator": (EmulatorParameters, "Imagenex852Emulator"),
-    "mlsm_core": (MlsmCoreParameters, "MlsmCore"),
-    "outlier_remover": (OutlierRemoverParameters, "OutlierRemover"),
-    "sonar_image": (SonarImageParameters, "SonarImage"),
-    "sonar_to_cloud": (SonarToCloudParameters, "SonarToCloud"),
-    "thresholder": (ThresholderParameters, "Thresholder"),
-}
 
 
-def _default_file(node):
-    return (ROOT / "yaml" / f"{node}_default.yaml").read_text()
+def test_generated_files_are_up_to_date():
+    assert [path.name for path, text in generated().items() if path.read_text() != text] == []
 
 
-@pytest.mark.parametrize("node", NODES)
-def test_the_default_yaml_says_what_the_dataclass_says(node):
-    assert _default_file(node) == default_yaml(node, NODES[node][0])
+@pytest.mark.parametrize("name", LIVE_NODES)
+def test_the_default_yaml_makes_the_defaults(name):
+    parameters = LIVE_NODES[name].parameters
+    text = (ROOT / "yaml" / f"{name}_default.yaml").read_text()
+    assert parameters.from_mapping(yaml.safe_load(text)) == parameters()
 
 
-@pytest.mark.parametrize("node", NODES)
-def test_the_default_yaml_makes_the_defaults(node):
-    assert NODES[node][0].from_mapping(yaml.safe_load(_default_file(node))) == NODES[node][0]()
-
-
-def test_the_simulators_default_yaml_says_what_its_dataclasses_say():
-    assert _default_file("sonar_simulator") == simulator_yaml()
-
-
-@pytest.fixture(params=sorted(NODES))
-def generated(request):
+@pytest.fixture(params=sorted(LIVE_NODES))
+def live(request):
     """Return a parameter dataclass and the dynamic_reconfigure module that the build made of it."""
-    parameters, name = NODES[request.param]
-    return parameters, importlib.import_module(f"underwater_map_construction.cfg.{name}Config")
+    node = LIVE_NODES[request.param]
+    return node.parameters, importlib.import_module(f"underwater_map_construction.cfg.{node.config_name}Config")
 
 
-def test_dynamic_reconfigure_offers_the_tunable_fields(generated):
-    parameters, module = generated
+def test_dynamic_reconfigure_offers_the_tunable_fields(live):
+    parameters, module = live
     assert list(module.defaults) == [field.name for field in parameters.tunable_fields()]
 
 
-def test_dynamic_reconfigure_starts_from_the_defaults(generated):
-    parameters, module = generated
+def test_dynamic_reconfigure_starts_from_the_defaults(live):
+    parameters, module = live
     assert module.defaults.items() <= parameters().to_mapping().items()
 
 
-def test_dynamic_reconfigure_has_the_ranges_of_numbers(generated):
-    parameters, module = generated
+def test_dynamic_reconfigure_has_the_ranges_of_numbers(live):
+    parameters, module = live
     numbers = [field for field in parameters.tunable_fields() if field.type in (int, float)]
     expected = {field.name: (describe(field).low, describe(field).high) for field in numbers}
     assert {name: (module.min[name], module.max[name]) for name in expected} == expected
 
 
-def test_dynamic_reconfigure_accepts_what_it_offers(generated):
-    parameters, module = generated
+def test_dynamic_reconfigure_accepts_what_it_offers(live):
+    parameters, module = live
     assert parameters().changed(module.defaults) == parameters()
 
 
 @pytest.mark.parametrize("name", STAGES)
 def test_every_stage_of_the_table_is_checked_here(name):
-    assert NODES[name] == (STAGES[name].parameters, STAGES[name].config_name)
+    assert LIVE_NODES[name] == LiveNode(STAGES[name].parameters, STAGES[name].config_name)

@@ -1,9 +1,9 @@
 """What a parameter set says of itself in yaml and in the documentation."""
 
 import pytest
+import yaml
 from example_parameters import ExampleParameters
 
-import yaml
 from node_support.parameter_text import default_yaml, markdown_table
 
 

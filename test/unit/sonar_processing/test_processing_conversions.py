@@ -1,6 +1,7 @@
 """Messages become arrays and arrays messages, bit by bit."""
 
 import math
+from dataclasses import replace
 from io import BytesIO
 
 import genpy
@@ -12,7 +13,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as numpy_st
 from scipy.spatial.transform import Rotation
-from sensor_msgs.msg import PointCloud2, PointField
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from node_support.refused_input import RefusedInput
@@ -23,9 +24,11 @@ from sonar_processing.conversions import (
     cloud_from_message,
     cloud_to_message,
     header,
+    laser_scan_message,
     point_cloud,
     points_from_message,
 )
+from sonar_processing.laser_turn import LaserTurn
 from sonar_processing.transforms import matrix_from_message
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
@@ -130,6 +133,29 @@ def test_an_organised_cloud_comes_back_organised():
     message = cloud_to_message(cloud_of([1, np.nan, 3, 4, 5, 6], height=2))
     assert (message.cloud.height, message.cloud.width, message.cloud.row_step) == (2, 3, 48)
     assert cloud_from_message(message).height == 2
+
+
+@pytest.mark.parametrize("strengths", [[1, np.nan, 3], [1, 2, 3]])
+def test_an_organised_cloud_of_one_beam_comes_back_organised(strengths):
+    message = _sent(cloud_to_message(replace(cloud_of(strengths), organized=True)), StampedIntensityCloudArrays)
+    cloud = cloud_from_message(message)
+    assert (cloud.is_organized, cloud.height, cloud.broken) == (True, 1, 0)
+
+
+def test_a_cloud_that_says_it_is_finite_and_is_not_is_broken():
+    message = cloud_to_message(cloud_of([1, np.nan, 3]))
+    message.cloud.is_dense = True
+    assert cloud_from_message(message).broken == 1
+
+
+def test_a_laser_scan_holds_at_one_moment_and_its_angles_grow():
+    turn = LaserTurn(np.array([1.0, np.inf, 3.0, 4.0], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0)
+    scan = _sent(laser_scan_message(turn, STAMP_NS, "sonar"), LaserScan)
+    assert (scan.header.frame_id, scan.header.stamp.to_nsec()) == ("sonar", STAMP_NS)
+    assert (scan.angle_min, scan.angle_increment) == (pytest.approx(-math.pi), pytest.approx(math.pi / 2))
+    assert scan.angle_max == pytest.approx(scan.angle_min + 3 * scan.angle_increment)
+    assert (scan.time_increment, scan.scan_time, scan.range_min, scan.range_max) == (0.0, 16.0, 0.5, 50.0)
+    assert (scan.ranges, scan.intensities) == ((1.0, math.inf, 3.0, 4.0), (0.0, 1.0, 2.0, 3.0))
 
 
 def test_an_empty_cloud_comes_back_empty():

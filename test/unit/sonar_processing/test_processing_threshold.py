@@ -127,3 +127,27 @@ def test_the_cloud_given_is_not_changed():
 def test_header_and_frame_are_those_of_the_scan():
     kept = Thresholder(ThresholderParameters())(cloud_of([1, 200]))
     assert (kept.stamp_ns, kept.frame_id) == (5 * 10**9, "odom")
+
+
+def test_an_organised_cloud_stays_organised_and_what_goes_becomes_nan():
+    cloud = cloud_of([70, 10, 80, 90, 20, 30], height=2)
+    kept = Thresholder(ThresholderParameters(mode="FIXED", fixed_threshold=66))(cloud)
+    assert (kept.height, len(kept), kept.is_organized) == (2, 6, True)
+    assert np.isnan(kept.points).all(axis=1).tolist() == [False, True, False, False, True, True]
+    np.testing.assert_array_equal(kept.time_stamps, cloud.time_stamps)
+
+
+def test_points_that_an_earlier_stage_removed_have_no_say_in_the_threshold():
+    strengths = [10.0, 20.0, 90.0, 95.0]
+    thresholder = Thresholder(ThresholderParameters(mode="OTSU"))
+    thresholder(cloud_of([*strengths, np.nan, np.nan], height=2))
+    assert thresholder.newest_threshold == otsu_threshold(np.array(strengths))
+
+
+def test_the_newest_threshold_can_be_read():
+    thresholder = Thresholder(ThresholderParameters(mode="FIXED", fixed_threshold=66))
+    assert thresholder.newest_threshold is None
+    thresholder(cloud_of([1, 2]))
+    assert thresholder.newest_threshold == 66
+    thresholder(cloud_of([]))
+    assert thresholder.newest_threshold is None

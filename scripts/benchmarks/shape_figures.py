@@ -1,0 +1,127 @@
+"""Walls and buoys found in simulated scans of the basin, against the world; and the time of the search."""
+
+import math
+from dataclasses import dataclass
+from functools import reduce
+from typing import List, Optional, Sequence
+
+import numpy as np
+
+from benchmarks.basin_scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
+from benchmarks.table import Row, median_seconds
+from sonar_processing.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.echo_extraction import EchoExtractorParameters
+from sonar_processing.echo_extractor import EchoExtractor
+from sonar_processing.lines import Line, LineDetector, LineDetectorParameters
+from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.stages import Stage
+from sonar_processing.threshold import Thresholder, ThresholderParameters
+
+SEEDS = 100
+SPREADS = (0.15, 1.0)
+WALL_REACH = 45.0
+DISTANCE_TOLERANCE, ANGLE_TOLERANCE = 0.15, math.radians(1.0)
+_SAME_WALL = 0.95
+
+
+@dataclass(frozen=True)
+class WallErrors:
+    """One wall that is there: its distance from the sonar, and the errors of what was found, None when nothing was."""
+
+    reach: float
+    distance: Optional[float]
+    angle: Optional[float]
+
+    @property
+    def is_good(self) -> bool:
+        """Whether it was found within the tolerances."""
+        found = self.distance is not None and self.angle is not None
+        return found and abs(self.distance) <= DISTANCE_TOLERANCE and self.angle <= ANGLE_TOLERANCE
+
+
+def wall_errors(lines: List[Line], T_world_sonar: np.ndarray) -> List[WallErrors]:
+    """Compare lines with the basin's walls within `WALL_REACH` of the sonar; beyond, a wall shows too few beams."""
+    sonar, result = T_world_sonar[:2, 3], []
+    for x, y, offset in WALLS:
+        normal = np.array([x, y])
+        reach = offset - normal @ sonar
+        if reach > WALL_REACH:
+            continue
+        foot = sonar + reach * normal
+        near = [line for line in lines if abs(line.normal @ normal) > _SAME_WALL and line.distance_from(foot) < 3.0]
+        best = min(near, key=lambda line: line.distance_from(foot), default=None)
+        angle = None if best is None else math.acos(min(abs(best.normal @ normal), 1.0))
+        result.append(WallErrors(reach, None if best is None else best.distance_from(foot), angle))
+    return result
+
+
+def wall_rows(spread: float, name: str, chain: Sequence[Stage]) -> List[Row]:
+    """Measure walls from random places, seed by seed."""
+    scans, detector = BasinScans(spread), LineDetector(LineDetectorParameters())
+    seeds = []
+    for seed in range(SEEDS):
+        pose = anywhere(seed)
+        cloud = reduce(lambda cloud, stage: stage(cloud), chain, scans.scan(pose, seed))
+        seeds.append(wall_errors(detector(cloud), pose))
+    found = [error for errors in seeds for error in errors if error.distance is not None]
+    good = sum(all(error.is_good for error in errors) for errors in seeds)
+    worst = f"{max(e.distance for e in found):.2f} m, {math.degrees(max(e.angle for e in found)):.2f} deg"
+    name = f"{name}, spread {spread} m: "
+    return [
+        (f"{name}all walls within {WALL_REACH:.0f} m found to 0.15 m, 1 deg", f"{good} of {SEEDS} seeds", ">= 99"),
+        (f"{name}walls found of those there", f"{len(found)} of {sum(map(len, seeds))}", ""),
+        (f"{name}greatest errors of those found", worst, "0.15 m, 1 deg"),
+    ]
+
+
+def buoy_rows(spread: float) -> List[Row]:
+    """Measure a buoy of 0.5 m radius from 10 m, seed by seed; its radius is not told, only the default range."""
+    scans, detector = BasinScans(spread), CircleDetector(CircleDetectorParameters())
+    thresholder = Thresholder(ThresholderParameters())
+    errors = []
+    for seed in range(SEEDS):
+        pose, buoy = near_buoy(seed), np.array(BUOYS[seed % len(BUOYS)])
+        cloud = thresholder(scans.scan(pose, seed))
+        circles = detector(cloud, lambda times, place=pose[:2, 3]: np.tile(place, (len(times), 1)))
+        errors.append(min((float(np.linalg.norm(circle.center - buoy)) for circle in circles), default=math.inf))
+    good = sum(error <= DISTANCE_TOLERANCE for error in errors)
+    name = f"thresholded, spread {spread} m: buoy of 0.5 m at 10 m"
+    return [
+        (f"{name}, error of its centre", f"{np.median(errors):.2f} m median", "0.15 m"),
+        (f"{name} within 0.15 m", f"{good} of {SEEDS} seeds", ""),
+    ]
+
+
+def cross_of_lines(points: int, rng: np.random.Generator) -> IntensityCloud:
+    """Return three noisy lines and as many stray points again, each point an echo of its own."""
+    along, each = rng.uniform(-30.0, 30.0, points), np.arange(points) % 4
+    noise = rng.normal(0.0, 0.1, points)
+    xy = np.where(
+        (each == 0)[:, np.newaxis], np.column_stack([along, 25.0 + noise]), np.column_stack([40.0 + noise, along])
+    )
+    xy = np.where((each == 2)[:, np.newaxis], np.column_stack([along, noise - 25.0]), xy)
+    xy = np.where((each == 3)[:, np.newaxis], rng.uniform(-40.0, 40.0, (points, 2)), xy)
+    cloud = np.column_stack([xy, np.zeros(points), np.full(points, 100.0)]).astype(np.float32)
+    return IntensityCloud(cloud, np.arange(1.0, points + 1.0), 10**9, "odom")
+
+
+def time_rows() -> List[Row]:
+    """Measure the search for three lines with all 5,000 hypotheses for each, and as it ends by itself."""
+    cloud = cross_of_lines(2000, np.random.default_rng(4))
+    rows = []
+    for probability, name in ((1.0, "5,000 hypotheses each"), (0.999, "default probability")):
+        detector = LineDetector(LineDetectorParameters(n_walls=3, probability=probability, max_iterations=5000))
+        seconds = median_seconds(lambda d=detector: d(cloud), repeats=30)
+        rows.append((f"3 lines in 2,000 points, {name}", f"{1e3 * seconds:.1f} ms", "<= 20 ms"))
+    return rows
+
+
+def rows() -> List[Row]:
+    """Return the figures of the shapes."""
+    found = []
+    for spread in SPREADS:
+        cleaned = [Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())]
+        extractor = EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))
+        found += wall_rows(spread, "cleaned", cleaned) + wall_rows(spread, "echoes", [extractor]) + buoy_rows(spread)
+    return found + time_rows()

@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""Detectors of walls and circles: what they publish, and that no cloud can end them."""
+
+import math
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import Diagnostics, Inbox, wait_for_publisher_links
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import Marker, MarkerArray
+
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.conversions import cloud_to_message
+from underwater_map_construction.msg import Circles, StampedIntensityCloud, Walls
+
+DETECTORS = ("line_detector", "circle_detector")
+BUOY = np.array([4.0, -6.0])
+
+
+def scan() -> np.ndarray:
+    """Return points (n, 4): a wall at y = 8 from x = -10 to 10 and the near side of a buoy at (4, -6)."""
+    along = np.linspace(-10.0, 10.0, 41)
+    wall = np.column_stack([along, np.full(41, 8.0)])
+    bearings = math.atan2(BUOY[1], BUOY[0]) + np.pi + np.linspace(-0.7, 0.7, 5)
+    buoy = BUOY + 0.4 * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    xy = np.concatenate([wall, buoy])
+    return np.column_stack([xy, np.full(len(xy), -2.0), np.full(len(xy), 100.0)]).astype(np.float32)
+
+
+def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
+    """Return the points as a message, each of a beam of its own."""
+    return cloud_to_message(IntensityCloud(points, -10.0 - np.arange(len(points)) * 0.1, 20 * 10**9, frame))
+
+
+class Shapes(unittest.TestCase):
+    """Sends clouds to both detectors."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Connect to both detectors."""
+        cls.diagnostics = Diagnostics()
+        cls.walls = Inbox("/sonar/scan/line/coefficients", Walls)
+        cls.circles = Inbox("/sonar/scan/circle/coefficients", Circles)
+        cls.wall_points = Inbox("/sonar/scan/line", PointCloud2)
+        cls.wall_markers = Inbox("/sonar/scan/line/markers", MarkerArray)
+        cls.clouds = rospy.Publisher("clouds", StampedIntensityCloud, queue_size=10)
+        wait_for_publisher_links(cls.clouds, 2)
+        for inbox in (cls.walls, cls.circles, cls.wall_points, cls.wall_markers):
+            inbox.wait_for_link()
+
+    def expect_for_both(self, counter: str, number: int) -> None:
+        """Wait for a counter of both detectors."""
+        for name in DETECTORS:
+            self.diagnostics.wait_for(name, counter, number)
+
+    def test_1_empty_clouds_and_two_points_hold_no_shape(self) -> None:
+        """They are answered with empty messages."""
+        self.clouds.publish(message(np.zeros((0, 4), np.float32)))
+        self.clouds.publish(message(scan()[[0, 20]]))
+        self.expect_for_both("clouds in", 2)
+        self.assertEqual(self.walls.wait_for().walls, [])
+        self.assertEqual(self.circles.wait_for().circles, [])
+
+    def test_2_stamps_that_do_not_match_the_points_are_refused(self) -> None:
+        """They are counted."""
+        cloud = message(scan())
+        cloud.timeStamps = cloud.timeStamps[:-1]
+        self.clouds.publish(cloud)
+        self.expect_for_both("clouds refused", 1)
+
+    def test_3_points_that_are_not_finite_are_left_out(self) -> None:
+        """One bad point costs one point, in a cloud that says that it has none."""
+        points = scan()
+        points[3, 0] = np.nan
+        cloud = message(points)
+        cloud.cloud.is_dense = True
+        self.clouds.publish(cloud)
+        self.expect_for_both("points that are not finite", 1)
+
+    def test_4_a_frame_that_tf_does_not_know_costs_circles_and_no_walls(self) -> None:
+        """Walls need no sonar; whether a circle is seen from outside does."""
+        self.clouds.publish(message(scan(), frame="moon"))
+        self.expect_for_both("scans without sonar position", 1)
+        (wall,) = self.walls.wait_for(lambda m: m.header.frame_id == "moon").walls
+        self.assertTrue(math.isnan(wall.sonar_distance))
+
+    def test_5_the_wall_is_where_it_is_and_as_long(self) -> None:
+        """Coefficients, inliers and marker agree."""
+        self.clouds.publish(message(scan()))
+        walls = self.walls.wait_for(lambda m: m.header.frame_id == "odom" and m.walls and m.walls[0].inliers == 41)
+        (wall,) = walls.walls
+        self.assertAlmostEqual(wall.orientation, math.pi / 2, places=3)
+        self.assertAlmostEqual(wall.distance, 8.0, places=3)
+        self.assertAlmostEqual(wall.sonar_distance, 8.0, places=3)
+        self.assertAlmostEqual(abs(wall.end.x - wall.start.x), 20.0, places=3)
+        self.assertAlmostEqual(wall.start.z, -2.0, places=3)
+        self.wall_points.wait_for(lambda cloud: cloud.width == 41)
+        markers = self.wall_markers.wait_for(lambda m: m.markers[0].header.stamp == walls.header.stamp).markers
+        (line,) = [marker for marker in markers if marker.type == Marker.LINE_STRIP]
+        self.assertEqual(line.points, [wall.start, wall.end])
+
+    def test_6_the_buoy_is_where_it_is(self) -> None:
+        """Its centre lies behind what the sonar sees."""
+        circles = self.circles.wait_for(lambda m: m.header.frame_id == "odom" and len(m.circles) == 1)
+        (circle,) = circles.circles
+        self.assertLess(math.hypot(circle.center.x - BUOY[0], circle.center.y - BUOY[1]), 0.15)
+        self.assertEqual(circle.inliers, 5)
+
+
+if __name__ == "__main__":
+    rospy.init_node("shapes_test")
+    rostest.rosrun("underwater_map_construction", "shapes", Shapes, sys.argv)

@@ -1,0 +1,66 @@
+#!/usr/bin/env python3
+"""The servo is stepped, the map gets a floor, and a service puts the sonar back to horizontal."""
+
+import math
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import Diagnostics, Inbox
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64, UInt32
+
+from underwater_map_construction.msg import SonarScanLine
+from underwater_map_construction.srv import SetScanMode
+
+FLOOR = -5.5
+
+
+def tilts(beams: list) -> list:
+    """Return how many beams were taken at each tilt, as (degrees, beams) in the order of time."""
+    found = []
+    for beam in beams:
+        degrees = math.degrees(beam.sensorAngle)
+        if found and abs(found[-1][0] - degrees) < 0.05:
+            found[-1][1] += 1
+        else:
+            found.append([degrees, 1])
+    return found
+
+
+class SonarControl(unittest.TestCase):
+    """Watches one sweep."""
+
+    def test_1_a_sweep_scans_every_tilt_whole_and_finds_the_floor(self) -> None:
+        """A full turn at -20, 0 and 20 degrees."""
+        beams = Inbox("/sonar/raw", SonarScanLine)
+        cloud = Inbox("/MLSM/cloud", PointCloud2)
+        commands = Inbox("/sonar_servo/command", Float64)
+        Inbox("/sonar_control/sweeps", UInt32).wait_for(timeout=60.0)
+        whole = [round(degrees) for degrees, count in tilts(beams.messages) if count >= 120]
+        self.assertEqual(whole[:3], [-20, 0, 20])
+        self.assertEqual([round(math.degrees(command.data)) for command in commands.messages[-3:]], [0, 20, 0])
+        points = np.frombuffer(cloud.wait_for().data, np.float32).reshape(-1, 7)
+        self.assertGreater(np.count_nonzero(np.abs(points[:, 2] - FLOOR) < 0.5), 50)
+
+    def test_2_a_mode_that_does_not_exist_is_refused(self) -> None:
+        """The answer says which there are."""
+        rospy.wait_for_service("/sonar_control/set_mode", 20.0)
+        answer = rospy.ServiceProxy("/sonar_control/set_mode", SetScanMode)("VERTICAL")
+        self.assertFalse(answer.success)
+        self.assertIn("must be one of STATIC_MAPPING, HORIZONTAL", answer.message)
+
+    def test_3_horizontal_puts_the_sonar_back_and_keeps_it_there(self) -> None:
+        """The beams say so."""
+        beams = Inbox("/sonar/raw", SonarScanLine)
+        self.assertTrue(rospy.ServiceProxy("/sonar_control/set_mode", SetScanMode)("HORIZONTAL").success)
+        self.assertEqual(rospy.get_param("/sonar_control/mode"), "HORIZONTAL")
+        beams.wait_for(lambda beam: beam.sensorAngle == 0.0)
+        Diagnostics().wait_for("sonar_control", "scans", 3)
+
+
+if __name__ == "__main__":
+    rospy.init_node("tilting")
+    rostest.rosrun("underwater_map_construction", "tilting", SonarControl, sys.argv)

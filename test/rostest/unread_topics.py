@@ -1,0 +1,128 @@
+#!/usr/bin/env python3
+"""What nobody reads is not made: no cloud, scan or image is serialised, and no echo is looked for."""
+
+import math
+import sys
+import unittest
+from typing import Callable, Iterable
+
+import rospy
+import rostest
+import tf2_ros
+from geometry_msgs.msg import TransformStamped
+from graph import Inbox, wait_for_publisher_links, wait_until
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
+from std_msgs.msg import Float32
+
+from node_support.node import DiagnosticsPublisher
+from sonar_processing.conversions import LaserScanArrays, StampedIntensityCloudArrays
+from sonar_processing.host import ProcessingHost
+from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
+
+BEAMS = 60
+TOPICS = {
+    "/sonar/scan/sonarCloud": StampedIntensityCloud,
+    "/sonar/scan/sonarCloud/cloud": PointCloud2,
+    "/sonar/scan/laserCloud": PointCloud2,
+    "/sonar/scan/laserScan": LaserScan,
+    "/sonar/scan/polar": StampedIntensityCloud,
+    "/sonar/scan/polar/cloud": PointCloud2,
+    "/sonar/scan/thresholded": StampedIntensityCloud,
+    "/sonar/scan/thresholded/cloud": PointCloud2,
+    "/sonar/scan/cleaned": StampedIntensityCloud,
+    "/sonar/scan/cleaned/cloud": PointCloud2,
+    "/sonar/scan/echoes": StampedIntensityCloud,
+    "/sonar/scan/echoes/cloud": PointCloud2,
+    "/sonar/beam": PointCloud2,
+    "/sonar/image": Image,
+    "/sonar/camera_info": CameraInfo,
+    "/thresholder/threshold": Float32,
+    "/echo_extractor/threshold": Float32,
+}
+
+
+class Counting:
+    """Counts how often messages of some types are serialised, whoever asks for it."""
+
+    def __init__(self, kinds: Iterable[type]) -> None:
+        self.serialised = 0
+        for kind in kinds:
+            kind.serialize = self._counted(kind.serialize)
+
+    def _counted(self, serialize: Callable[..., None]) -> Callable[..., None]:
+        def call(*arguments: object) -> None:
+            self.serialised += 1
+            serialize(*arguments)
+
+        return call
+
+
+class UnreadTopics(unittest.TestCase):
+    """The host runs in this process, so that what it does can be counted."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Host everything, with the odometry as velocity, and connect."""
+        cls.counting = Counting([StampedIntensityCloudArrays, LaserScanArrays, PointCloud2, Image, CameraInfo, Float32])
+        rospy.set_param("sonar_to_cloud", {"velocity_topic": "odom", "velocity_type": "ODOMETRY", "mode": "LASER"})
+        cls.host = ProcessingHost()
+        cls.diagnostics = DiagnosticsPublisher(cls.host.healths)
+        cls.beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
+        cls.odometry = rospy.Publisher("/odom", Odometry, queue_size=10)
+        cls.transforms = tf2_ros.StaticTransformBroadcaster()
+        mount = TransformStamped(child_frame_id="sonar")
+        mount.header.frame_id = "odom"
+        mount.transform.rotation.w = 1.0
+        cls.transforms.sendTransform(mount)
+        wait_for_publisher_links(cls.beams, 1)
+        wait_for_publisher_links(cls.odometry, 1)
+        cls.time = 1000.0
+
+    def send_turn(self) -> None:
+        """Publish a full turn with an echo in every beam."""
+        for step in range(BEAMS):
+            type(self).time += 0.1
+            message = SonarScanLine(intensities=bytes([3] * (20 + step % 7) + [120] * 3 + [3] * (27 - step % 7)))
+            message.header.frame_id, message.header.stamp = "sonar", rospy.Time.from_sec(self.time)
+            message.angle = 2.0 * math.pi * step / BEAMS
+            message.maxrange_meters, message.range_resolution = 50.0, 1.0
+            self.beams.publish(message)
+
+    def number(self, stage: str, counter: str) -> int:
+        """Return a counter of a stage; 0 before its first count."""
+        health = next(health for health in self.host.healths if health.name == stage)
+        return int(health.report().values.get(counter, 0))
+
+    def test_1_nothing_is_serialised_while_nobody_reads(self) -> None:
+        """The chain works all the same; the stage beside it and the image rest."""
+        self.send_turn()
+        wait_until(lambda: self.number("outlier_remover", "clouds out") == 1)
+        wait_until(lambda: self.number("sonar_to_cloud", "turns") == 1)
+        self.assertEqual(self.counting.serialised, 0)
+        self.assertEqual(self.number("echo_extractor", "clouds in"), 0)
+        self.assertEqual(self.number("sonar_image", "beams in"), 0)
+
+    def test_2_every_topic_comes_when_it_is_read(self) -> None:
+        """And the odometry tells that the vehicle moves."""
+        moving = Odometry()
+        moving.twist.twist.linear.x = 0.5
+        self.odometry.publish(moving)
+        wait_until(lambda: self.number("sonar_to_cloud", "velocities in") == 1)
+        inboxes = {topic: Inbox(topic, kind) for topic, kind in TOPICS.items()}
+        for _ in range(50):
+            self.send_turn()
+            if wait_until(lambda: all(inbox.messages for inbox in inboxes.values()), timeout=0.2, required=False):
+                break
+        received = {topic: inbox.wait_for() for topic, inbox in inboxes.items()}
+        self.assertGreaterEqual(self.counting.serialised, len(TOPICS))
+        stamps = received["/sonar/scan/sonarCloud"].timeStamps
+        self.assertGreater(min(stamps), 0.0)
+        self.assertEqual(len(received["/sonar/scan/laserScan"].ranges), BEAMS)
+        self.assertEqual(received["/sonar/scan/polar"].cloud.height, BEAMS)
+        self.assertEqual(received["/sonar/image"].encoding, "mono8")
+
+
+if __name__ == "__main__":
+    rospy.init_node("unread_topics")
+    rostest.rosrun("underwater_map_construction", "unread_topics", UnreadTopics, sys.argv)

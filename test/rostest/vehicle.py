@@ -1,0 +1,31 @@
+#!/usr/bin/env python3
+"""vehicle.launch: beams become a map and walls, in the frames that its arguments name."""
+
+import sys
+import unittest
+
+import rospy
+import rostest
+from graph import Inbox
+from sensor_msgs.msg import PointCloud2
+
+from underwater_map_construction.msg import Walls
+
+ONE_TURN = 60.0
+
+
+class Vehicle(unittest.TestCase):
+    """Listens to what a topside computer would."""
+
+    def test_a_turn_of_the_head_becomes_map_and_walls(self) -> None:
+        """The emulated basin is square."""
+        blocks, walls = Inbox("/MLSM/cloud", PointCloud2), Inbox("/sonar/scan/line/coefficients", Walls)
+        found = walls.wait_for(timeout=ONE_TURN)
+        self.assertEqual(found.header.frame_id, "dead_reckoning")
+        self.assertEqual(len(found.walls), 4)
+        self.assertEqual(blocks.wait_for(timeout=ONE_TURN).header.frame_id, "harbour")
+
+
+if __name__ == "__main__":
+    rospy.init_node("vehicle_test")
+    rostest.rosrun("underwater_map_construction", "vehicle", Vehicle, sys.argv)

@@ -1,0 +1,190 @@
+"""Which echoes come out of a polar scan, and where they lie."""
+
+import numpy as np
+import pytest
+from clouds import SECOND, beam_of
+from hypothesis import given
+from hypothesis import strategies as st
+from polar_scans import binary_image, wall_image, with_ring, with_speckle
+
+from node_support.refused_input import RefusedInput
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.echo_extraction import EchoExtractorParameters, ExtractionMode, extract_echoes, height_threshold
+from sonar_processing.echo_extractor import EchoExtractor
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.polar_scan import PolarScan
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
+
+BEAMS, RESOLUTION = 60, 0.1
+# A wall that is nearest in the middle of the scan.
+WALL = 150.0 + 0.05 * (np.arange(BEAMS) - 30.0) ** 2
+
+
+def _echoes(image, **values):
+    return extract_echoes(image, RESOLUTION, EchoExtractorParameters(**values))
+
+
+def test_an_echo_is_found_between_the_bins():
+    echoes = _echoes(wall_image(WALL))
+    assert echoes.beams.tolist() == list(range(BEAMS))
+    np.testing.assert_allclose(echoes.bins, WALL, atol=0.03)
+
+
+def test_speckle_leaves_the_wall():
+    echoes = _echoes(with_speckle(wall_image(WALL), seed=1))
+    assert echoes.beams.tolist() == list(range(BEAMS))
+    np.testing.assert_allclose(echoes.bins, WALL, atol=1.5)
+
+
+def test_the_ring_of_the_floor_is_no_echo():
+    echoes = _echoes(with_speckle(with_ring(wall_image(WALL), at=80), seed=2))
+    assert len(echoes) == BEAMS
+    assert np.abs(echoes.bins - WALL[echoes.beams]).max() < 2.0
+
+
+def test_without_taking_the_ring_off_it_is_found_in_every_direction():
+    echoes = _echoes(with_ring(wall_image(WALL), at=80), ring_quantile=0.0)
+    assert set(echoes.beams[np.abs(echoes.bins - 95.0) < 15.0]) == set(range(BEAMS))
+
+
+def test_a_wall_inside_the_ring_is_still_found():
+    echoes = _echoes(with_ring(wall_image(WALL), at=140, width=60))
+    assert set(echoes.beams) == set(range(BEAMS))
+    assert np.median(np.abs(echoes.bins - WALL[echoes.beams])) < 0.5
+
+
+def test_heights_are_what_stands_out_of_the_ring():
+    runs = binary_image([150] * 20 + [0] * 40, [40] * 20 + [0] * 40).astype(np.float32)
+    image = with_ring(runs, at=100, width=200, strength=50.0)
+    echoes = _echoes(image)
+    np.testing.assert_allclose(echoes.heights, 127.0, atol=0.1)
+
+
+def test_nothing_nearer_than_min_range_is_an_echo():
+    image = wall_image(WALL) + wall_image(np.where(np.arange(BEAMS) % 2, 20.0, -100.0))
+    assert _echoes(image, min_range=1.0).bins.min() < 25
+    assert _echoes(image, min_range=3.0).bins.min() > 100
+
+
+def test_a_scan_of_nothing_has_no_echo():
+    echoes = _echoes(np.zeros((BEAMS, 400), np.uint8))
+    assert (len(echoes), echoes.threshold) == (0, 10.0)
+
+
+def test_echoes_lower_than_min_height_are_none():
+    assert len(_echoes(wall_image(WALL, height=20.0), min_height=30.0)) == 0
+
+
+def test_binary_strengths_give_one_echo_per_run_in_its_middle():
+    echoes = _echoes(binary_image([150] * 30 + [200] * 30, [28] * 30 + [9] * 30))
+    assert echoes.bins.tolist() == [163.5] * 30 + [204.0] * 30
+
+
+def test_the_leading_edge_of_a_binary_run_is_where_it_begins():
+    echoes = _echoes(binary_image(np.arange(150, 210), [28] * 60), mode="LEADING_EDGE")
+    np.testing.assert_allclose(echoes.bins, np.arange(149.5, 209.5), atol=0.01)
+
+
+def test_the_leading_edge_lies_before_the_peak_by_as_much_whatever_the_strength():
+    heights = np.linspace(110.0, 200.0, BEAMS)[:, np.newaxis]
+    before = WALL - _echoes(wall_image(WALL, height=1.0) * heights, mode="LEADING_EDGE").bins
+    assert before.min() > 1.0
+    assert np.ptp(before) < 0.25
+
+
+def test_peaks_of_one_echo_have_one_leading_edge():
+    image = binary_image([150] * 20 + [0] * 40, [60] * 20 + [0] * 40).astype(np.float32)
+    image[:20, 180:184] -= 30.0
+    assert len(_echoes(image)) == 40
+    assert len(_echoes(image, mode="LEADING_EDGE")) == 20
+
+
+@pytest.mark.parametrize(("spacing", "per_run"), [(0.1, 28), (0.5, 6), (2.8, 1), (50.0, 1)])
+def test_dense_points_stand_all_along_a_run(spacing, per_run):
+    echoes = _echoes(binary_image([150] * 20 + [0] * 40, [28] * 20 + [0] * 40), mode="DENSE", spacing=spacing)
+    assert np.bincount(echoes.beams).tolist() == [per_run] * 20
+    assert (echoes.bins.min(), echoes.bins.max() <= 177) == (150, True)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from(list(ExtractionMode)), st.sampled_from([0.0, 0.3, 0.9]))
+def test_no_scan_breaks_it_and_every_echo_lies_in_the_scan(seed, mode, quantile):
+    rng = np.random.default_rng(seed)
+    image = rng.integers(0, rng.integers(1, 257), (rng.integers(10, 30), rng.integers(1, 40)), dtype=np.uint8)
+    echoes = _echoes(image, mode=mode, ring_quantile=quantile, min_range=0.0, min_height=0.0)
+    assert len(echoes.beams) == len(echoes.bins) == len(echoes.heights)
+    assert np.isfinite(echoes.bins).all()
+    assert ((echoes.bins >= -0.5) & (echoes.bins <= image.shape[1] - 0.5)).all()
+    assert ((echoes.beams >= 0) & (echoes.beams < len(image))).all()
+    assert (echoes.heights > 0).all()
+
+
+def test_the_order_of_the_beams_makes_no_difference():
+    image = with_speckle(wall_image(WALL), seed=3)
+    there, back = _echoes(image), _echoes(image[::-1])
+    np.testing.assert_array_equal(np.sort(there.bins), np.sort(back.bins))
+
+
+def test_too_few_beams_show_no_ring():
+    with pytest.raises(RefusedInput, match=r"^9, must be at least 10") as refused:
+        _echoes(wall_image(WALL[:9]))
+    assert refused.value.kind == "scans of too few beams"
+
+
+def test_few_beams_are_enough_where_no_ring_is_taken_off():
+    assert len(_echoes(wall_image(WALL[:2]), ring_quantile=0.0)) == 2
+
+
+def test_the_threshold_is_never_above_half_of_the_highest():
+    assert height_threshold(np.array([100.0, 120.0, 127.0])) == 63.5
+    assert height_threshold(np.zeros(0)) == 0.0
+
+
+def _polar_cloud(image, *, moving_by=0.0, **values):
+    """Return the organised cloud of a turn of a vehicle that moves along +x by `moving_by` m per beam."""
+    beams = []
+    for number, strengths in enumerate(np.clip(image, 0, 255).astype(np.uint8)):
+        pose = np.eye(4)
+        pose[0, 3] = moving_by * number
+        angle = 2 * np.pi * number / len(image)
+        beam = beam_of(strengths, angle=angle, resolution=RESOLUTION, seconds=number + 1)
+        beams.append(PlacedBeam(beam, pose, is_moving=moving_by > 0))
+    return PolarScan.of(beams).cloud(SonarToCloudParameters(**{"min_range": 0.0, **values}))
+
+
+@pytest.mark.parametrize("moving_by", [0.0, 0.03])
+def test_the_stage_places_every_echo_by_the_pose_of_its_beam(moving_by):
+    cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), moving_by=moving_by))
+    angles, ranges = 2 * np.pi * np.arange(BEAMS) / BEAMS, (WALL + 0.5) * RESOLUTION
+    expected = np.column_stack([ranges * np.cos(angles) + moving_by * np.arange(BEAMS), ranges * np.sin(angles)])
+    np.testing.assert_allclose(cloud.points[:, :2], expected, atol=0.01)
+    assert cloud.points.dtype == np.float32
+
+
+def test_the_stage_gives_every_echo_the_stamp_of_its_beam():
+    cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), moving_by=0.01))
+    np.testing.assert_allclose(cloud.time_stamps, np.arange(1, BEAMS + 1))
+    assert (cloud.stamp_ns, cloud.frame_id, cloud.height) == (BEAMS * SECOND, "odom", 1)
+
+
+def test_the_stage_hears_nothing_in_removed_bins():
+    cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), min_range=17.0))
+    assert 0 < len(cloud) < BEAMS
+    assert np.isfinite(cloud.points).all()
+    assert np.hypot(*cloud.points[:, :2].T).min() > 16.9
+
+
+def test_the_stage_tells_its_threshold():
+    extractor = EchoExtractor(EchoExtractorParameters())
+    assert extractor.newest_threshold is None
+    extractor(_polar_cloud(wall_image(WALL)))
+    assert 10.0 <= extractor.newest_threshold < 127.0
+
+
+def test_a_cloud_without_rows_is_refused():
+    with pytest.raises(RefusedInput, match="not organised"):
+        EchoExtractor(EchoExtractorParameters())(IntensityCloud(np.zeros((3, 4), np.float32), np.ones(3), 1, "odom"))
+
+
+def test_a_cloud_of_removed_points_only_is_refused():
+    with pytest.raises(RefusedInput, match="no two neighbouring bins"):
+        EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), min_range=90.0))

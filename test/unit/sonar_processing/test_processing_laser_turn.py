@@ -1,0 +1,143 @@
+"""What a planar laser would have seen, and what the organised cloud of a turn holds."""
+
+import math
+
+import numpy as np
+import pytest
+from clouds import SECOND, beam_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sonar_processing.laser_turn import laser_turn, usual_rays
+from sonar_processing.placed_beam import PlacedBeam
+from sonar_processing.polar_scan import PolarScan
+from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
+
+RAYS, BINS, RESOLUTION = 120, 100, 0.1
+STEP = 2 * math.pi / RAYS
+
+
+def _pose(x=0.0, y=0.0, yaw=0.0, z=0.0):
+    pose = np.eye(4)
+    pose[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
+    pose[:3, 3] = x, y, z
+    return pose
+
+
+def _strengths(distance, strength=100):
+    strengths = np.full(BINS, 3, np.uint8)
+    index = int(distance / RESOLUTION)
+    if index < BINS:
+        strengths[index] = strength
+    return strengths
+
+
+def _scan(distances, numbers=None, poses=None):
+    """Return a scan whose beam k looks at k * 3 deg and hears an echo at its distance."""
+    numbers = range(len(distances)) if numbers is None else numbers
+    poses = [np.eye(4)] * len(distances) if poses is None else poses
+    return PolarScan.of([
+        PlacedBeam(beam_of(_strengths(distance), number * STEP, RESOLUTION, seconds), pose, is_moving=False)
+        for seconds, (distance, number, pose) in enumerate(zip(distances, numbers, poses), 1)
+    ])  # fmt: skip
+
+
+def _laser(scan, **values):
+    return laser_turn(scan, SonarToCloudParameters(**values))
+
+
+def _angles(turn):
+    return -math.pi + np.arange(turn.ranges.size) * turn.angle_increment
+
+
+def test_rays_go_round_from_minus_pi_in_steps_of_the_head():
+    turn = _laser(_scan(np.full(RAYS, 5.0)))
+    assert turn.ranges.size == RAYS
+    assert turn.angle_increment == pytest.approx(STEP)
+    np.testing.assert_allclose(turn.ranges, 5.05, atol=1e-5)
+
+
+@pytest.mark.parametrize("direction", [1, -1])
+def test_the_direction_of_the_head_makes_no_difference(direction):
+    numbers = direction * np.arange(RAYS) + 17
+    distances = 4.0 + 2.0 * np.cos(numbers * STEP)
+    turn = _laser(_scan(distances, numbers))
+    np.testing.assert_allclose(turn.ranges, 4.0 + 2.0 * np.cos(_angles(turn)), atol=0.11)
+
+
+def test_lost_beams_and_beams_without_echo_are_infinitely_far():
+    numbers = [number for number in range(RAYS) if number not in (10, 11, 80)]
+    distances = [np.inf if number == 30 else 5.0 for number in numbers]
+    turn = _laser(_scan(np.minimum(distances, 99.0), numbers), laser_strongest_above=50.0)
+    missing = sorted(round((angle % (2 * math.pi)) / STEP) for angle in _angles(turn)[~np.isfinite(turn.ranges)])
+    assert missing == [10, 11, 30, 80]
+    assert turn.intensities[~np.isfinite(turn.ranges)].tolist() == [0.0] * 4
+    assert set(turn.intensities[np.isfinite(turn.ranges)]) == {100.0}
+
+
+@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-0.6, 0.6))
+def test_a_wall_stays_straight_while_the_vehicle_moves(dx, dy, turned):
+    share = np.linspace(0.0, 1.0, RAYS)
+    poses = [_pose(dx * s, dy * s, turned * s) for s in share]
+    bearings = np.arange(RAYS) * STEP + turned * share
+    # Beams towards a wall along y at x = 6.
+    with np.errstate(divide="ignore"):
+        distances = np.where(np.cos(bearings) > 0.7, (6.0 - dx * share) / np.cos(bearings), 50.0)
+    turn = _laser(_scan(distances, poses=poses), laser_strongest_above=50.0)
+    near = np.isfinite(turn.ranges)
+    points = _pose(dx, dy, turned) @ np.array([
+        turn.ranges[near] * np.cos(_angles(turn)[near]), turn.ranges[near] * np.sin(_angles(turn)[near]),
+        np.zeros(near.sum()), np.ones(near.sum()),
+    ])  # fmt: skip
+    assert near.sum() > 15
+    assert np.abs(points[0] - 6.0).max() < 9.0 * STEP / 2 + 0.1
+
+
+def test_the_nearest_of_two_echoes_in_one_ray_stays():
+    assert _laser(_scan([5.0, 2.0, 3.0], [0, 0, 0]), laser_scan_rays=4).ranges.tolist() == [
+        np.inf, np.inf, pytest.approx(2.05), np.inf,
+    ]  # fmt: skip
+
+
+def test_what_lies_nearer_than_min_range_is_not_measured():
+    turn = _laser(_scan(np.full(RAYS, 0.3)), min_range=0.5, laser_strongest_above=50.0)
+    assert np.isinf(turn.ranges).all()
+    assert (turn.range_min, turn.range_max) == (0.5, pytest.approx(10.0))
+
+
+def test_the_first_strong_bin_can_be_taken_instead_of_the_strongest():
+    scan = _scan(np.full(RAYS, 8.0))
+    scan.strengths[:, 40] = 60
+    assert _laser(scan).ranges.max() == pytest.approx(8.05)
+    assert _laser(scan, laser_pick="FIRST", laser_first_above=50.0).ranges.max() == pytest.approx(4.05)
+    assert _laser(scan, laser_pick="FIRST", laser_first_above=70.0).ranges.max() == pytest.approx(8.05)
+
+
+def test_the_duration_is_that_of_the_turn():
+    assert _laser(_scan(np.full(RAYS, 5.0))).duration == pytest.approx(RAYS - 1)
+
+
+def test_a_fixed_number_of_rays_can_be_asked_for():
+    assert _laser(_scan(np.full(RAYS, 5.0)), laser_scan_rays=360).ranges.size == 360
+
+
+def test_gaps_do_not_change_the_number_of_rays():
+    assert usual_rays(np.delete(np.arange(RAYS) * STEP, [3, 4, 70])) == RAYS
+    assert usual_rays(np.full(5, 1.0)) == usual_rays(np.zeros(1)) == 1
+
+
+def test_the_cloud_of_a_turn_has_a_row_per_beam_placed_by_its_pose():
+    cloud = _scan([5.0, 5.0], poses=[_pose(x=1.0), _pose(y=2.0, z=-3.0)]).cloud(SonarToCloudParameters(min_range=0.2))
+    rows = cloud.points.reshape(2, BINS, 4)
+    assert (cloud.height, cloud.frame_id, cloud.stamp_ns, cloud.is_organized) == (2, "odom", 2 * SECOND, True)
+    np.testing.assert_allclose(rows[0, 2], [1.25, 0.0, 0.0, 3.0], atol=1e-6)
+    heading = [0.25 * math.cos(STEP), 2.0 + 0.25 * math.sin(STEP), -3.0, 3.0]
+    np.testing.assert_allclose(rows[1, 2], heading, atol=1e-6)
+    assert np.isnan(rows[:, :2]).all()
+    assert cloud.time_stamps.reshape(2, BINS)[:, 0].tolist() == [-1.0, -2.0]
+
+
+def test_the_height_limit_removes_bins_of_a_turn():
+    cloud = _scan([5.0, 5.0], poses=[_pose(z=1.0), _pose(z=-1.0)]).cloud(SonarToCloudParameters(height_limit=0.0))
+    assert np.isnan(cloud.points.reshape(2, BINS, 4)[0]).all()
+    assert np.isfinite(cloud.points.reshape(2, BINS, 4)[1, 10:]).all()

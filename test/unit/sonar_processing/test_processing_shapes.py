@@ -1,0 +1,163 @@
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from node_support.parameters import ParameterError
+from sonar_processing.beam_echoes import beam_echoes
+from sonar_processing.circle_fit import CircleSight, range_differences
+from sonar_processing.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.lines import LineDetector, LineDetectorParameters
+from sonar_processing.ransac import iterations_wanted
+
+
+def _cloud(xy, stamps=None, strengths=100.0):
+    """Return a cloud at z = -2 m, a beam per point unless `stamps` say otherwise."""
+    points = np.empty((len(xy), 4), dtype=np.float32)
+    points[:, :2], points[:, 2], points[:, 3] = np.asarray(xy).reshape(-1, 2), -2.0, strengths
+    stamps = np.arange(1.0, len(xy) + 1.0) if stamps is None else np.asarray(stamps, dtype=float)
+    return IntensityCloud(points, stamps, 10**9, "odom")
+
+
+def _wall(x, y, bearing, length, count=40, noise=0.0, seed=0):
+    along = np.linspace(-length / 2.0, length / 2.0, count)
+    off = np.random.default_rng(seed).normal(0.0, noise, count)
+    direction = np.array([math.cos(bearing), math.sin(bearing)])
+    return np.array([x, y]) + np.outer(along, direction) + np.outer(off, [-direction[1], direction[0]])
+
+
+def _lines(cloud, **values):
+    return LineDetector(LineDetectorParameters(**values))(cloud)
+
+
+def _circles(cloud, **values):
+    return CircleDetector(CircleDetectorParameters(**values))(cloud, lambda times: np.zeros((len(times), 2)))
+
+
+def _seen_circle(center, radius, step=0.0175, width=0.0436):
+    """Return one point for each beam from the origin that meets a circle, on the beam's axis at its mean range."""
+    center = np.asarray(center)
+    axis, reach = math.atan2(center[1], center[0]), math.asin(radius / np.linalg.norm(center)) + width / 2.0 - 0.002
+    bearings = axis + np.arange(-reach + step / 3.0, reach, step)
+    units = np.column_stack([np.cos(bearings), np.sin(bearings)])
+    sight = CircleSight(units, np.zeros_like(units), np.ones(len(units)), width)
+    return units * (1.0 - range_differences(sight, center, radius))[:, np.newaxis]
+
+
+def test_bins_of_one_beam_make_one_echo_at_their_middle():
+    cloud = _cloud([[9.9, 0.0], [10.0, 0.0], [10.1, 0.0], [20.0, 0.0], [0.0, 5.0]], stamps=[-1, -1, -1, -1, -2])
+    echoes = beam_echoes(cloud, gap=0.5)
+    np.testing.assert_allclose(echoes.points, [[10.0, 0.0], [20.0, 0.0], [0.0, 5.0]], atol=1e-5)
+    assert echoes.weights.tolist() == [3, 1, 1]
+    assert echoes.owner.tolist() == [0, 0, 0, 1, 2]
+    assert echoes.time_stamps.tolist() == [1, 1, 2]
+
+
+def test_strong_bins_weigh_more_in_an_echo():
+    cloud = _cloud([[10.0, 0.0], [10.1, 0.0]], stamps=[1, 1], strengths=[30.0, 90.0])
+    assert beam_echoes(cloud, gap=0.5).points[0, 0] == pytest.approx(10.075, abs=1e-4)
+
+
+def test_the_search_may_end_sooner_when_more_samples_are_good():
+    assert iterations_wanted(1.0, 0.99) == 1.0
+    assert iterations_wanted(0.25, 0.99) == pytest.approx(math.log(0.01) / math.log(0.75))
+    assert iterations_wanted(0.0, 0.99) == iterations_wanted(0.5, 1.0) == math.inf
+
+
+def test_every_wall_of_a_basin_is_found_with_its_ends():
+    sides = [_wall(0, 12, 0.0, 50, 80), _wall(0, -12, 0.0, 50, 70), _wall(25, 0, math.pi / 2, 22, 40)]
+    lines = _lines(_cloud(np.concatenate(sides)))
+    assert [line.orientation for line in lines] == pytest.approx([math.pi / 2, -math.pi / 2, 0.0], abs=1e-6)
+    assert [line.offset for line in lines] == pytest.approx([12.0, 12.0, 25.0])
+    assert [line.length for line in lines] == pytest.approx([50.0, 50.0, 22.0])
+    assert [line.echoes for line in lines] == [80, 70, 40]
+
+
+@given(st.floats(-math.pi, math.pi), st.floats(5.0, 50.0), st.integers(0, 2**31 - 1), st.integers(0, 40))
+def test_a_noisy_wall_among_stray_echoes_is_found(bearing, distance, seed, strays):
+    rng = np.random.default_rng(seed)
+    foot = distance * np.array([math.cos(bearing), math.sin(bearing)])
+    wall = _wall(*foot, bearing + math.pi / 2.0, 30.0, 60, 0.1, seed)
+    lines = _lines(_cloud(np.concatenate([wall, rng.uniform(-60.0, 60.0, (strays, 2))])), n_walls=1)
+    assert abs(math.remainder(lines[0].orientation - bearing, 2.0 * math.pi)) < math.radians(1.0)
+    assert lines[0].offset == pytest.approx(distance, abs=0.15)
+
+
+def test_same_seed_and_scan_give_the_same_walls():
+    cloud = _cloud(np.random.default_rng(0).uniform(-10, 10, (300, 2)))
+    first, second = _lines(cloud, seed=7), _lines(cloud, seed=7)
+    assert [line.members.tolist() for line in first] == [line.members.tolist() for line in second]
+
+
+def test_inliers_are_the_points_of_the_cloud_and_belong_to_one_wall_only():
+    cloud = _cloud(np.concatenate([_wall(0, 12, 0.0, 40), _wall(20, 0, math.pi / 2, 40)]))
+    members = np.concatenate([line.members for line in _lines(cloud)])
+    assert len(np.unique(members)) == len(members) == 80
+
+
+def test_two_things_far_apart_are_no_wall():
+    clumps = np.concatenate([np.random.default_rng(seed).normal([20.0 * seed, 3.0], 0.2, (10, 2)) for seed in (0, 1)])
+    assert _lines(_cloud(clumps)) == []
+
+
+def test_noise_of_single_bins_beside_a_wall_is_no_second_wall():
+    wall = np.repeat(_wall(0, 12, 0.0, 40, 40), 10, axis=0)
+    wall[:, 1] += np.tile(np.arange(10) * 0.1, 40)
+    noise = _wall(0, 10, 0.0, 40, 12)
+    stamps = np.concatenate([np.repeat(np.arange(40), 10), 100 + np.arange(12)])
+    assert len(_lines(_cloud(np.concatenate([wall, noise]), stamps))) == 1
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5])
+def test_clouds_of_few_points_have_neither_walls_nor_circles(count):
+    cloud = _cloud(np.arange(2.0 * count).reshape(count, 2) * 5.0)
+    assert _lines(cloud) == []
+    assert _circles(cloud) == []
+
+
+def test_points_in_one_place_are_no_shape():
+    cloud = _cloud(np.ones((50, 2)))
+    assert _lines(cloud) == []
+    assert _circles(cloud) == []
+
+
+def test_when_the_points_left_are_one_wall_the_search_ends():
+    lines = _lines(_cloud(_wall(0, 12, 0.0, 40)), n_walls=10)
+    assert len(lines) == 1
+
+
+def test_points_that_are_not_finite_are_left_out():
+    cloud = _cloud(_wall(0, 12, 0.0, 40))
+    cloud.points[::5, 1] = np.nan
+    (line,) = _lines(cloud)
+    assert line.echoes == 32
+    assert not set(line.members) & set(range(0, 40, 5))
+
+
+@pytest.mark.parametrize("center", [(10.0, 0.0), (-6.0, 8.0), (0.0, -15.0)])
+def test_a_buoy_is_found_behind_its_near_side(center):
+    (circle,) = _circles(_cloud(_seen_circle(center, 0.5)), min_radius=0.45, max_radius=0.55)
+    np.testing.assert_allclose(circle.center, center, atol=0.1)
+
+
+def test_a_wall_is_no_row_of_circles():
+    assert _circles(_cloud(_wall(0, 8, 0.0, 20, 40, 0.05))) == []
+
+
+def test_circles_stand_beside_walls():
+    cloud = _cloud(np.concatenate([_wall(0, 8, 0.0, 20, 40, 0.05), _seen_circle((4.0, -4.0), 0.4)]))
+    (circle,) = _circles(cloud)
+    np.testing.assert_allclose(circle.center, (4.0, -4.0), atol=0.15)
+
+
+def test_what_was_seen_from_an_unknown_place_is_no_circle():
+    detector = CircleDetector(CircleDetectorParameters())
+    assert detector(_cloud(_seen_circle((4.0, -4.0), 0.4)), lambda times: np.full((len(times), 2), np.nan)) == []
+
+
+def test_radii_in_the_wrong_order_are_refused():
+    with pytest.raises(ParameterError, match="min_radius"):
+        CircleDetectorParameters(min_radius=0.7)
