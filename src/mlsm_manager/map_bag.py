@@ -3,15 +3,16 @@
 import sys
 import time
 from argparse import Namespace
-from typing import Any, Dict, List
+from typing import Any, Dict, List, Optional
 
 from tqdm import tqdm
 
 from mlsm_manager.bag_recording import BagNames, read_recording
 from mlsm_manager.map_bag_arguments import map_bag_arguments
 from mlsm_manager.mapping.recording import Recording, RecordingError
+from mlsm_manager.mapping.refinement import Refined, refine
 from mlsm_manager.mapping.replay import Replayed, replay
-from mlsm_manager.run_files import CORRECTED, ODOMETRY, Run, errors_of, write_run, write_summary
+from mlsm_manager.run_files import CORRECTED, ODOMETRY, REFINED, Run, errors_of, write_run, write_summary
 from node_support.parameters import ParameterError
 
 
@@ -35,7 +36,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
     recording = read_recording(options.bag, names)
     replayed = _replayed(recording, options)
-    run = _run(replayed)
+    run = _run(replayed, _refined(recording, replayed) if options.refine else None)
     write_run(options.out, options.bag.name, run, recording)
     seconds = time.monotonic() - start
     summary = {
@@ -54,15 +55,19 @@ def _replayed(recording: Recording, options: Namespace) -> Replayed:
         return replay(recording, options.parameters, bar.update)
 
 
-def _run(replayed: Replayed) -> Run:
+def _refined(recording: Recording, replayed: Replayed) -> Refined:
+    with tqdm(total=len(replayed.updates), unit="scan", desc="refine", disable=None) as bar:
+        return refine(recording, replayed, bar.update)
+
+
+def _run(replayed: Replayed, refined: Optional[Refined]) -> Run:
+    poses = {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
     blocks = replayed.mapper.shown.blocks
-    counts = {
-        "scans": len(replayed.updates),
-        "matched": replayed.matched,
-        "rejected": replayed.rejected,
-        "blocks": len(blocks),
-    }
-    return Run(replayed.times, {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}, blocks, counts)
+    counts = {"scans": len(replayed.updates), "matched": replayed.matched, "rejected": replayed.rejected}
+    if refined is not None:
+        poses[REFINED], blocks = refined.poses, refined.blocks
+        counts["edges"] = refined.edges
+    return Run(replayed.times, poses, blocks, {**counts, "blocks": len(blocks)})
 
 
 def _told(summary: Dict[str, Any], options: Namespace) -> List[str]:
@@ -70,7 +75,7 @@ def _told(summary: Dict[str, Any], options: Namespace) -> List[str]:
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
         f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time"
     ]
-    for name in (ODOMETRY, CORRECTED, "refined"):
+    for name in (ODOMETRY, CORRECTED, REFINED):
         if name in summary:
             error = summary[name]
             lines.append(f"{name}: mean {error['mean']} m, sd {error['sd']} m, max {error['max']} m")
