@@ -12,6 +12,7 @@ from node_support.parameters import ParameterSet, parameter
 
 _NEIGHBOURS = 10
 _REACH = 4.0
+_REACH_OF_RANGE = 0.2
 _FEWEST = 5
 _FLATNESS = 0.3
 _PASSES = 2
@@ -83,18 +84,23 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
 
 def _incidence(points: np.ndarray, places: np.ndarray) -> np.ndarray:
     """Return (n,) rad: from the line of sight to the outward normal of the surface at each point; 0 where unknown."""
-    normals, known = surface_normals(points)
     sight = points - places[:, :2]
+    # Beams fan out: at a far wall met aslant, the next echo lies many metres on.
+    reach = np.maximum(_REACH, _REACH_OF_RANGE * np.hypot(*sight.T))
+    normals, known = surface_normals(points, reach)
     outward = normals * np.where(np.einsum("na,na->n", normals, sight) < 0.0, -1.0, 1.0)[:, np.newaxis]
     cross = sight[:, 0] * outward[:, 1] - sight[:, 1] * outward[:, 0]
     return np.where(known, np.arctan2(cross, np.einsum("na,na->n", sight, outward)), 0.0)
 
 
-def surface_normals(points: np.ndarray, reach: float = _REACH) -> Tuple[np.ndarray, np.ndarray]:
-    """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and (n,) where they do lie on one."""
-    distance, index = cKDTree(points).query(points, k=min(_NEIGHBOURS, len(points)), distance_upper_bound=reach)
+def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and (n,) where they do lie on one.
+
+    reach: (n,) m, how far from each point its neighbours may lie.
+    """
+    distance, index = cKDTree(points).query(points, k=min(_NEIGHBOURS, len(points)))
     distance, index = distance.reshape(len(points), -1), index.reshape(len(points), -1)
-    near = np.isfinite(distance)
+    near = distance <= reach[:, np.newaxis]
     count = near.sum(axis=1)
     group = points[np.where(near, index, 0)]
     mean = (group * near[..., np.newaxis]).sum(axis=1) / count[:, np.newaxis]
