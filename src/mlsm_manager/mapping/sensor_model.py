@@ -68,7 +68,7 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
     """Return the scan with each point turned about the vehicle, by up to `half_width`, towards its surface's normal.
 
     A wide beam that meets a surface aslant hears first what its nearer edge meets, and the point was placed on its
-    axis: too near by range * tan(incidence) * half_width. Points whose surface is not known stay.
+    axis: too near by range * tan(incidence) * half_width. Points whose surface is not known are left out.
     """
     if half_width == 0.0 or len(scan) < _FEWEST:
         return scan
@@ -76,21 +76,24 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
     seen = transformed(inverse(places), scan.points)
     turned = scan.points
     for _ in range(_PASSES):
-        incidence = _incidence(turned[:, :2], places)
+        incidence, known = _incidence(turned[:, :2], places)
         arms = rotated(seen[:, :2], np.clip(incidence, -half_width, half_width))
         turned = transformed(places, np.column_stack([arms, seen[:, 2:]]))
-    return replace(scan, points=turned)
+    return replace(scan, points=turned[known], times=scan.times[known], moving=scan.moving[known])
 
 
-def _incidence(points: np.ndarray, places: np.ndarray) -> np.ndarray:
-    """Return (n,) rad: from the line of sight to the outward normal of the surface at each point; 0 where unknown."""
+def _incidence(points: np.ndarray, places: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return (n,) rad from the line of sight to the outward normal of the surface at each point, and where it is known.
+
+    It is 0 where it is not.
+    """
     sight = points - places[:, :2]
     # Beams fan out: at a far wall met aslant, the next echo lies many metres on.
     reach = np.maximum(_REACH, _REACH_OF_RANGE * np.hypot(*sight.T))
     normals, known = surface_normals(points, reach)
     outward = normals * np.where(np.einsum("na,na->n", normals, sight) < 0.0, -1.0, 1.0)[:, np.newaxis]
     cross = sight[:, 0] * outward[:, 1] - sight[:, 1] * outward[:, 0]
-    return np.where(known, np.arctan2(cross, np.einsum("na,na->n", sight, outward)), 0.0)
+    return np.where(known, np.arctan2(cross, np.einsum("na,na->n", sight, outward)), 0.0), known
 
 
 def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
