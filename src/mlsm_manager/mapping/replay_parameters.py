@@ -5,6 +5,7 @@ from typing import Type, TypeVar
 
 from mlsm_manager.mapping.mapper import Mapper, MapSettings
 from mlsm_manager.mapping.sensor_model import SensorModel
+from mlsm_manager.matching.matcher import Matcher
 from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters, SegmentsMatcherParameters
 from mlsm_manager.matching.matchers import MATCHERS, MatcherName
 from mlsm_manager.matching.prediction import OdometryErrors
@@ -36,16 +37,16 @@ class ReplayParameters(
         ExtractionMode.LEADING_EDGE, "the peak of an echo, where it begins, or points all along it"
     )
     sonar_delay: float = parameter(
-        0.85, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0
+        0.0, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0
     )
     range_scale: float = parameter(
         1.0, "true range over the range that the sonar reports, as of another speed of sound", low=0.5, high=2.0
     )
     edge_half_width: float = parameter(
-        0.073, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
+        0.0, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
         unit="rad", low=0.0, high=0.3,
     )  # fmt: skip
-    scale_deviation: float = parameter(0.02, "relative error of the distances the odometry reports", low=0.0, high=2.0)
+    scale_deviation: float = parameter(0.01, "relative error of the distances the odometry reports", low=0.0, high=2.0)
     direction_deviation: float = parameter(
         0.1, "error of their direction, a sensor's mounting angle", unit="rad", low=0.0, high=1.0
     )
@@ -79,10 +80,15 @@ class ReplayParameters(
         """Return how echoes lie against surfaces."""
         return self.part(SensorModel)
 
+    def build_matcher(self) -> Matcher:
+        """Return the matcher; it knows that echoes come from as wide a beam as the sensor model says."""
+        kind = MATCHERS[self.matcher]
+        wide = self.changed({"beam_width": max(self.beam_width, 2.0 * self.edge_half_width)})
+        return kind.build(wide.part(kind.parameters))
+
     def build_mapper(self) -> Mapper:
         """Return an empty mapper that matches from the start."""
-        kind = MATCHERS[self.matcher]
         settings = MapSettings(self.resolution, self.match_resolution, _LIMIT, 0, self.min_points)
-        mapper = Mapper(settings, self.part(OdometryErrors), kind.build(self.part(kind.parameters)))
+        mapper = Mapper(settings, self.part(OdometryErrors), self.build_matcher())
         mapper.matching = True
         return mapper

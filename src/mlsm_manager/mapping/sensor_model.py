@@ -16,6 +16,7 @@ _REACH_OF_RANGE = 0.2
 _FEWEST = 5
 _FLATNESS = 0.3
 _PASSES = 2
+_MOST_SHIFT = 1.0
 
 
 @dataclass(frozen=True)
@@ -36,9 +37,9 @@ class SensorModel(ParameterSet):
     )  # fmt: skip
 
     def applied(self, scan: Scan) -> Scan:
-        """Return the scan with stamps and points put right; see `restamped`, `rescaled` and `at_beam_edge`."""
+        """Return the scan with stamps and points put right; see `restamped`, `rescaled` and `trusted`."""
         timed = rescaled(restamped(scan, self.sonar_delay), self.range_scale)
-        return at_beam_edge(timed, self.edge_half_width)
+        return trusted(timed, self.edge_half_width)
 
 
 def restamped(scan: Scan, delay: float) -> Scan:
@@ -68,10 +69,29 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
     """Return the scan with each point turned about the vehicle, by up to `half_width`, towards its surface's normal.
 
     A wide beam that meets a surface aslant hears first what its nearer edge meets, and the point was placed on its
-    axis: too near by range * tan(incidence) * half_width. Points whose surface is not known are left out.
+    axis: too near by range * tan(incidence) * half_width. Points whose surface is not known stay.
     """
+    return _turned(scan, half_width)[0]
+
+
+def trusted(scan: Scan, half_width: float) -> Scan:
+    """Return what `at_beam_edge` does, without the points whose place stays doubtful.
+
+    A beam does not tell where within it a lone echo lies; and what would shift a point by more than a metre off its
+    surface hangs too much on a half width that is never quite the same for strong and for weak echoes.
+    """
+    turned, incidence, known = _turned(scan, half_width)
+    places = scan.track.at(scan.times)
+    shift = half_width * np.hypot(*(scan.points[:, :2] - places[:, :2]).T) * np.abs(np.sin(incidence))
+    keep = (shift < _MOST_SHIFT) & (known | (half_width == 0.0))
+    return replace(turned, points=turned.points[keep], times=scan.times[keep], moving=scan.moving[keep])
+
+
+def _turned(scan: Scan, half_width: float) -> Tuple[Scan, np.ndarray, np.ndarray]:
+    """Return the turned scan, the incidence (n,) rad, and (n,) where it is known."""
+    incidence, known = np.zeros(len(scan)), np.zeros(len(scan), dtype=bool)
     if half_width == 0.0 or len(scan) < _FEWEST:
-        return scan
+        return scan, incidence, known
     places = scan.track.at(scan.times)
     seen = transformed(inverse(places), scan.points)
     turned = scan.points
@@ -79,7 +99,7 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
         incidence, known = _incidence(turned[:, :2], places)
         arms = rotated(seen[:, :2], np.clip(incidence, -half_width, half_width))
         turned = transformed(places, np.column_stack([arms, seen[:, 2:]]))
-    return replace(scan, points=turned[known], times=scan.times[known], moving=scan.moving[known])
+    return replace(scan, points=turned), incidence, known
 
 
 def _incidence(points: np.ndarray, places: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

@@ -1,6 +1,7 @@
 """Refines a state so that the points lie where the local distributions expect them (thesis 6.3, all at once)."""
 
 from dataclasses import dataclass
+from typing import Union
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -62,6 +63,18 @@ class _Normal:
     distances: np.ndarray
 
 
+@dataclass(frozen=True)
+class _Residuals:
+    """Places (n, 2), distances (n,), residuals (n, 2) and their metric (n, 2, 2), squared (n,), importance (n,)."""
+
+    world: np.ndarray
+    distances: np.ndarray
+    residual: np.ndarray
+    metric: np.ndarray
+    squared: np.ndarray
+    importance: np.ndarray
+
+
 class Refiner:
     """Minimises the points' robust squared Mahalanobis distances plus the prior's.
 
@@ -100,28 +113,31 @@ class Refiner:
 
     def matched(self, theta: np.ndarray) -> np.ndarray:
         """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
-        return self._on_surface(self._normal(theta, SCALES[-1]))
+        return self._on_surface(self._residuals(self._motion.path(theta), SCALES[-1]))
 
     def _step(self, theta: np.ndarray, normal: _Normal, information: np.ndarray, inflation: float) -> np.ndarray:
         objection = self._prior.information @ (theta - self._prior.mean)
         return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
 
-    def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
-        path = self._motion.path(theta)
+    def _residuals(self, path: np.ndarray, scale: float) -> _Residuals:
         world = self._motion.points(path)
         distances, nearest = self._target.nearest(world)
         residual = world - self._target.mean[nearest]
         metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(path))
-        weighted = np.einsum("nab,nb->na", metric, residual)
-        squared = np.einsum("na,na->n", residual, weighted)
+        squared = np.einsum("na,nab,nb->n", residual, metric, residual)
         importance = self._point_weights * self._target.weight[nearest] * self._map_share(nearest)
         importance = importance * (distances < _GATE * scale)
-        weights = importance * geman_mcclure(squared, scale)
+        return _Residuals(world, distances, residual, metric, squared, importance)
+
+    def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
+        path = self._motion.path(theta)
+        found = self._residuals(path, scale)
+        weights = found.importance * geman_mcclure(found.squared, scale)
         jacobian = self._motion.point_jacobian(path, theta)
-        lever = (metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
+        lever = (found.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
         information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
-        gradient = np.einsum("nas,na->ns", lever, residual)
-        return _Normal(information, gradient, world, squared, importance, distances)
+        gradient = np.einsum("nas,na->ns", lever, found.residual)
+        return _Normal(information, gradient, found.world, found.squared, found.importance, found.distances)
 
     def _map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return (n,) the share of the points' information that is left after the map's own noise.
@@ -142,8 +158,8 @@ class Refiner:
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
         return float(np.clip(np.trace(whitening @ (sums.T @ sums)) / independent, 1.0, _GREATEST_INFLATION))
 
-    def _on_surface(self, normal: _Normal) -> np.ndarray:
-        return (normal.squared < INLIER**2) & (normal.importance > 0.0)
+    def _on_surface(self, found: Union[_Normal, _Residuals]) -> np.ndarray:
+        return (found.squared < INLIER**2) & (found.importance > 0.0)
 
     def _fit(self, theta: np.ndarray, iterations: int, converged: bool) -> Fit:
         normal = self._normal(theta, SCALES[-1])
