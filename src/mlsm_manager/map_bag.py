@@ -9,9 +9,12 @@ from tqdm import tqdm
 
 from mlsm_manager.bag_recording import BagNames, read_recording
 from mlsm_manager.map_bag_arguments import map_bag_arguments
-from mlsm_manager.mapping.recording import Recording, RecordingError
+from mlsm_manager.mapping.calibration import calibrated
+from mlsm_manager.mapping.recording import Recording, RecordingError, scans_of
 from mlsm_manager.mapping.refinement import Refined, refine
 from mlsm_manager.mapping.replay import Replayed, replay
+from mlsm_manager.mapping.replay_parameters import ReplayParameters
+from mlsm_manager.matching.scan import Scan
 from mlsm_manager.run_files import CORRECTED, ODOMETRY, REFINED, Run, errors_of, write_run, write_summary
 from node_support.parameters import ParameterError
 
@@ -35,8 +38,11 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     start = time.monotonic()
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
     recording = read_recording(options.bag, names)
-    replayed = _replayed(recording, options)
+    scans = _scans(recording, options)
+    parameters = _calibrated(scans, options)
+    replayed = _replayed(recording, scans, parameters)
     run = _run(replayed, _refined(recording, replayed) if options.refine else None)
+    errors = errors_of(run, recording)
     write_run(options.out, options.bag.name, run, recording)
     seconds = time.monotonic() - start
     summary = {
@@ -44,19 +50,42 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
-        **errors_of(run, recording),
+        "calibration": {name: round(value, 4) for name, value in parameters.sensor_model().to_mapping().items()},
+        **errors,
     }
     write_summary(options.out, summary)
     return summary
 
 
-def _replayed(recording: Recording, options: Namespace) -> Replayed:
-    with tqdm(total=len(recording.beams), unit="beam", desc=options.bag.name, disable=None) as bar:
-        return replay(recording, options.parameters, bar.update)
+def _scans(recording: Recording, options: Namespace) -> List[Scan]:
+    with _bar(len(recording.beams), "beam", "echoes") as bar:
+        scans = []
+        for scan, beams in scans_of(recording, options.parameters.echoes()):
+            scans.append(scan)
+            bar.update(beams)
+    if not scans:
+        raise RecordingError(f"{options.bag}: {len(recording.beams)} beams make no whole turn of the head")
+    return scans
+
+
+def _calibrated(scans: List[Scan], options: Namespace) -> ReplayParameters:
+    if not options.calibrate:
+        return options.parameters
+    with _bar(None, "", "calibrate"):
+        return calibrated(scans, options.parameters, options.held)
+
+
+def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParameters) -> Replayed:
+    with _bar(len(scans), "scan", "match") as bar:
+        return replay(recording, scans, parameters, bar.update)
+
+
+def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
+    return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
 
 
 def _refined(recording: Recording, replayed: Replayed) -> Refined:
-    with tqdm(total=len(replayed.updates), unit="scan", desc="refine", disable=None) as bar:
+    with _bar(len(replayed.updates), "scan", "refine") as bar:
         return refine(recording, replayed, bar.update)
 
 

@@ -7,10 +7,11 @@ the recording, so that a recording that does not tell changes nothing.
 """
 
 from dataclasses import dataclass
-from typing import Iterator, List, Tuple
+from typing import Collection, Iterator, List, Tuple
 
 import numpy as np
 
+from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from mlsm_manager.mapping.sensor_model import SensorModel
 from mlsm_manager.mapping.straightness import half_width_of
 from mlsm_manager.matching.matcher import Matcher
@@ -28,6 +29,16 @@ _MOST_PAIRS = 40
 _FEWEST_PAIRS = 8
 _LAG = 6
 _OUTLIER = 3.0
+
+
+def calibrated(scans: List[Scan], parameters: ReplayParameters, held: Collection[str]) -> ReplayParameters:
+    """Return `parameters` with those of the sensor model that are not `held` estimated from raw `scans`."""
+    model = parameters.sensor_model()
+    if "edge_half_width" not in held:
+        model = model.changed({"edge_half_width": half_width_of(scans)})
+    matcher = parameters.changed(model.to_mapping()).build_matcher()
+    calibrator = Calibrator(matcher, parameters.part(OdometryErrors), parameters.match_resolution)
+    return parameters.changed(calibrator.calibrated(scans, model, held).to_mapping())
 
 
 @dataclass(frozen=True)
@@ -53,11 +64,8 @@ class Calibrator:
     errors: OdometryErrors
     resolution: float
 
-    def calibrated(self, scans: List[Scan], known: SensorModel, held: Tuple[str, ...]) -> SensorModel:
-        """Return `known` with all that is not `held` (names of its fields) estimated from raw `scans`."""
-        model = known
-        if "edge_half_width" not in held:
-            model = model.changed({"edge_half_width": half_width_of(scans)})
+    def calibrated(self, scans: List[Scan], model: SensorModel, held: Collection[str]) -> SensorModel:
+        """Return `model` with delay and scale, where they are not `held`, estimated from raw `scans`."""
         if "sonar_delay" not in held:
             found = self.delay([model.applied(scan) for scan in scans])
             model = model.changed({"sonar_delay": model.sonar_delay + found.shrunk(_DELAY_DEVIATION)})
@@ -140,4 +148,3 @@ def _regressed(causes: np.ndarray, effects: np.ndarray, together: float) -> Esti
         keep = np.abs(left) < _OUTLIER * spread
     variance = together * spread**2 * np.linalg.inv(information)[0, 0]
     return Estimate(float(coefficients[0]), float(np.sqrt(variance)), int(keep.sum()))
-

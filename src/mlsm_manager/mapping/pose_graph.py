@@ -91,14 +91,17 @@ def _edges(state: np.ndarray, edges: RelativePoses) -> Tuple[np.ndarray, sparse.
     relative = composed(inverse(first), second)
     turned = rotated(edges.measured[:, :2], np.where(edges.by_odometry, direction, 0.0))
     stretch = np.where(edges.by_odometry, 1.0 + scale, 1.0)[:, np.newaxis]
-    residual = np.column_stack(
-        [relative[:, :2] - stretch * turned, wrapped(relative[:, 2] - edges.measured[:, 2])]
-    )
+    residual = np.column_stack([relative[:, :2] - stretch * turned, wrapped(relative[:, 2] - edges.measured[:, 2])])
     return residual, _jacobian(state.size, edges, relative, first[:, 2], turned, stretch)
 
 
 def _jacobian(
-    states: int, edges: RelativePoses, relative: np.ndarray, heading: np.ndarray, turned: np.ndarray, stretch: np.ndarray
+    states: int,
+    edges: RelativePoses,
+    relative: np.ndarray,
+    heading: np.ndarray,
+    turned: np.ndarray,
+    stretch: np.ndarray,
 ) -> sparse.csr_matrix:
     count = len(edges)
     blocks = np.zeros((count, 3, 8))

@@ -6,6 +6,7 @@ from typing import Iterator, List, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.matching.scan import Scan, Track
+from node_support.refused_input import RefusedInput
 from sonar_processing.echo_extraction import EchoExtractorParameters
 from sonar_processing.echo_extractor import EchoExtractor
 from sonar_processing.placed_beam import PlacedBeam
@@ -14,6 +15,7 @@ from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.turn_collector import TurnCollector
 
 _BEFORE = 60.0
+_AFTER = 10.0
 
 
 class RecordingError(ValueError):
@@ -46,16 +48,22 @@ class Recording:
         return float(self.track.times[-1] - self.track.times[0])
 
 
-def scans_of(recording: Recording, echoes: EchoExtractorParameters, delay: float) -> Iterator[Tuple[Scan, int]]:
-    """Yield one scan of echoes per turn of the head, with its number of beams; `delay` is what will be added to their stamps."""
+def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[Tuple[Scan, int]]:
+    """Yield one scan of echoes per turn of the head, with its number of beams.
+
+    Its track begins a minute before its end and reaches 10 s beyond, for stamps that are to be moved.
+    """
     collector, extractor, cloud = TurnCollector(), EchoExtractor(echoes), SonarToCloudParameters()
     for placed in recording.beams:
         turn = collector.add(placed)
         if turn is None:
             continue
-        found = extractor(PolarScan.of(turn).cloud(cloud))
-        end = min(found.stamp_ns * 1e-9, float(recording.track.times[-1]) - max(delay, 0.0))
-        track = track_between(recording.track, end - _BEFORE, end + max(delay, 0.0))
+        try:
+            found = extractor(PolarScan.of(turn).cloud(cloud))
+        except RefusedInput:
+            continue
+        end = found.stamp_ns * 1e-9
+        track = track_between(recording.track, end - _BEFORE, end + _AFTER)
         yield Scan.from_stamps(found.points, found.time_stamps, end, track), len(turn)
 
 

@@ -1,15 +1,16 @@
 """Runs the mapper over a recording as the live graph would have run it."""
 
 from dataclasses import dataclass, field
-from typing import Callable, List
+from typing import Callable, List, Sequence
 
 import numpy as np
 
 from mlsm_manager.mapping.live_correction import LiveCorrection
 from mlsm_manager.mapping.mapper import Mapper, ScanUpdate
-from mlsm_manager.mapping.recording import Recording, scans_of
+from mlsm_manager.mapping.recording import Recording
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from mlsm_manager.matching.planar import composed
+from mlsm_manager.matching.scan import Scan
 
 
 @dataclass(frozen=True)
@@ -37,17 +38,19 @@ class Replayed:
         return sum(not update.accepted for update in self.updates)
 
 
-def replay(recording: Recording, parameters: ReplayParameters, on_beams: Callable[[int], None]) -> Replayed:
-    """Match every scan of a recording; `on_beams` is told how many beams were used.
+def replay(
+    recording: Recording, scans: Sequence[Scan], parameters: ReplayParameters, on_scans: Callable[[int], None]
+) -> Replayed:
+    """Match the raw `scans` of a recording one after the other; `on_scans` is told with 1 that one is done.
 
     A scan is used from the moment on at which its last beam and the odometry of that time were known.
     """
-    mapper = parameters.build_mapper()
+    mapper, sensor = parameters.build_mapper(), parameters.sensor_model()
     live = LiveCorrection(parameters.blend_time)
     track, corrections, updates = recording.track, np.empty((len(recording.track.times), 3)), []
     done = 0
-    for raw, beams in scans_of(recording, parameters.echoes(), parameters.sonar_delay):
-        scan = parameters.sensor_model().applied(raw)
+    for raw in scans:
+        scan = sensor.applied(raw)
         known = int(np.searchsorted(track.times, scan.reference_time, side="left"))
         done = _follow(live, recording, corrections, done, known)
         updates.append(mapper.take_echoes(scan))
@@ -55,7 +58,7 @@ def replay(recording: Recording, parameters: ReplayParameters, on_beams: Callabl
         while mapper.take_waiting() is not None:
             pass
         live.believe(updates[-1].belief)
-        on_beams(beams)
+        on_scans(1)
     _follow(live, recording, corrections, done, len(track.times))
     corrected = composed(corrections, track.poses)
     return Replayed(track.times, track.poses, corrected, mapper, updates)
