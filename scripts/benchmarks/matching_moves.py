@@ -3,9 +3,9 @@
 from typing import Dict, List, Tuple
 
 import numpy as np
+import yaml
 from scipy.stats import chi2
 
-import yaml
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind
 from benchmarks.table import Row
 from mlsm_manager.mapping.mapper import Mapper, MapSettings

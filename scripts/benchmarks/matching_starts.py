@@ -3,8 +3,8 @@
 from typing import List
 
 import numpy as np
-
 import yaml
+
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind, still
 from benchmarks.table import Row
 from mlsm_manager.blocks import Blocks

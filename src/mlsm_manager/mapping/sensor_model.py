@@ -16,7 +16,7 @@ _REACH_OF_RANGE = 0.2
 _FEWEST = 5
 _FLATNESS = 0.3
 _PASSES = 2
-_MOST_SHIFT = 1.0
+_MOST_SHIFT = 0.8
 
 
 @dataclass(frozen=True)
