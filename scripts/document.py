@@ -25,7 +25,7 @@ from sonar_simulator.default_yaml import GROUPS, simulator_yaml
 from sonar_simulator.simulation import SimulatorParameters
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENTS = [ROOT / name for name in ("README.md", "docs/shapes.md", "docs/sonar_control.md")]
+DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
 _BLOCK = re.compile(r"(<!-- parameters: ([\w/]+) -->\n).*?(<!-- end -->)", re.DOTALL)
 
 
@@ -58,8 +58,8 @@ def generated() -> Dict[Path, str]:
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, node.parameters) for name, node in LIVE_NODES.items()
     }
     texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
-    texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     texts.update({path: with_tables(path.read_text()) for path in DOCUMENTS})
+    texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     return texts
 
 

@@ -18,7 +18,7 @@ from sonar_simulator.vehicle import VehicleScript
 STARTS = 100
 _NEAR, _NEAR_YAW = 0.5, np.radians(3.0)
 _HELD = 1e-3
-_WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0))}
+_WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0)), "candidates": 12}
 
 
 def tour_map(maker: ScanMaker) -> Blocks:

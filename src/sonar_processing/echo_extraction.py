@@ -8,9 +8,10 @@ echoes are looked for.
 import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Tuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 
 from node_support.parameters import ParameterSet, parameter
 from node_support.refused_input import RefusedInput
@@ -19,6 +20,8 @@ from sonar_processing.otsu import HIGHEST_LEVEL, otsu_threshold
 
 FEWEST_BEAMS = 10
 _SMALLEST_SIGMA_BINS = 0.5
+_SPREAD = 0.1
+_SPREAD_SIGMAS = 4.0
 
 
 class ExtractionMode(Enum):
@@ -46,6 +49,10 @@ class EchoExtractorParameters(ParameterSet):
     ring_quantile: float = parameter(
         0.4, "share of directions weaker than the ring: 0.3 among walls, 0.5 in open water; 0 for sectors",
         low=0.0, high=0.9,
+    )  # fmt: skip
+    min_contrast: float = parameter(
+        8.0, "an echo stands out by at least this many times the spread of the ring; 15 in open water",
+        low=0.0, high=100.0,
     )  # fmt: skip
     min_height: float = parameter(
         10.0, "an echo stands out of the ring by at least this", unit="echo strength", low=0.0, high=255.0
@@ -85,8 +92,12 @@ def extract_echoes(
     """
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
     first_bin = max(math.ceil(parameters.min_range / range_resolution - 0.5), 0)
-    response = echo_response(strengths, sigma, parameters.ring_quantile, first_bin)
+    smooth = matched_filter(strengths, sigma, first_bin)
+    ring, spread = ring_of(smooth, parameters.ring_quantile, sigma)
+    response = np.maximum(smooth - ring, 0.0, out=smooth)
     peaks = find_peaks(response, apart=math.ceil(2.0 * sigma))
+    least = np.maximum(parameters.min_contrast * spread, parameters.min_height)
+    peaks = peaks.select(peaks.heights >= least[np.rint(peaks.bins).astype(np.int64)])
     threshold = max(height_threshold(peaks.heights), parameters.min_height)
     peaks = peaks.select(peaks.heights >= threshold)
     if parameters.mode is ExtractionMode.LEADING_EDGE:
@@ -96,24 +107,32 @@ def extract_echoes(
     return Echoes(peaks.beams, peaks.bins, peaks.heights, threshold)
 
 
-def echo_response(strengths: np.ndarray, sigma: float, ring_quantile: float, first_bin: int = 0) -> np.ndarray:
-    """Return (beams, bins) float32: how much each bin, smoothed, stands out of the ring; never negative.
+def matched_filter(strengths: np.ndarray, sigma: float, first_bin: int = 0) -> np.ndarray:
+    """Return (beams, bins) float32: strengths through a Gaussian of `sigma` bins along range.
 
-    strengths: (beams, bins); the matched filter is a Gaussian along range of `sigma` bins, beyond the first and the
-    last bin nothing is heard, and neither before `first_bin`. The ring is, for each range, the `ring_quantile` over
-    the directions; a quantile of 0 takes nothing off. Raises RefusedInput for fewer than `FEWEST_BEAMS` beams where
-    a ring is to be found.
+    Beyond the first and the last bin nothing is heard, and neither before `first_bin`.
     """
     heard = strengths.astype(np.float32)
     heard[:, :first_bin] = 0.0
-    smooth = gaussian_filter1d(heard, sigma, axis=1, mode="constant")
-    if ring_quantile == 0.0:
-        return smooth
-    if len(smooth) < FEWEST_BEAMS:
-        raise RefusedInput("scans of too few beams", f"{len(smooth)}, must be at least {FEWEST_BEAMS} to see a ring")
-    rank = int(ring_quantile * (len(smooth) - 1))
-    ring = np.partition(smooth, rank, axis=0)[rank]
-    return np.maximum(smooth - ring, 0.0, out=smooth)
+    return gaussian_filter1d(heard, sigma, axis=1, mode="constant")
+
+
+def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarray, np.ndarray]:
+    """Return strength and spread (bins,) of what is heard at each range in most directions.
+
+    The strength is the `quantile` over the directions, the spread the distance to the quantile `_SPREAD` higher,
+    averaged over some `sigma` bins: about a quarter of a standard deviation of normal speckle. A quantile of 0 means
+    that there is no ring. Raises RefusedInput for fewer than `FEWEST_BEAMS` beams where there is one.
+    """
+    beams, bins = smooth.shape
+    if quantile == 0.0:
+        return np.zeros(bins, np.float32), np.zeros(bins, np.float32)
+    if beams < FEWEST_BEAMS:
+        raise RefusedInput("scans of too few beams", f"{beams}, must be at least {FEWEST_BEAMS} to see a ring")
+    ranks = [int(share * (beams - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
+    ordered = np.partition(smooth, ranks, axis=0)
+    ring, upper = ordered[ranks[0]], ordered[ranks[1]]
+    return ring, uniform_filter1d(upper - ring, 2 * math.ceil(_SPREAD_SIGMAS * sigma) + 1)
 
 
 def height_threshold(heights: np.ndarray) -> float:

@@ -54,9 +54,14 @@ def _level_tops(image: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _summit(image: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
-    """Return where between -0.5 and 0.5 bins the parabola through a peak and its neighbours is highest."""
+    """Return where between -0.5 and 0.5 bins the parabola through a peak and its neighbours is highest.
+
+    Beyond the first and the last bin nothing is heard.
+    """
     end = image.shape[1] - 1
-    left, top, right = (image[beams, np.clip(bins + side, 0, end)] for side in (-1, 0, 1))
+    top = image[beams, bins]
+    left = np.where(bins > 0, image[beams, np.maximum(bins - 1, 0)], 0.0)
+    right = np.where(bins < end, image[beams, np.minimum(bins + 1, end)], 0.0)
     bend = left - 2.0 * top + right
     with np.errstate(divide="ignore", invalid="ignore"):
         offset = 0.5 * (left - right) / bend

@@ -18,6 +18,11 @@ def test_generated_files_are_up_to_date():
 
 
 @pytest.mark.parametrize("name", LIVE_NODES)
+def test_the_readme_has_the_parameters_of_every_node(name):
+    assert f"<!-- parameters: {name} -->" in (ROOT / "README.md").read_text()
+
+
+@pytest.mark.parametrize("name", LIVE_NODES)
 def test_the_default_yaml_makes_the_defaults(name):
     parameters = LIVE_NODES[name].parameters
     text = (ROOT / "yaml" / f"{name}_default.yaml").read_text()

@@ -46,6 +46,9 @@ class ReplayParameters(
         0.0, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
         unit="rad", low=0.0, high=0.3,
     )  # fmt: skip
+    range_scale_deviation: float = parameter(
+        0.02, "how far all ranges may be off in proportion, as by the speed of sound", low=0.0, high=0.5
+    )
     scale_deviation: float = parameter(0.01, "relative error of the distances the odometry reports", low=0.0, high=2.0)
     direction_deviation: float = parameter(
         0.1, "error of their direction, a sensor's mounting angle", unit="rad", low=0.0, high=1.0
@@ -63,6 +66,13 @@ class ReplayParameters(
         3.0, "a fix whose standard deviation in the worst direction is above this is ambiguous",
         unit="m", low=0.001, high=100.0,
     )  # fmt: skip
+    min_agreement: float = parameter(
+        0.0, "mean of the share of the scan that lies on the map and the share of the map in reach that is heard",
+        low=0.0, high=1.0,
+    )  # fmt: skip
+    min_gain_over_second: float = parameter(
+        0.0, "log-likelihood by which the best place must beat the second one; 0: not asked", low=0.0, high=100.0
+    )
     max_jump: float = parameter(
         6.0, "a pose farther than this from the expected one, in the prior's standard deviations, is rejected",
         low=1.0, high=100.0,

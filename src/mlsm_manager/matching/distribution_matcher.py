@@ -14,7 +14,7 @@ from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES, Plan
 from mlsm_manager.matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.scan import Scan
 from mlsm_manager.matching.score_field import ScoreField
-from mlsm_manager.matching.significance import significance
+from mlsm_manager.matching.significance import heard_share, lead_along, significance
 
 _WINDOW_DEVIATIONS = 3.0
 _OBJECTION_SHARE = 0.01
@@ -39,7 +39,7 @@ class DistributionMatcher:
             reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
             return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
         fits, refiner = self._fits(scan, motion, target, state)
-        status, reason = self._judge(fits, refiner, state)
+        status, reason = self._judge(fits, refiner, state, target)
         return _result(status, reason, motion, fits[0], start)
 
     def _fits(self, scan: Scan, motion: PlanarMotion, target: Blocks, state: PriorState) -> Tuple[List[Fit], Refiner]:
@@ -52,9 +52,10 @@ class DistributionMatcher:
         found = search(
             motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, parameters.candidates
         )
-        refiner = Refiner(motion, weights, LocalDistributions(target), state)
+        refiner = Refiner(motion, weights, LocalDistributions(target), state, parameters.range_scale_deviation)
         fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
-        return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain)), refiner
+        inflation = max(fits, key=lambda fit: fit.support).inflation
+        return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
 
     def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
         deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))
@@ -67,7 +68,7 @@ class DistributionMatcher:
             yaw_rates=np.arange(-rates, rates + 1) * step,
         )
 
-    def _judge(self, fits: List[Fit], refiner: Refiner, state: PriorState) -> Tuple[MatchStatus, str]:
+    def _judge(self, fits: List[Fit], refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
         parameters, best = self.parameters, fits[0]
         if not best.converged:
             return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
@@ -80,21 +81,39 @@ class DistributionMatcher:
         jump = float(np.sqrt(2.0 * state.objection(best.theta)))
         if jump > parameters.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
-        return self._judge_certainty(fits)
+        agreement = self._agreement(best, refiner, target)
+        if agreement < parameters.min_agreement:
+            return MatchStatus.DIVERGED, f"scan and map agree by {agreement:.2f} only, another place perhaps"
+        return self._judge_certainty(fits, refiner)
 
-    def _judge_certainty(self, fits: List[Fit]) -> Tuple[MatchStatus, str]:
+    def _judge_certainty(self, fits: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
         parameters, best = self.parameters, fits[0]
-        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
+        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
+        position = float(np.sqrt(values[-1]))
         if position > parameters.max_position_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
         yaw = float(np.sqrt(best.covariance[2, 2]))
         if yaw > parameters.max_yaw_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
+        if parameters.min_gain_over_second == 0.0:
+            return MatchStatus.CONVERGED, ""
+        return self._judge_second_places(fits, refiner, vectors[:, -1])
+
+    def _judge_second_places(self, fits: List[Fit], refiner: Refiner, direction: np.ndarray) -> Tuple[MatchStatus, str]:
+        parameters, best = self.parameters, fits[0]
         for other in fits[1:]:
-            lead = best.gain - other.gain
+            lead = best.gain(best.inflation) - other.gain(best.inflation)
             if separation(best.theta, other.theta) >= 0.5 and lead < parameters.min_gain_over_second:
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
+        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, direction)
+        if lead < parameters.min_gain_over_second:
+            return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
         return MatchStatus.CONVERGED, ""
+
+    def _agreement(self, fit: Fit, refiner: Refiner, target: Blocks) -> float:
+        """Return the mean of the share of the scan that is on the map and the share of the map that is heard."""
+        heard = heard_share(refiner.world(fit.theta), fit.theta[:2], target.mean[:, :2])
+        return (float(fit.inliers.mean()) + heard) / 2.0
 
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:
@@ -129,5 +148,5 @@ def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, st
 
 def _unmatched(status: MatchStatus, reason: str, motion: PlanarMotion, state: PriorState, start: float) -> MatchResult:
     nothing = np.empty(0)
-    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, nothing.astype(bool), nothing, 0, False)
+    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, 1.0, 0.0, nothing.astype(bool), nothing, 0, False)
     return _result(status, reason, motion, fit, start)

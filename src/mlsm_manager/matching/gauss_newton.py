@@ -1,7 +1,7 @@
 """Refines a state so that the points lie where the local distributions expect them (thesis 6.3, all at once)."""
 
 from dataclasses import dataclass
-from typing import Union
+from typing import Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -37,42 +37,56 @@ class PriorState:
 class Fit:
     """Where Gauss-Newton ended.
 
-    theta: (8,). covariance: (8, 8), prior included. gain: by how many nats the points prefer this place to one where
-    they meet nothing, less the prior's objection. inliers: (n,) bool, points that lie on a surface of the map.
-    distances: (n,) m from the nearest block. converged: whether the last step was small.
+    theta: (8,). covariance: (8, 8), prior included. support: by how many nats the points, taken as independent, prefer
+    this place to one where they meet nothing; `inflation` of them are worth one. objection: nats by which the prior
+    argues against it. inliers: (n,) bool, points that lie on a surface of the map. distances: (n,) m from the nearest
+    block. converged: whether the last step was small.
     """
 
     theta: np.ndarray
     covariance: np.ndarray
-    gain: float
+    support: float
+    inflation: float
+    objection: float
     inliers: np.ndarray
     distances: np.ndarray
     iterations: int
     converged: bool
 
+    def gain(self, inflation: float) -> float:
+        """Return the nats for this place; fits are compared with one `inflation` for all of them."""
+        return self.support / inflation - self.objection
+
+
+@dataclass(frozen=True)
+class _Meeting:
+    """How the points meet the map: places (n, 2), metric (n, 2, 2), residuals and what each point is worth."""
+
+    world: np.ndarray
+    nearest: np.ndarray
+    distances: np.ndarray
+    metric: np.ndarray
+    residual: np.ndarray
+    squared: np.ndarray
+
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals."""
+    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals.
+
+    scale_information: of the ranges' common scale. scale_mixed: (8,) what it has in common with the state.
+    scale_gradient: of all points by it.
+    """
 
     information: np.ndarray
     gradient: np.ndarray
+    scale_information: float
+    scale_mixed: np.ndarray
+    scale_gradient: float
     world: np.ndarray
     squared: np.ndarray
     importance: np.ndarray
     distances: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Residuals:
-    """Places (n, 2), distances (n,), residuals (n, 2) and their metric (n, 2, 2), squared (n,), importance (n,)."""
-
-    world: np.ndarray
-    distances: np.ndarray
-    residual: np.ndarray
-    metric: np.ndarray
-    squared: np.ndarray
-    importance: np.ndarray
 
 
 class Refiner:
@@ -80,17 +94,24 @@ class Refiner:
 
     The robust kernel narrows as the iterations go on, until a step is below a tenth of a standard deviation. Points
     that lie near each other in the map err alike; the information is divided by what the sums of their gradients over
-    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share.
+    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share. An error of all ranges
+    in proportion is one more unknown and is integrated out: between walls that converge it looks like a motion.
     """
 
     def __init__(
-        self, motion: PlanarMotion, point_weights: np.ndarray, target: LocalDistributions, prior: PriorState
+        self,
+        motion: PlanarMotion,
+        point_weights: np.ndarray,
+        target: LocalDistributions,
+        prior: PriorState,
+        range_scale_deviation: float = 0.0,
     ) -> None:
-        """`point_weights` is (n,), n > 0."""
+        """`point_weights` is (n,), n > 0; `range_scale_deviation` is relative, 0 where ranges are certain."""
         self._motion = motion
         self._point_weights = point_weights
         self._target = target
         self._prior = prior
+        self._range_scale_deviation = range_scale_deviation
         spots = motion.points(motion.path(prior.mean))
         self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
 
@@ -102,8 +123,9 @@ class Refiner:
             iteration += 1
             normal = self._normal(theta, SCALES[index])
             inflation = self._design_effect(normal) if index == narrowest else 1.0
-            information = normal.information / inflation + self._prior.information
-            step = self._step(theta, normal, information, inflation)
+            points_information, gradient = self._weighed(normal, inflation)
+            information = points_information + self._prior.information
+            step = -np.linalg.solve(information, gradient + self._prior.information @ (theta - self._prior.mean))
             theta = theta + step
             small = bool(step @ information @ step < _LAST_STEP**2)
             converged = small and index == narrowest
@@ -113,31 +135,56 @@ class Refiner:
 
     def matched(self, theta: np.ndarray) -> np.ndarray:
         """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
-        return self._on_surface(self._residuals(self._motion.path(theta), SCALES[-1]))
+        meeting = self._meeting(self._motion.path(theta))
+        return (meeting.squared < INLIER**2) & (meeting.distances < _GATE * SCALES[-1])
 
-    def _step(self, theta: np.ndarray, normal: _Normal, information: np.ndarray, inflation: float) -> np.ndarray:
-        objection = self._prior.information @ (theta - self._prior.mean)
-        return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
+    def gain(self, theta: np.ndarray, inflation: float) -> float:
+        """Return what `Fit.gain` would be if a fit ended at `theta`."""
+        meeting = self._meeting(self._motion.path(theta))
+        importance = self._importance(meeting, SCALES[-1])
+        return _support(importance, meeting.squared) / inflation - self._prior.objection(theta)
 
-    def _residuals(self, path: np.ndarray, scale: float) -> _Residuals:
+    def world(self, theta: np.ndarray) -> np.ndarray:
+        """Return the points (n, 2) in map when the state is `theta`."""
+        return self._motion.points(self._motion.path(theta))
+
+    def _weighed(self, normal: _Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
+        """Return information (8, 8) and gradient (8,) of all points, without what they tell only if ranges are sure."""
+        information, gradient = normal.information / inflation, normal.gradient.sum(axis=0) / inflation
+        if self._range_scale_deviation == 0.0:
+            return information, gradient
+        known = normal.scale_information / inflation + self._range_scale_deviation**-2
+        gain = normal.scale_mixed / inflation / known
+        mixed = normal.scale_mixed / inflation
+        return information - np.outer(gain, mixed), gradient - gain * normal.scale_gradient / inflation
+
+    def _meeting(self, path: np.ndarray) -> _Meeting:
         world = self._motion.points(path)
         distances, nearest = self._target.nearest(world)
         residual = world - self._target.mean[nearest]
         metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(path))
         squared = np.einsum("na,nab,nb->n", residual, metric, residual)
-        importance = self._point_weights * self._target.weight[nearest] * self._map_share(nearest)
-        importance = importance * (distances < _GATE * scale)
-        return _Residuals(world, distances, residual, metric, squared, importance)
+        return _Meeting(world, nearest, distances, metric, residual, squared)
 
     def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
         path = self._motion.path(theta)
-        found = self._residuals(path, scale)
-        weights = found.importance * geman_mcclure(found.squared, scale)
+        meeting = self._meeting(path)
+        importance = self._importance(meeting, scale)
+        weights = importance * geman_mcclure(meeting.squared, scale)
         jacobian = self._motion.point_jacobian(path, theta)
-        lever = (found.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
+        lever = (meeting.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
         information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
-        gradient = np.einsum("nas,na->ns", lever, found.residual)
-        return _Normal(information, gradient, found.world, found.squared, found.importance, found.distances)
+        gradient = np.einsum("nas,na->ns", lever, meeting.residual)
+        arms = meeting.world - path[self._motion.beam, :2]
+        pull = np.einsum("nab,nb->na", meeting.metric, arms) * weights[:, np.newaxis]
+        return _Normal(
+            information, gradient, float((pull * arms).sum()), np.einsum("nas,na->s", lever, arms),
+            float((pull * meeting.residual).sum()), meeting.world, meeting.squared, importance, meeting.distances,
+        )  # fmt: skip
+
+    def _importance(self, meeting: _Meeting, scale: float) -> np.ndarray:
+        share = self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
+        return self._point_weights * share * (meeting.distances < _GATE * scale)
 
     def _map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return (n,) the share of the points' information that is left after the map's own noise.
@@ -158,16 +205,23 @@ class Refiner:
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
         return float(np.clip(np.trace(whitening @ (sums.T @ sums)) / independent, 1.0, _GREATEST_INFLATION))
 
-    def _on_surface(self, found: Union[_Normal, _Residuals]) -> np.ndarray:
-        return (found.squared < INLIER**2) & (found.importance > 0.0)
+    def _on_surface(self, normal: _Normal) -> np.ndarray:
+        return (normal.squared < INLIER**2) & (normal.importance > 0.0)
 
     def _fit(self, theta: np.ndarray, iterations: int, converged: bool) -> Fit:
         normal = self._normal(theta, SCALES[-1])
         inflation = self._design_effect(normal)
-        covariance = np.linalg.inv(normal.information / inflation + self._prior.information)
-        saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(normal.squared, SCALES[-1])
-        gain = float((normal.importance * saved).sum()) / inflation - self._prior.objection(theta)
-        return Fit(theta, covariance, gain, self._on_surface(normal), normal.distances, iterations, converged)
+        covariance = np.linalg.inv(self._weighed(normal, inflation)[0] + self._prior.information)
+        support = _support(normal.importance, normal.squared)
+        return Fit(
+            theta, covariance, support, inflation, self._prior.objection(theta), self._on_surface(normal),
+            normal.distances, iterations, converged,
+        )  # fmt: skip
+
+
+def _support(importance: np.ndarray, squared: np.ndarray) -> float:
+    saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(squared, SCALES[-1])
+    return float((importance * saved).sum())
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:

@@ -1,13 +1,8 @@
-from pathlib import Path
-
 import pytest
 
 from imagenex_852_driver.driver_parameters import DriverParameters
 from imagenex_852_driver.emulator_parameters import EmulatorParameters
-from node_support.parameter_text import markdown_table
 from node_support.parameters import ParameterError
-
-DOCUMENTATION = Path(__file__).resolve().parents[3] / "docs" / "imagenex_852_driver.md"
 
 
 @pytest.mark.parametrize(
@@ -47,8 +42,3 @@ def test_the_port_cannot_be_changed_while_the_driver_runs():
 def test_the_emulator_refuses_what_makes_no_head(values):
     with pytest.raises(ParameterError, match=next(iter(values))):
         EmulatorParameters.from_mapping(values)
-
-
-@pytest.mark.parametrize("parameters", [DriverParameters, EmulatorParameters])
-def test_the_documentation_has_the_table_of_the_parameters(parameters):
-    assert markdown_table(parameters) in DOCUMENTATION.read_text()

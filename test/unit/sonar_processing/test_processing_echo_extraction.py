@@ -66,6 +66,13 @@ def test_nothing_nearer_than_min_range_is_an_echo():
     assert _echoes(image, min_range=3.0).bins.min() > 100
 
 
+def test_contrast_keeps_echoes_out_of_a_scan_of_speckle_alone():
+    speckle = with_speckle(np.zeros((120, 500), np.float32), seed=4, strength=90.0)
+    assert len(_echoes(speckle, min_contrast=0.0)) > 500
+    assert len(_echoes(speckle)) < 500
+    assert len(_echoes(speckle, min_contrast=15.0)) < 60
+
+
 def test_a_scan_of_nothing_has_no_echo():
     echoes = _echoes(np.zeros((BEAMS, 400), np.uint8))
     assert (len(echoes), echoes.threshold) == (0, 10.0)
@@ -81,8 +88,8 @@ def test_binary_strengths_give_one_echo_per_run_in_its_middle():
 
 
 def test_the_leading_edge_of_a_binary_run_is_where_it_begins():
-    echoes = _echoes(binary_image(np.arange(150, 210), [28] * 60), mode="LEADING_EDGE")
-    np.testing.assert_allclose(echoes.bins, np.arange(149.5, 209.5), atol=0.01)
+    echoes = _echoes(binary_image(np.arange(150, 270, 2), [28] * 60), mode="LEADING_EDGE")
+    np.testing.assert_allclose(echoes.bins, np.arange(149.5, 269.5, 2.0), atol=0.01)
 
 
 def test_the_leading_edge_lies_before_the_peak_by_as_much_whatever_the_strength():
@@ -104,6 +111,15 @@ def test_dense_points_stand_all_along_a_run(spacing, per_run):
     echoes = _echoes(binary_image([150] * 20 + [0] * 40, [28] * 20 + [0] * 40), mode="DENSE", spacing=spacing)
     assert np.bincount(echoes.beams).tolist() == [per_run] * 20
     assert (echoes.bins.min(), echoes.bins.max() <= 177) == (150, True)
+
+
+@pytest.mark.parametrize("mode", ["MATCHED_FILTER", "LEADING_EDGE", "DENSE"])
+@pytest.mark.parametrize("sigma", [0.1, 2.0])
+@pytest.mark.parametrize("at", [0, 1, 398, 399])
+def test_an_echo_at_either_end_of_the_range_lies_there(mode, at, sigma):
+    echoes = _echoes(wall_image([at] * 20 + [-100.0] * 40, sigma=sigma), mode=mode, min_range=0.0, spacing=9.0)
+    assert echoes.beams.tolist() == list(range(20))
+    assert np.abs(echoes.bins - at).max() < 3.5
 
 
 @given(st.integers(0, 2**32 - 1), st.sampled_from(list(ExtractionMode)), st.sampled_from([0.0, 0.3, 0.9]))

@@ -1,0 +1,125 @@
+"""The correction map -> odom: between scans without jumps, and for points of the past."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_scans import at_velocity, still
+
+from mlsm_manager.mapping.correction_history import CorrectionHistory
+from mlsm_manager.mapping.live_correction import LiveCorrection
+from mlsm_manager.matching.prediction import Belief
+from mlsm_manager.matching.scan import Scan, Track
+
+TIMES = np.arange(0.0, 10.0, 0.1)
+
+
+def belief_of(time, pose, *errors):
+    theta = np.zeros(8)
+    theta[:3] = pose
+    theta[3 : 3 + len(errors)] = errors
+    return Belief(time, theta, np.zeros((8, 8)))
+
+
+def cloud_at(times):
+    times = np.array(times, dtype=float)
+    points = np.zeros((len(times), 4))
+    return Scan(points, times, np.zeros(len(times), dtype=bool), Track(TIMES, np.zeros((100, 3))), float(times[-1]))
+
+
+def history_of(*stretches):
+    history = CorrectionHistory()
+    for start, end, x, holds in stretches:
+        times = np.linspace(start, end, 5)
+        poses = np.column_stack([np.full(5, x), np.zeros((5, 2))])
+        history.add(times, poses, Track(TIMES, np.zeros((100, 3))), holds)
+    return history
+
+
+def test_before_any_belief_the_correction_is_none():
+    correction = LiveCorrection(1.0)
+    np.testing.assert_array_equal(correction.sample(0.0, np.array([3.0, 2.0, 1.0])), np.zeros(3))
+
+
+@given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-3.0, 3.0))
+def test_after_the_blend_the_pose_is_the_believed_one(x, y, yaw):
+    correction = LiveCorrection(1.0)
+    correction.sample(0.0, np.zeros(3))
+    correction.believe(belief_of(0.0, [x, y, yaw]))
+    for time in (0.1, 0.6, 1.2):
+        found = correction.sample(time, np.zeros(3))
+    np.testing.assert_allclose(found, [x, y, yaw], atol=1e-9)
+
+
+def test_a_new_fix_is_approached_without_a_jump():
+    correction = LiveCorrection(1.0)
+    correction.believe(belief_of(0.0, np.zeros(3)))
+    before = [correction.sample(time, np.zeros(3))[0] for time in TIMES[:50]]
+    correction.believe(belief_of(TIMES[49], [1.0, 0.0, 0.0]))
+    after = [correction.sample(time, np.zeros(3))[0] for time in TIMES[50:]]
+    steps = np.abs(np.diff(before + after))
+    assert steps.max() < 0.11
+    assert after[-1] == pytest.approx(1.0)
+
+
+def test_a_fix_of_the_past_is_brought_to_now_by_the_odometry():
+    odometry = at_velocity((0.5, 0.0, 0.0))
+    correction = LiveCorrection(0.0)
+    for time in TIMES[:50]:
+        correction.sample(time, odometry(time))
+    correction.believe(belief_of(2.0, odometry(2.0) + np.array([0.0, 3.0, 0.0])))
+    np.testing.assert_allclose(correction.sample(TIMES[50], odometry(TIMES[50])), [0.0, 3.0, 0.0], atol=1e-9)
+
+
+def test_an_error_of_the_speed_that_was_found_goes_on():
+    correction = LiveCorrection(0.0)
+    correction.believe(belief_of(0.0, np.zeros(3), 0.2))
+    found = [correction.sample(time, np.zeros(3))[0] for time in TIMES]
+    np.testing.assert_allclose(found, 0.2 * TIMES, atol=1e-9)
+
+
+def test_a_time_that_does_not_increase_changes_nothing():
+    correction = LiveCorrection(0.0)
+    correction.believe(belief_of(0.0, np.zeros(3), 0.2))
+    for time in TIMES[:20]:
+        expected = correction.sample(time, np.zeros(3))
+    np.testing.assert_array_equal(correction.sample(TIMES[5], np.ones(3)), expected)
+
+
+def test_clear_forgets_what_was_before_a_jump_of_time():
+    correction = LiveCorrection(1.0)
+    correction.believe(belief_of(100.0, [5.0, 0.0, 0.0]))
+    correction.sample(100.5, np.zeros(3))
+    correction.clear()
+    np.testing.assert_array_equal(correction.sample(1.0, np.zeros(3)), np.zeros(3))
+
+
+def test_points_are_placed_by_the_stretch_of_their_time():
+    points, unplaced = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, True)).placed(cloud_at([1.0, 4.0]))
+    np.testing.assert_allclose(points[:, 0], [1.0, 3.0])
+    assert unplaced == 0
+
+
+def test_between_two_times_the_correction_is_between_theirs():
+    history = CorrectionHistory()
+    poses = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    history.add(np.array([0.0, 2.0]), poses, Track(TIMES, still()(TIMES)), holds=True)
+    assert history.placed(cloud_at([0.5]))[0][0, 0] == pytest.approx(0.5)
+
+
+def test_points_of_a_rejected_stretch_have_no_place():
+    points, unplaced = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, False)).placed(cloud_at([1.0, 3.0, 4.0]))
+    assert len(points) == 1
+    assert unplaced == 2
+
+
+def test_without_history_no_point_has_a_place():
+    points, unplaced = CorrectionHistory().placed(cloud_at([1.0, 4.0]))
+    assert (len(points), unplaced) == (0, 2)
+    assert CorrectionHistory().end == -np.inf
+
+
+def test_only_the_last_stretches_are_kept():
+    history = history_of(*[(float(k), k + 0.5, float(k), True) for k in range(9)])
+    assert history.end == 8.5
+    assert history.placed(cloud_at([0.2]))[0][0, 0] == pytest.approx(1.0)

@@ -1,0 +1,175 @@
+"""What the default matcher finds, how sure it says it is, and when it refuses."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_scans import DEVIATIONS, at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
+
+from mlsm_manager.matching.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.result import MatchStatus
+from mlsm_manager.matching.undistort import corrected_points
+
+FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
+
+
+def match(scan, target, expected, deviations=DEVIATIONS, **changes):
+    matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
+    return matcher.match(scan, target, prior_of_pose(scan, expected, deviations))
+
+
+@settings(max_examples=8)
+@given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-0.3, 0.3))
+def test_a_pose_is_found_from_a_wrong_expectation(x, y, yaw):
+    truth = np.array([1.0, -0.5, 0.3])
+    scan = scan_of(harbour(), still(truth), still((0.3, 0.2, 0.0)))
+    result = match(scan, map_of(harbour()), truth + np.array([x, y, yaw]))
+    assert result.status is MatchStatus.CONVERGED, result.reason
+    np.testing.assert_allclose(result.pose, truth, atol=0.03)
+
+
+@settings(max_examples=8)
+@given(st.floats(-0.3, 0.3), st.floats(-0.1, 0.1), st.sampled_from([-0.02, 0.0, 0.03]))
+def test_a_velocity_that_the_odometry_missed_is_found(along, aside, turn_rate):
+    velocity = np.array([along, aside, turn_rate])
+    truth = at_velocity(velocity)
+    scan = scan_of(harbour(), truth, still(), moving=True)
+    result = match(scan, map_of(harbour()), truth(16.0), FREE_RATES)
+    assert result.status is MatchStatus.CONVERGED, result.reason
+    np.testing.assert_allclose(result.velocity, velocity, atol=0.015)
+    np.testing.assert_allclose(result.pose, truth(16.0), atol=0.06)
+
+
+def test_a_matched_scan_is_put_where_its_points_were():
+    truth = at_velocity((0.3, 0.0, 0.03))
+    scan = scan_of(harbour(), truth, at_velocity((0.2, 0.0, 0.02)), moving=True)
+    result = match(scan, map_of(harbour()), truth(16.0), FREE_RATES)
+    true_places = scan_of(harbour(), truth).points
+    assert np.linalg.norm(corrected_points(scan, result)[:, :2] - true_places[:, :2], axis=1).max() < 0.15
+    np.testing.assert_array_equal(corrected_points(scan, result)[:, 2:], scan.points[:, 2:])
+
+
+def test_the_path_ends_at_the_pose():
+    scan = scan_of(harbour(), at_velocity((0.3, 0.0, 0.03)))
+    result = match(scan, map_of(harbour()), at_velocity((0.3, 0.0, 0.03))(16.0))
+    np.testing.assert_allclose(result.beam_poses[-1], result.pose)
+    assert result.beam_times[-1] == scan.reference_time
+
+
+def test_a_scale_error_of_the_odometry_is_found_while_it_moves():
+    truth = at_velocity((0.3, 0.0, 0.0))
+    scan = scan_of(harbour(), truth, at_velocity((0.2, 0.0, 0.0)), moving=True)
+    deviations = np.array([1.0, 1.0, 0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.1])
+    result = match(scan, map_of(harbour()), truth(16.0), deviations)
+    assert result.motion[0] == pytest.approx(0.5, abs=0.05)
+
+
+def test_the_prior_keeps_what_it_is_sure_of():
+    """The weights are those of the deviations: a certain odometry is not moved by a scan."""
+    scan = scan_of(harbour(), still())
+    sure = np.full(8, 1e-4)
+    result = match(scan, map_of(harbour()), [0.3, 0.0, 0.0], sure, min_agreement=0.0, min_significance=0.0)
+    np.testing.assert_allclose(result.pose, [0.3, 0.0, 0.0], atol=0.01)
+
+
+def test_a_match_makes_the_prior_surer_and_never_less_sure():
+    scan = scan_of(harbour(), still())
+    result = match(scan, map_of(harbour()), np.zeros(3))
+    deviations = np.sqrt(np.diag(result.state_covariance))
+    assert (deviations <= DEVIATIONS * (1.0 + 1e-6)).all()
+    assert (deviations[:3] < 0.1 * DEVIATIONS[:3]).all()
+
+
+def test_along_a_single_wall_a_scan_is_ambiguous():
+    scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
+    result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.5, 0.3, 0.02])
+    assert result.status is MatchStatus.AMBIGUOUS
+    assert "worst direction" in result.reason
+
+
+def test_along_a_single_wall_the_deviation_is_that_of_the_prior_and_across_it_that_of_the_match():
+    scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
+    result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.5, 0.3, 0.02])
+    along, across = np.sqrt(np.diag(result.covariance)[:2])
+    assert along > 0.5
+    assert across < 0.1
+    assert abs(result.pose[1]) < 0.1
+
+
+def test_beside_a_wall_a_sure_odometry_gives_a_fix():
+    """What the wall leaves open the odometry tells."""
+    scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
+    sure = np.array([0.1, 1.0, 0.1, 1e-3, 1e-3, 1e-4, 1e-3, 1e-3])
+    result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.05, 0.5, 0.02], sure)
+    assert result.status is MatchStatus.CONVERGED, result.reason
+    np.testing.assert_allclose(result.pose, [0.0, 0.0, 0.0], atol=0.1)
+
+
+def test_two_places_that_look_alike_are_ambiguous():
+    """A comb of equal jetties every 3 m."""
+    comb = np.vstack([wall((x, 8), (x, 12), spacing=0.3) for x in np.arange(-18.0, 19.0, 3.0)])
+    scan = scan_of(comb[np.abs(comb[:, 0]) < 10.0], still())
+    result = match(scan, map_of(comb), [1.4, 0.0, 0.0], min_significance=0.0)
+    assert result.status is MatchStatus.AMBIGUOUS
+
+
+@pytest.mark.parametrize(("points", "blocks"), [(0, 100), (14, 100), (100, 0), (100, 2)])
+def test_a_scan_or_a_map_of_few_points_tells_nothing(points, blocks):
+    places = np.vstack([harbour()] * 2)
+    result = match(scan_of(places[:points], still()), map_of(places[:blocks]), np.zeros(3))
+    assert result.status is MatchStatus.TOO_FEW_POINTS
+    assert "must be 15 or more" in result.reason
+
+
+def test_a_scan_far_from_everything_in_the_map_is_not_accepted():
+    result = match(scan_of(harbour(), still()), map_of(harbour() + 200.0), np.zeros(3))
+    assert not result.accepted
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_noise_is_not_accepted(seed):
+    noise = np.random.default_rng(seed).uniform(-20.0, 20.0, (150, 2))
+    assert not match(scan_of(noise, still()), map_of(harbour()), np.zeros(3)).accepted
+
+
+def test_a_scan_of_another_place_is_refused_because_scan_and_map_disagree():
+    """One wall of the two is there, and so are some posts, but not the rest."""
+    other = np.vstack([wall((-12, 12), (14, 12)), wall((-12, 12), (-12, -10)), wall((-8, -8), (8, -8))])
+    result = match(scan_of(other, still()), map_of(harbour()), np.zeros(3))
+    assert not result.accepted
+
+
+def test_a_jump_beyond_the_priors_deviations_is_rejected():
+    deviations = np.array([0.3, 0.3, 0.1, 1e-3, 1e-3, 1e-4, 1e-3, 1e-3])
+    scan = scan_of(harbour(), still())
+    result = match(scan, map_of(harbour()), [0.85, 0.0, 0.0], deviations, max_jump=1.5)
+    assert result.status is MatchStatus.REJECTED_JUMP
+    assert "standard deviations from where it was expected" in result.reason
+
+
+def test_a_refinement_that_finds_no_end_says_so():
+    result = match(scan_of(harbour(), still()), map_of(harbour()), [0.5, 0.5, 0.1], max_steps=1)
+    assert result.status is MatchStatus.DIVERGED
+    assert result.iterations == 1
+
+
+def test_an_unmatched_scan_keeps_the_priors_pose():
+    result = match(scan_of(harbour()[:3], still()), map_of(harbour()), [1.0, 2.0, 0.3])
+    np.testing.assert_allclose(result.pose, [1.0, 2.0, 0.3])
+    np.testing.assert_allclose(np.diag(result.state_covariance), DEVIATIONS**2, rtol=1e-4)
+
+
+def test_a_match_is_repeatable():
+    scan, target = scan_of(harbour(), still()), map_of(harbour())
+    first, second = (match(scan, target, [1.0, 1.0, 0.1]) for _ in range(2))
+    np.testing.assert_allclose(first.pose, second.pose, atol=1e-9)
+    np.testing.assert_allclose(first.covariance, second.covariance, atol=1e-9)
+
+
+def test_the_correction_takes_the_odometrys_pose_to_the_matched_one():
+    scan = scan_of(harbour(), still((1.0, -0.5, 0.3)), still((0.3, 0.2, 0.0)))
+    result = match(scan, map_of(harbour()), [1.0, -0.5, 0.3])
+    x, y, yaw = result.correction(scan)
+    turned = np.array([x + np.cos(yaw) * 0.3 - np.sin(yaw) * 0.2, y + np.sin(yaw) * 0.3 + np.cos(yaw) * 0.2, yaw])
+    np.testing.assert_allclose(turned, result.pose, atol=1e-9)

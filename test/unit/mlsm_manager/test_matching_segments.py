@@ -1,0 +1,161 @@
+"""The thesis's own matcher: closest block, directional search, segments (6.5.6, figures 6.4 to 6.8)."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
+
+from mlsm_manager.matching.closest_blocks import ClosestBlocks
+from mlsm_manager.matching.matcher_parameters import SegmentsMatcherParameters
+from mlsm_manager.matching.result import MatchStatus
+from mlsm_manager.matching.segments import translate_segments
+from mlsm_manager.matching.segments_matcher import SegmentsMatcher
+from mlsm_manager.mlsm import MultiLevelSurfaceMap
+
+POSTS = np.array([[4.0, 0.0], [0.0, 6.0], [-5.0, -1.0], [2.0, -7.0], [8.0, 8.0]])
+OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)
+
+
+def match(scan, target, expected, **changes):
+    matcher = SegmentsMatcher(SegmentsMatcherParameters().changed(changes))
+    return matcher.match(scan, target, prior_of_pose(scan, expected))
+
+
+def column(*heights):
+    surface_map = MultiLevelSurfaceMap(0.5)
+    surface_map.insert(np.array([[0.2, 0.2, z, 1.0] for z in heights]))
+    return surface_map.blocks
+
+
+def test_the_closest_block_is_that_of_the_nearest_cell():
+    closest = ClosestBlocks(map_of(np.array([[0.2, 0.2], [5.2, 0.2]])))
+    assert closest.find(np.array([[2.0, 0.0, -2.0], [3.5, 0.0, -2.0]])).tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(("height", "block"), [(-9.0, 0), (-4.8, 0), (-1.0, 1), (3.0, 1)])
+def test_in_a_column_the_block_nearest_in_height_is_taken(height, block):
+    """The 2015 code compared the height with the mean of x."""
+    blocks = column(-5.0, 0.0)
+    found = ClosestBlocks(blocks).find(np.array([[100.0, 0.0, height]]))[0]
+    assert np.argsort(blocks.mean[:, 2])[block] == found
+
+
+def test_the_search_along_the_movement_prefers_the_block_that_lies_in_its_direction():
+    blocks = map_of(np.array([[0.2, 1.2], [1.2, 0.2]]))
+    point, step = np.array([[0.2, 0.2, -2.0]]), np.array([[0.3, 0.0, 0.0]])
+    found = ClosestBlocks(blocks).find_along(point, step, samples=4)
+    np.testing.assert_allclose(blocks.mean[found[0], :2], [1.2, 0.2])
+
+
+def test_without_samples_or_movement_the_search_takes_the_closest_block():
+    closest = ClosestBlocks(map_of(harbour()))
+    points = np.column_stack([harbour() + 0.3, np.full(len(harbour()), -2.0)])
+    still_steps, steps = np.zeros_like(points), np.full_like(points, 0.2)
+    np.testing.assert_array_equal(closest.find_along(points, still_steps, 5), closest.find(points))
+    np.testing.assert_array_equal(closest.find_along(points, steps, 0), closest.find(points))
+
+
+@given(OFFSETS)
+def test_a_still_segment_moves_by_its_mean_error(error):
+    errors = error + np.array([[0.1, 0.0], [-0.1, 0.2], [0.0, -0.2]])
+    fit = translate_segments(np.arange(3.0), np.zeros(3, dtype=bool), errors)
+    np.testing.assert_allclose(fit.translations, np.tile(error, (3, 1)), atol=1e-12)
+    np.testing.assert_array_equal(fit.slope, np.zeros(2))
+
+
+@given(OFFSETS, OFFSETS)
+def test_a_moving_segment_moves_along_a_line_over_time(offset, slope):
+    times = np.linspace(0.0, 8.0, 20)
+    errors = offset + times[:, np.newaxis] * slope
+    fit = translate_segments(times, np.ones(20, dtype=bool), errors)
+    np.testing.assert_allclose(fit.translations, errors, atol=1e-9)
+    np.testing.assert_allclose(fit.slope, slope, atol=1e-9)
+
+
+@given(OFFSETS, OFFSETS)
+def test_a_moving_segment_begins_where_the_still_one_ended(offset, slope):
+    times = np.arange(20.0)
+    moving = times >= 8.0
+    errors = offset + np.maximum(times - 7.0, 0.0)[:, np.newaxis] * slope
+    fit = translate_segments(times, moving, errors)
+    np.testing.assert_allclose(fit.translations, errors, atol=1e-9)
+
+
+def test_every_change_between_still_and_moving_begins_a_segment():
+    moving = np.array([False, False, True, True, True, False, False])
+    errors = np.array([[1.0, 0.0]] * 2 + [[2.0, 0.0], [3.0, 0.0], [4.0, 0.0]] + [[9.0, 0.0]] * 2)
+    translations = translate_segments(np.arange(7.0), moving, errors).translations
+    np.testing.assert_allclose(translations[:, 0], [1.0, 1.0, 2.0, 3.0, 4.0, 9.0, 9.0])
+
+
+def test_a_moving_segment_of_two_times_has_no_slope():
+    fit = translate_segments(np.array([0.0, 1.0]), np.ones(2, dtype=bool), np.array([[0.0, 0.0], [1.0, 0.0]]))
+    np.testing.assert_allclose(fit.translations, [[0.5, 0.0], [0.5, 0.0]])
+
+
+@given(OFFSETS)
+def test_a_still_scan_of_posts_far_apart_is_put_onto_them(offset):
+    """Every post's closest block is its own, so one translation is enough."""
+    places = np.repeat(POSTS, 3, axis=0) + np.tile([[0.0, 0.0], [0.1, 0.0], [0.0, 0.1]], (5, 1))
+    scan = scan_of(places, still())
+    result = match(scan, map_of(places), np.append(offset, 0.0), error_threshold=0.1)
+    assert result.status is MatchStatus.CONVERGED
+    assert np.hypot(*result.pose[:2]) < 0.15
+
+
+def test_the_yaw_stays_the_priors():
+    result = match(scan_of(harbour(), still()), map_of(harbour()), [0.0, 0.0, 0.2])
+    assert result.pose[2] == pytest.approx(0.2)
+
+
+def test_a_velocity_that_the_odometry_missed_is_found_among_posts():
+    velocity = np.array([0.03, 0.0, 0.0])
+    truth = at_velocity(velocity)
+    places = np.repeat(POSTS, 4, axis=0) + np.random.default_rng(0).uniform(-0.1, 0.1, (20, 2))
+    scan = scan_of(places, truth, still(), moving=True)
+    result = match(scan, map_of(places), np.zeros(3), error_threshold=0.12)
+    np.testing.assert_allclose(result.velocity, velocity, atol=0.02)
+
+
+def test_a_point_inside_a_blocks_spread_has_no_error():
+    """Then nothing is left to improve: no iteration moves it (thesis 6.5.6)."""
+    grid = np.stack(np.meshgrid(np.linspace(0.05, 0.45, 5), np.linspace(0.05, 0.45, 5)), axis=-1).reshape(-1, 2)
+    middle = np.tile([[0.25, 0.3]], (5, 1))
+    result = match(scan_of(middle, still()), map_of(grid), np.zeros(3), error_threshold=0.0)
+    assert result.error == 0.0
+    assert result.accepted
+
+
+def test_it_stops_at_the_error_threshold():
+    scan = scan_of(harbour(), still())
+    strict = match(scan, map_of(harbour()), [0.6, 0.4, 0.0], error_threshold=0.01)
+    loose = match(scan, map_of(harbour()), [0.6, 0.4, 0.0], error_threshold=5.0)
+    assert loose.iterations == 1
+    assert strict.iterations > 1
+
+
+@pytest.mark.parametrize("limit", [1, 3, 7])
+def test_without_success_it_stops_at_max_iterations_and_is_not_accepted(limit):
+    scan = scan_of(harbour(), still())
+    result = match(
+        scan, map_of(harbour() + np.array([30.0, 0.0])), np.zeros(3), error_threshold=0.0, max_iterations=limit
+    )
+    assert result.status is MatchStatus.DIVERGED
+    assert result.iterations == limit
+    assert "iterations" in result.reason
+
+
+@pytest.mark.parametrize(("points", "blocks"), [(0, 10), (2, 10), (10, 0)])
+def test_a_scan_or_a_map_of_nothing_tells_nothing(points, blocks):
+    result = match(scan_of(harbour()[:points], still()), map_of(harbour()[:blocks]), [1.0, 2.0, 0.0])
+    assert result.status is MatchStatus.TOO_FEW_POINTS
+    np.testing.assert_allclose(result.pose, [1.0, 2.0, 0.0], atol=1e-9)
+
+
+def test_a_wall_lets_it_slide_and_it_does_not_notice():
+    """What the thesis's matcher lacks: it accepts a place along a wall of which it knows nothing."""
+    scan = scan_of(wall((-10, 5), (10, 5)), still())
+    result = match(scan, map_of(wall((-20, 5), (20, 5))), [3.0, 0.0, 0.0])
+    assert result.accepted
+    assert abs(result.pose[0]) > 1.0
