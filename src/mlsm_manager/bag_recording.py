@@ -1,5 +1,6 @@
 """Reads what map_bag needs from a bag, without a master."""
 
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, List, Optional, Tuple
@@ -124,10 +125,8 @@ def _beam(message: Any) -> Optional[Beam]:
 def _take_velocity(motion: Motion, message: Any) -> None:
     twist = message if isinstance(message, Twist) or hasattr(message, "linear") else message.twist
     linear, angular = twist.linear, twist.angular
-    try:
+    with suppress(RefusedInput):
         motion.take((linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
-    except RefusedInput:
-        pass
 
 
 def _matrix(buffer: tf2_py.BufferCore, target: str, source: str, stamp_ns: int) -> Tuple[Optional[np.ndarray], str]:

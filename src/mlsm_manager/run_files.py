@@ -60,7 +60,7 @@ def trajectory_csv(run: Run) -> str:
     for poses in run.poses.values():
         columns += [poses[:, :2], wrapped(poses[:, 2:])]
     rows = np.concatenate(columns, axis=1)
-    lines = [",".join(["%.6f" % row[0]] + ["%.4f" % value for value in row[1:]]) for row in rows]
+    lines = [",".join([f"{row[0]:.6f}", *(f"{value:.4f}" for value in row[1:])]) for row in rows]
     return "\n".join([",".join(header), *lines]) + "\n"
 
 

@@ -36,7 +36,8 @@ def calibrated(scans: List[Scan], parameters: ReplayParameters, held: Collection
     model = parameters.sensor_model()
     if "edge_half_width" not in held:
         model = model.changed({"edge_half_width": half_width_of(scans)})
-    matcher = parameters.changed(model.to_mapping()).build_matcher()
+    # A fit that takes the scale of its ranges for unknown would not show it.
+    matcher = parameters.changed({**model.to_mapping(), "range_scale_deviation": 0.0}).build_matcher()
     calibrator = Calibrator(matcher, parameters.part(OdometryErrors), parameters.match_resolution)
     return parameters.changed(calibrator.calibrated(scans, model, held).to_mapping())
 
@@ -101,7 +102,7 @@ class Calibrator:
         return Estimate(raw.value + min(share, 1.0), raw.deviation, raw.pairs)
 
     def _share_of_sonar(self, found: Estimate) -> float:
-        """Return what the sonar must answer for of a disagreement in scale, the odometry's scale being uncertain too."""
+        """Return what of a disagreement in scale is the sonar's, the odometry's scale being uncertain too."""
         value = found.shrunk(float(np.hypot(_RANGE_SCALE_DEVIATION, self.errors.scale_deviation)))
         return value * _RANGE_SCALE_DEVIATION**2 / (_RANGE_SCALE_DEVIATION**2 + self.errors.scale_deviation**2)
 
