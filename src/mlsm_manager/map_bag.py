@@ -29,7 +29,7 @@ def run_map_bag() -> None:
     except OSError as error:
         sys.exit(f"map_bag: {error.filename or 'output'}: {error.strerror or error}")
     except KeyboardInterrupt:
-        sys.exit("map_bag: interrupted; nothing was written")
+        sys.exit("map_bag: interrupted")
     print("\n".join(_told(summary, options)))
 
 
@@ -38,6 +38,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     start = time.monotonic()
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
     recording = read_recording(options.bag, names)
+    options.out.mkdir(parents=True, exist_ok=True)
     scans = _scans(recording, options)
     parameters = _calibrated(scans, options)
     replayed = _replayed(recording, scans, parameters)

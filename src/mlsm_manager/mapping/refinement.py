@@ -21,7 +21,10 @@ _HEADING_LASTS = 300.0
 
 @dataclass(frozen=True)
 class Refined:
-    """poses: (m, 3) T_map_base at the recording's odometry times. blocks: of the map made anew. loops: edges used."""
+    """poses: (m, 3) T_map_base at the recording's odometry times. blocks: of the map made anew.
+
+    edges: how many matches of keyframes with others were used.
+    """
 
     poses: np.ndarray
     blocks: Blocks
@@ -32,6 +35,8 @@ def refine(recording: Recording, replayed: Replayed, on_match: Callable[[int], N
     """Return the run smoothed over all its scans; the causal run is the seed."""
     mapper = replayed.mapper
     keyframes = keyframes_of(replayed.updates)
+    if len(keyframes) < 2:
+        return Refined(replayed.corrected, mapper.shown.blocks, 0)
     poses = np.array([keyframe.pose for keyframe in keyframes])
     motion = replayed.updates[-1].belief.theta[6:]
     matching = ScanMatching(mapper.matcher, mapper.errors, mapper.settings.match_resolution, motion)
