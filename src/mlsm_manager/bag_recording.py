@@ -57,7 +57,11 @@ def _read(bag: rosbag.Bag, path: Path, names: BagNames) -> Recording:
     for topic in [names.beams, *([names.truth] if names.truth else [])]:
         if topic not in topics:
             raise RecordingError(f"{path}: no topic {topic}; there are {', '.join(sorted(topics)) or 'none at all'}")
+    if not any(topic in topics for topic in _TF_TOPICS):
+        raise RecordingError(f"{path}: no /tf, so nothing tells where the beams were taken; there are {', '.join(topics)}")
     buffer, stamps = _transforms(bag)
+    if not stamps.size:
+        stamps = _beam_stamps(bag, names.beams)
     track = _track(buffer, stamps, path, names)
     beams, unplaced = _beams(bag, buffer, path, names)
     return Recording(beams, unplaced, track, _truth(bag, names.truth, path) if names.truth else None)
@@ -81,8 +85,14 @@ def _transforms(bag: rosbag.Bag) -> Tuple[tf2_py.BufferCore, np.ndarray]:
     return buffer, np.array(sorted(stamps), dtype=np.int64)
 
 
+def _beam_stamps(bag: rosbag.Bag, topic: str) -> np.ndarray:
+    """Return when the beams were taken, ns: a vehicle that never moves may have static transforms only."""
+    stamps = {message.header.stamp.to_nsec() for _, message in _messages(bag, topic)}
+    return np.array(sorted(stamps), dtype=np.int64)
+
+
 def _track(buffer: tf2_py.BufferCore, stamps: np.ndarray, path: Path, names: BagNames) -> Track:
-    times, poses, reason = [], [], "the bag has no /tf"
+    times, poses, reason = [], [], "no stamps"
     for stamp in stamps:
         matrix, reason = _matrix(buffer, names.odom_frame, names.base_frame, int(stamp))
         if matrix is not None:

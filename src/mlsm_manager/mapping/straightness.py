@@ -18,7 +18,7 @@ _RANGE_NOISE = 0.1
 _HALF_WIDTHS = np.linspace(0.0, 0.12, 9)
 _MOST_SCANS = 30
 _FEWEST_SCANS = 5
-_SURE = 3.0
+_SURE = 2.0
 
 
 def half_width_of(scans: List[Scan]) -> float:
