@@ -58,7 +58,9 @@ def _read(bag: rosbag.Bag, path: Path, names: BagNames) -> Recording:
         if topic not in topics:
             raise RecordingError(f"{path}: no topic {topic}; there are {', '.join(sorted(topics)) or 'none at all'}")
     if not any(topic in topics for topic in _TF_TOPICS):
-        raise RecordingError(f"{path}: no /tf, so nothing tells where the beams were taken; there are {', '.join(topics)}")
+        raise RecordingError(
+            f"{path}: no /tf, so nothing tells where the beams were taken; there are {', '.join(topics)}"
+        )
     buffer, stamps = _transforms(bag)
     if not stamps.size:
         stamps = _beam_stamps(bag, names.beams)

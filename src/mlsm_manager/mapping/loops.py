@@ -1,11 +1,10 @@
-"""Measures keyframes against each other: each against those before it, and against earlier ones of the same place."""
+"""Matches keyframes with each other: each with some before it, and with earlier ones of the same place."""
 
 from dataclasses import dataclass
 from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.blocks import Blocks
 from mlsm_manager.mapping.keyframes import Keyframe
 from mlsm_manager.mapping.pose_graph import RelativePoses
 from mlsm_manager.matching.matcher import Matcher
@@ -14,18 +13,22 @@ from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.result import MatchResult, Prior
 from mlsm_manager.mlsm import MultiLevelSurfaceMap
 
-_SUBMAP = 8
+_LAGS = (1, 2, 4, 7, 11)
 _LOOP_AGE = 12
-_LOOP_REACH = 30.0
-_LOOP_EVERY = 2
+_LOOPS = 2
+_LOOPS_APART = 3
+_REACH = 30.0
 _LEAST_INFORMATION = 1e-9
 _PLACE_DEVIATION = 1.0
 _HEADING_DEVIATION = 0.0175
 
+_Edge = Tuple[int, int, np.ndarray, np.ndarray]
+"""First and second keyframe, T_first_second (3,), and its information (3, 3)."""
+
 
 @dataclass(frozen=True)
 class ScanMatching:
-    """How keyframes are matched. resolution: of the submaps, m. motion: (2,) lasting errors of the odometry."""
+    """How keyframes are matched. resolution: of the target, m. motion: (2,) lasting errors of the odometry."""
 
     matcher: Matcher
     errors: OdometryErrors
@@ -37,44 +40,49 @@ def scan_edges(
     keyframes: List[Keyframe], poses: np.ndarray, matching: ScanMatching, on_match: Callable[[int], None]
 ) -> RelativePoses:
     """Return the edges that matching finds; `on_match` is called with 1 for every keyframe that is done."""
-    found: List[Tuple[int, int, np.ndarray, np.ndarray]] = []
+    found: List[_Edge] = []
     for index in range(1, len(keyframes)):
-        groups = [np.arange(max(index - _SUBMAP, 0), index)]
-        if index % _LOOP_EVERY == 0:
-            groups.append(revisited(poses, index))
-        for group in groups:
-            edge = _edge(keyframes, poses, index, group, matching) if len(group) else None
+        for other in partners(poses, index):
+            edge = _edge(keyframes, poses, other, index, matching)
             if edge is not None:
                 found.append(edge)
         on_match(1)
     return _joined(found)
 
 
-def revisited(poses: np.ndarray, index: int) -> np.ndarray:
-    """Return the earlier keyframes (at most eight, nearest first) near keyframe `index` that are not its predecessors.
+def partners(poses: np.ndarray, index: int) -> List[int]:
+    """Return the earlier keyframes that keyframe `index` is matched with: some just before it, and of its place.
 
-    poses: (k, 3). Nearest first, none if fewer than three are within 30 m.
+    poses: (k, 3). The one just before always is; the others only within 30 m.
     """
-    earlier = poses[: max(index - _LOOP_AGE, 0), :2]
-    distance = np.hypot(*(earlier - poses[index, :2]).T)
-    near = np.argsort(distance)[:_SUBMAP]
-    near = near[distance[near] < _LOOP_REACH]
-    return near if len(near) >= 3 else near[:0]
+    distance = np.hypot(*(poses[:index, :2] - poses[index, :2]).T)
+    before = [index - lag for lag in _LAGS if lag <= index and (lag == 1 or distance[index - lag] < _REACH)]
+    return before + _revisited(distance[: max(index - _LOOP_AGE, 0)])
+
+
+def _revisited(distance: np.ndarray) -> List[int]:
+    found: List[int] = []
+    for other in np.argsort(distance):
+        if distance[other] > _REACH or len(found) == _LOOPS:
+            break
+        if all(abs(int(other) - known) > _LOOPS_APART for known in found):
+            found.append(int(other))
+    return found
 
 
 def _edge(
-    keyframes: List[Keyframe], poses: np.ndarray, index: int, group: np.ndarray, matching: ScanMatching
-) -> Optional[Tuple[int, int, np.ndarray, np.ndarray]]:
-    anchor = int(group[np.argmin(np.abs(group - index))])
-    prior = _prior(keyframes[index], poses[index], matching)
-    result = matching.matcher.match(keyframes[index].scan, _submap(keyframes, poses, group, matching), prior)
+    keyframes: List[Keyframe], poses: np.ndarray, first: int, second: int, matching: ScanMatching
+) -> Optional[_Edge]:
+    surfaces = MultiLevelSurfaceMap(matching.resolution)
+    surfaces.insert(transformed(poses[first], keyframes[first].seen))
+    prior = _prior(keyframes[second], poses[second], matching)
+    result = matching.matcher.match(keyframes[second].scan, surfaces.blocks, prior)
     if not result.accepted:
         return None
-    pose, information = measured_alone(result, poses[index], prior.covariance[:3, :3])
-    relative = composed(inverse(poses[anchor]), pose)
+    pose, information = measured_alone(result, poses[second], prior.covariance[:3, :3])
     turn = np.eye(3)
-    turn[:2, :2] = rotated(np.eye(2), -poses[anchor, 2]).T
-    return anchor, index, relative, turn @ information @ turn.T
+    turn[:2, :2] = rotated(np.eye(2), -poses[first, 2]).T
+    return first, second, composed(inverse(poses[first]), pose), turn @ information @ turn.T
 
 
 def _prior(keyframe: Keyframe, pose: np.ndarray, matching: ScanMatching) -> Prior:
@@ -83,12 +91,6 @@ def _prior(keyframe: Keyframe, pose: np.ndarray, matching: ScanMatching) -> Prio
     covariance[6:, 6:] *= 0.1
     correction = composed(pose, inverse(keyframe.scan.reference_pose))
     return Prior(correction, np.zeros(3), matching.motion, covariance)
-
-
-def _submap(keyframes: List[Keyframe], poses: np.ndarray, group: np.ndarray, matching: ScanMatching) -> Blocks:
-    surfaces = MultiLevelSurfaceMap(matching.resolution)
-    surfaces.insert(np.concatenate([transformed(poses[one], keyframes[one].seen) for one in group]))
-    return surfaces.blocks
 
 
 def measured_alone(
@@ -111,7 +113,7 @@ def measured_alone(
     return expected + offset, information
 
 
-def _joined(found: List[Tuple[int, int, np.ndarray, np.ndarray]]) -> RelativePoses:
+def _joined(found: List[_Edge]) -> RelativePoses:
     count = len(found)
     return RelativePoses(
         np.array([edge[0] for edge in found], dtype=np.int64),

@@ -5,7 +5,9 @@ import numpy as np
 from mlsm_manager.matching.planar import rotated
 from mlsm_manager.matching.scan import Scan, Track
 
-_WALLS = np.array([[-20, 0], [-16, 6], [-9, 11], [50, -1], [90, -9], [120, -9], [123, -40], [80, -53], [10, -68]], float)
+_WALLS = np.array(
+    [[-20, 0], [-16, 6], [-9, 11], [50, -1], [90, -9], [120, -9], [123, -40], [80, -53], [10, -68]], dtype=float
+)
 _JETTIES = np.array([[-12, -2, -3, -29], [-18, -33, -4, -54], [-4, -54, 14, -53], [14, -53, 23, -86]], float)
 _SEGMENTS = np.vstack([np.hstack([_WALLS[:-1], _WALLS[1:]]), _JETTIES])
 _TURN_SECONDS = 13.8
@@ -19,17 +21,18 @@ def path(seconds=400.0):
     times = np.arange(0.0, seconds, 0.1)
     yaw = -0.25 + 0.5 * np.sin(times / 17.0)
     steps = 0.2 * 0.1 * np.column_stack([np.cos(yaw), np.sin(yaw)])
-    return Track(times, np.column_stack([np.cumsum(steps, axis=0) + [2.0, -5.0], yaw]))
+    return Track(times, np.column_stack([np.array([2.0, -5.0]) + np.cumsum(steps, axis=0), yaw]))
 
 
-def heard(true, half_width=0.0, delay=0.0, range_scale=1.0, wander=0.0, seed=0):
+def heard(true, half_width=0.0, delay=0.0, range_scale=1.0, wander=0.0, direction=0.0, seed=0):
     """Return the scans of a vehicle on the track `true`.
 
     half_width: rad, to each side of the beam's axis. delay: s, by which the beams' stamps are early. range_scale: true
-    ranges over those that are heard. wander: m/sqrt(s), random walk of the odometry.
+    ranges over those that are heard. wander: m/sqrt(s), random walk of the odometry. direction: rad, by which its ways
+    are turned.
     """
     random = np.random.default_rng(seed)
-    odometry = _wandering(true, wander, random)
+    odometry = _erring(true, wander, direction, random)
     stamps = np.arange(true.times[0] + 1.0, true.times[-1] - 2.0, _TURN_SECONDS / _BEAMS)
     bearing = np.radians(360.0 / _BEAMS) * np.arange(len(stamps))
     ranges = np.full(len(stamps), np.inf)
@@ -50,10 +53,11 @@ def _scan(beams, stamps, bearing, ranges, odometry, end):
     return Scan(points, stamps[beams], np.ones(len(beams), dtype=bool), odometry, end)
 
 
-def _wandering(true, wander, random):
+def _erring(true, wander, direction, random):
     steps = wander * np.sqrt(np.diff(true.times))[:, np.newaxis] * random.normal(size=(len(true.times) - 1, 2))
     poses = true.poses.copy()
-    poses[1:, :2] += np.cumsum(steps, axis=0)
+    steps += rotated(np.diff(true.poses[:, :2], axis=0), direction)
+    poses[1:, :2] = poses[0, :2] + np.cumsum(steps, axis=0)
     return Track(true.times, poses)
 
 

@@ -11,7 +11,7 @@ AHEAD = np.column_stack([TIMES, np.zeros(11)])
 
 
 def test_a_shifted_truth_is_no_error():
-    error = position_error(TIMES, AHEAD, Truth(TIMES, AHEAD + [100.0, -50.0]))
+    error = position_error(TIMES, AHEAD, Truth(TIMES, AHEAD + np.array([100.0, -50.0])))
     assert (error.mean, error.max) == (0.0, 0.0)
 
 
