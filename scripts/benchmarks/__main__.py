@@ -3,11 +3,12 @@
 import argparse
 from typing import Callable, Dict, List
 
-from benchmarks import map_figures, matching_figures, processing_figures, shape_figures, survey_figures
+from benchmarks import map_figures, marina_figures, matching_figures, processing_figures, shape_figures, survey_figures
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map": map_figures.rows,
+    "marina": marina_figures.rows,
     "matching": matching_figures.rows,
     "processing": processing_figures.rows,
     "shapes": shape_figures.rows,

@@ -1,4 +1,8 @@
-"""Matches keyframes with each other: each with some before it, and with earlier ones of the same place."""
+"""Matches keyframes with each other: each with some before it, and with earlier ones of the same place.
+
+What a keyframe is matched with is an earlier one and its two neighbours: a single scan has gaps, and many together hide
+how they lie to each other.
+"""
 
 from dataclasses import dataclass
 from typing import Callable, List, Optional, Tuple
@@ -13,8 +17,9 @@ from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.result import MatchResult, Prior
 from mlsm_manager.mlsm import MultiLevelSurfaceMap
 
-_LAGS = (1, 2, 4, 7, 11)
-_LOOP_AGE = 12
+_LAGS = (2, 5, 9, 14)
+_BESIDE = 1
+_LOOP_AGE = 15
 _LOOPS = 2
 _LOOPS_APART = 3
 _REACH = 30.0
@@ -51,13 +56,15 @@ def scan_edges(
 
 
 def partners(poses: np.ndarray, index: int) -> List[int]:
-    """Return the earlier keyframes that keyframe `index` is matched with: some just before it, and of its place.
+    """Return the earlier keyframes around which keyframe `index` is matched: some before it, and of its place.
 
-    poses: (k, 3). The one just before always is; the others only within 30 m.
+    poses: (k, 3). The first of them always is; the others only within 30 m.
     """
+    if index == 0:
+        return []
     distance = np.hypot(*(poses[:index, :2] - poses[index, :2]).T)
-    before = [index - lag for lag in _LAGS if lag <= index and (lag == 1 or distance[index - lag] < _REACH)]
-    return before + _revisited(distance[: max(index - _LOOP_AGE, 0)])
+    before = [index - lag for lag in _LAGS[1:] if lag <= index and distance[index - lag] < _REACH]
+    return [max(index - _LAGS[0], 0), *before, *_revisited(distance[: max(index - _LOOP_AGE, 0)])]
 
 
 def _revisited(distance: np.ndarray) -> List[int]:
@@ -74,7 +81,8 @@ def _edge(
     keyframes: List[Keyframe], poses: np.ndarray, first: int, second: int, matching: ScanMatching
 ) -> Optional[_Edge]:
     surfaces = MultiLevelSurfaceMap(matching.resolution)
-    surfaces.insert(transformed(poses[first], keyframes[first].seen))
+    for one in range(max(first - _BESIDE, 0), min(first + _BESIDE + 1, second)):
+        surfaces.insert(transformed(poses[one], keyframes[one].seen))
     prior = _prior(keyframes[second], poses[second], matching)
     result = matching.matcher.match(keyframes[second].scan, surfaces.blocks, prior)
     if not result.accepted:

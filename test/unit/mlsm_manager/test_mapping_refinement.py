@@ -45,8 +45,9 @@ def test_a_keyframe_is_matched_with_some_before_it_and_with_earlier_ones_of_its_
     out, back = np.arange(30.0), np.arange(29.0, -1.0, -1.0)
     poses = np.column_stack([np.append(out, back) * 5.0, np.zeros((60, 2))])
     assert partners(poses, 0) == []
-    assert partners(poses, 10) == [9, 8, 6]
-    assert partners(poses, 59) == [58, 57, 55, 0, 4]
+    assert partners(poses, 1) == [0]
+    assert partners(poses, 10) == [8, 5]
+    assert partners(poses, 59) == [57, 54, 0, 4]
 
 
 def test_points_alone_are_what_is_left_of_a_fit_without_its_prior():
