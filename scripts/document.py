@@ -21,8 +21,10 @@ from sonar_processing.polar_image import SonarImageParameters
 from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
 from sonar_processing.threshold import ThresholderParameters
 from sonar_processing.tilt_scan import SonarControlParameters
-from sonar_simulator.default_yaml import GROUPS, simulator_yaml
+from sonar_simulator.default_yaml import gazebo_sonar_yaml, simulator_yaml
+from sonar_simulator.gazebo_parameters import GazeboSonarParameters
 from sonar_simulator.simulation import SimulatorParameters
+from sonar_simulator.simulation_setup import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -58,6 +60,7 @@ def generated() -> Dict[Path, str]:
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, node.parameters) for name, node in LIVE_NODES.items()
     }
     texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
+    texts[ROOT / "yaml/gazebo_sonar_default.yaml"] = gazebo_sonar_yaml()
     texts.update({path: with_tables(path.read_text()) for path in DOCUMENTS})
     texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     return texts
@@ -77,8 +80,9 @@ def thesis_names() -> str:
 def with_tables(text: str) -> str:
     """Return the text with every block "<!-- parameters: NODE --> ... <!-- end -->" made anew."""
     tables = {name: markdown_table(node.parameters) for name, node in LIVE_NODES.items()}
-    tables["sonar_simulator"] = markdown_table(SimulatorParameters)
-    tables.update({f"sonar_simulator/{name}": markdown_table(group) for name, group in GROUPS.items()})
+    tables["sonar_simulator"] = markdown_table(SimulatorParameters, live=False)
+    tables["gazebo_sonar"] = markdown_table(GazeboSonarParameters, live=False)
+    tables.update({f"sonar_simulator/{name}": markdown_table(group, live=False) for name, group in GROUPS.items()})
     return _BLOCK.sub(lambda block: f"{block[1]}\n{tables[block[2]]}\n{block[3]}", text)
 
 

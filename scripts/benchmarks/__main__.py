@@ -3,7 +3,16 @@
 import argparse
 from typing import Callable, Dict, List
 
-from benchmarks import map_figures, marina_figures, matching_figures, processing_figures, shape_figures, survey_figures
+from benchmarks import (
+    map_figures,
+    marina_figures,
+    matching_figures,
+    processing_figures,
+    shape_figures,
+    simulation_figures,
+    survey_figures,
+    vehicle_figures,
+)
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
@@ -11,6 +20,8 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "marina": marina_figures.rows,
     "matching": matching_figures.rows,
     "processing": processing_figures.rows,
+    "simulation": simulation_figures.rows,
+    "vehicle": vehicle_figures.rows,
     "shapes": shape_figures.rows,
     "survey": survey_figures.rows,
 }

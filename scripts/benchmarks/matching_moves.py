@@ -44,7 +44,7 @@ def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
 def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
     """Return (scans - 1, 5): accepted, distance [m] and angle [rad] from the truth, squared Mahalanobis distance, s.
 
-    Where a match was not accepted the pose is the one that was kept.
+    Where a match was not accepted, the pose is the one that the matcher offered.
     """
     kind = MATCHERS[name]
     mapper = Mapper(SETTINGS, ODOMETRY, kind.build(kind.parameters()))
@@ -54,7 +54,7 @@ def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
         update = mapper.take_echoes(scan)
         if update.result is None:
             continue
-        difference = update.belief.theta[:3] - true_path(np.array([scan.reference_time]))[0]
+        difference = update.result.pose - true_path(np.array([scan.reference_time]))[0]
         squared = difference @ np.linalg.solve(update.belief.covariance[:3, :3], difference)
         distance = np.hypot(*difference[:2])
         rows.append([update.accepted, distance, abs(difference[2]), squared, update.result.seconds])

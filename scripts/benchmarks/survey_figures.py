@@ -40,7 +40,7 @@ class Survey:
         """`changes`: of the head's parameters in yaml/sonar_simulator_survey.yaml."""
         settings = yaml.safe_load((ROOT / "yaml/sonar_simulator_survey.yaml").read_text())
         parameters = SonarParameters.from_mapping({**settings["sonar"], **changes})
-        model = make_echo_model("laser_cone", settings["echo"])
+        model = make_echo_model("laser_cone", settings["laser_cone"])
         self._sonar = Sonar(RayCaster(WORLD), parameters.pattern(), model, np.random.default_rng(1))
         self._head = SonarHead(parameters.beams_per_turn, parameters.seconds_per_turn)
         self._servo = Servo(ServoParameters())

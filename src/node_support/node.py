@@ -14,6 +14,7 @@ from node_support.parameters import ParameterError
 from node_support.refused_input import RefusedInput
 
 DIAGNOSTICS_PERIOD = 1.0
+_SPIN_STEP = 0.05
 
 
 class StartError(Exception):
@@ -38,11 +39,13 @@ def run(name: str, construct: Callable[[], Any]) -> None:
 
 
 def _spin() -> None:
-    """Wait for the end; rospy.spin notices it up to half a second late, and roslaunch ends nodes one by one."""
-    ended = threading.Event()
-    rospy.on_shutdown(ended.set)
-    while not (ended.is_set() or rospy.is_shutdown()):
-        ended.wait(1.0)
+    """Wait for the end; rospy.spin notices it up to half a second late, and roslaunch ends nodes one by one.
+
+    No threading.Event: the handler of Ctrl-C runs in this thread too, and would wait for ever for the Event's lock when
+    it comes while this thread holds it.
+    """
+    while not rospy.is_shutdown():
+        time.sleep(_SPIN_STEP)
 
 
 def make_health(name: str) -> Health:
@@ -61,7 +64,7 @@ def guarded(health: Health, callback: Callable[..., None]) -> Callable[..., None
         except rospy.ROSInterruptException:
             pass
         except Exception as error:
-            if rospy.is_shutdown():
+            if rospy.core.is_shutdown_requested():
                 return
             health.problem("internal errors", f"{type(error).__name__}: {error}; please report this")
             rospy.logerr_throttle(10.0, traceback.format_exc())

@@ -27,8 +27,11 @@ def yaml_keys(parameters: Type[ParameterSet], live: bool) -> List[str]:
     return lines
 
 
-def markdown_table(parameters: Type[ParameterSet]) -> str:
-    """Return the parameter table of a node: name, type, default, what is allowed, unit, thesis name, meaning."""
+def markdown_table(parameters: Type[ParameterSet], live: bool = True) -> str:
+    """Return the parameter table of a node: name, type, default, what is allowed, unit, thesis name, meaning.
+
+    `live` marks those that dynamic_reconfigure may change.
+    """
     rows = [
         "| parameter | type | default | allowed | unit | thesis | meaning |",
         "| --- | --- | --- | --- | --- | --- | --- |",
@@ -40,7 +43,7 @@ def markdown_table(parameters: Type[ParameterSet]) -> str:
         unit = described.unit
         if unit and allowed.endswith(f" {unit}"):
             allowed = allowed[: -len(unit) - 1]
-        star = " *" if described.tunable else ""
+        star = " *" if described.tunable and live else ""
         cells: List[str] = [
             f"`{field.name}`{star}", kind, f"`{_yaml_value(field.default)}`", allowed, unit, described.thesis_name,
             described.text,

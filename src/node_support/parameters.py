@@ -100,6 +100,16 @@ class ParameterSet:
                 raise ParameterError(f"{key} = {values[key]!r}: no such parameter; there are {', '.join(known)}")
         return cls(**values)
 
+    @classmethod
+    def from_group(cls: Type[Self], name: str, values: Any) -> Self:
+        """Build as `from_mapping` does from the keys of one group; what is wrong is told with the group's name."""
+        if not isinstance(values, Mapping):
+            raise ParameterError(f"{name} = {values!r}: must be keys and values")
+        try:
+            return cls.from_mapping(values)
+        except ParameterError as error:
+            raise ParameterError(f"{name}: {error}") from error
+
     def changed(self: Self, changes: Mapping[str, Any]) -> Self:
         """Return a copy with `changes` applied and everything validated again."""
         return type(self).from_mapping({**self.to_mapping(), **changes})

@@ -5,17 +5,26 @@ from typing import Any, Callable, Dict, Mapping, NamedTuple, Protocol, Type
 import numpy as np
 
 from node_support.parameters import ParameterError, ParameterSet
+from sonar_simulator.beam_pattern import BeamPattern, RayPattern
+from sonar_simulator.collision import Collision, CollisionParameters
+from sonar_simulator.contacts import Contacts
 from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
+from sonar_simulator.mirrors import Mirrors
+from sonar_simulator.physical import Physical, PhysicalParameters
 
 
 class EchoModel(Protocol):
-    """Turns ray distances into echo strengths."""
+    """Turns contacts into echo strengths, and says which rays it wants cast for that."""
 
     bins: int
     max_range: float
+    mirrors: Mirrors
 
-    def echoes(self, distances: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return strengths (..., bins) uint8 for ray distances (..., rays) in m, inf where nothing is hit."""
+    def pattern(self, fan: BeamPattern) -> RayPattern:
+        """Return the rays the model wants for a head whose beam is `fan`."""
+
+    def echoes(self, contacts: Contacts, rng: np.random.Generator) -> np.ndarray:
+        """Return strengths (beams, bins) uint8."""
 
 
 class EchoModelKind(NamedTuple):
@@ -27,6 +36,8 @@ class EchoModelKind(NamedTuple):
 
 ECHO_MODELS: Dict[str, EchoModelKind] = {
     "laser_cone": EchoModelKind(LaserConeParameters, LaserCone),
+    "collision": EchoModelKind(CollisionParameters, Collision),
+    "physical": EchoModelKind(PhysicalParameters, Physical),
 }
 
 

@@ -1,6 +1,7 @@
 """The executables of this package."""
 
 from node_support.node import DiagnosticsPublisher, run
+from sonar_simulator.gazebo_node import GazeboSonar
 from sonar_simulator.simulator_node import Simulator
 
 
@@ -12,3 +13,13 @@ def run_simulator() -> None:
         return simulator, DiagnosticsPublisher([simulator.health])
 
     run("sonar_simulator", construct)
+
+
+def run_gazebo_sonar() -> None:
+    """Run gazebo_sonar."""
+
+    def construct() -> tuple:
+        sonar = GazeboSonar()
+        return sonar, DiagnosticsPublisher([sonar.health])
+
+    run("gazebo_sonar", construct)

@@ -9,6 +9,7 @@ Mesh = Tuple[np.ndarray, np.ndarray]
 # The chords of a 64-gon lie at most 0.12 % of the radius inside the circle: less than a bin at any range.
 _SEGMENTS = 64
 _RINGS = 32
+_ENDLESS = 4000.0
 
 
 def box(x: float, y: float, z: float) -> Mesh:
@@ -30,8 +31,15 @@ def sphere(radius: float) -> Mesh:
     return _revolved(radius * np.sin(polar), -radius * np.cos(polar))
 
 
+def plane(x: float, y: float) -> Mesh:
+    """Return a rectangle across the z axis, m; one without end is cut off where no sonar hears it."""
+    half_x, half_y = min(x, _ENDLESS) / 2.0, min(y, _ENDLESS) / 2.0
+    corners = [[-half_x, -half_y, 0.0], [half_x, -half_y, 0.0], [half_x, half_y, 0.0], [-half_x, half_y, 0.0]]
+    return np.array(corners), _split(np.array([[0, 1, 2, 3]]))
+
+
 def _revolved(radii: np.ndarray, heights: np.ndarray) -> Mesh:
-    """Turn a profile about the z axis; on the axis triangles shrink to lines, which no ray hits."""
+    """Turn a profile about the z axis; triangles that shrink to lines on the axis are left out."""
     turn = np.arange(_SEGMENTS) * 2.0 * np.pi / _SEGMENTS
     rings = [
         np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(_SEGMENTS, height)])
@@ -40,12 +48,15 @@ def _revolved(radii: np.ndarray, heights: np.ndarray) -> Mesh:
     here = np.arange(_SEGMENTS)
     there = np.roll(here, -1)
     strip = np.column_stack([here, there, there + _SEGMENTS, here + _SEGMENTS])
-    quads = np.concatenate([strip + ring * _SEGMENTS for ring in range(len(radii) - 1)])
-    return np.concatenate(rings), _split(quads)
+    vertices = np.concatenate(rings)
+    faces = _split(np.concatenate([strip + ring * _SEGMENTS for ring in range(len(radii) - 1)]))
+    corners = vertices[faces]
+    areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    return vertices, faces[areas > 1e-9 * areas.max()]
 
 
 def _split(quads: np.ndarray) -> np.ndarray:
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]]).astype(np.int32)
 
 
-MESHES = {"box": box, "cylinder": cylinder, "sphere": sphere}
+MESHES = {"box": box, "cylinder": cylinder, "sphere": sphere, "plane": plane}

@@ -8,14 +8,14 @@ from genpy import Message
 from geometry_msgs.msg import Pose, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from sonar_processing.transforms import pose_from_matrix
 from sonar_simulator.simulation import Moment, Ping
+from sonar_simulator.simulation_setup import BASE_FRAME, SONAR_FRAME
 from underwater_map_construction.msg import SonarScanLine
 
-SONAR_FRAME = "sonar"
-BASE_FRAME = "base_link"
 ODOM_FRAME = "odom"
 WORLD_FRAME = "map"
 SERVO_JOINT = "sonar_servo_joint"
@@ -23,7 +23,7 @@ SERVO_JOINT = "sonar_servo_joint"
 TOPICS = {
     "/tf": TFMessage,
     "joint_states": JointState,
-    "cmd_vel": Twist,
+    "velocity": Twist,
     "odom": Odometry,
     "ground_truth": Odometry,
     "sonar/raw": SonarScanLine,
@@ -32,19 +32,34 @@ TOPICS = {
 
 
 def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List[Tuple[str, Message]]:
-    """Return (topic, message) pairs, the transform first and the beam last; max_range [m] is the sonar's."""
-    odom_pose = pose_from_matrix(moment.T_odom_base)
-    twist = _twist(moment.twist)
-    messages = [
+    """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
+
+    Transform and joint come with every moment, so that a beam can be placed at its own stamp; the rest comes with
+    ticks only, at the steady rate of an instrument.
+    """
+    messages = placing_messages(moment, stamp)
+    if moment.is_tick:
+        odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
+        velocity, true_velocity = _twist(moment.odometry.twist), _twist(moment.truth.twist)
+        true_pose = pose_from_matrix(moment.truth.T_world_base)
+        messages += [
+            ("velocity", velocity),
+            ("odom", _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
+            ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
+        ]
+    if moment.ping is not None:
+        header = Header(stamp=stamp, frame_id=SONAR_FRAME)
+        messages.append(("sonar/raw", scan_line(moment.ping, moment.tilt, header, max_range)))
+    return messages
+
+
+def placing_messages(moment: Moment, stamp: rospy.Time) -> List[Tuple[str, Message]]:
+    """Return the (topic, message) pairs that place vehicle and sonar, the transform first."""
+    odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
+    return [
         ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
         ("joint_states", joint_state(moment.tilt, stamp)),
-        ("cmd_vel", twist),
-        ("odom", _odometry(odom_pose, twist, stamp, ODOM_FRAME)),
-        ("ground_truth", _odometry(pose_from_matrix(moment.T_world_base), Twist(), stamp, WORLD_FRAME)),
     ]
-    if moment.ping is not None:
-        messages.append(("sonar/raw", _beam(moment.ping, moment.tilt, stamp, max_range)))
-    return messages
 
 
 def transform_message(pose: Pose, stamp: rospy.Time, parent: str, child: str) -> TransformStamped:
@@ -65,16 +80,16 @@ def joint_state(tilt: float, stamp: rospy.Time) -> JointState:
     return message
 
 
-def _beam(ping: Ping, tilt: float, stamp: rospy.Time, max_range: float) -> SonarScanLine:
-    message = SonarScanLine()
-    message.header.stamp = stamp
-    message.header.frame_id = SONAR_FRAME
-    message.angle = ping.angle
-    message.intensities = ping.strengths.tobytes()
-    message.maxrange_meters = max_range
-    message.range_resolution = max_range / len(ping.strengths)
-    message.sensorAngle = tilt
-    return message
+def scan_line(ping: Ping, tilt: float, header: Header, max_range: float) -> SonarScanLine:
+    """Return the message of a beam; `tilt` [rad] is that of the sonar's servo, `max_range` [m] the last bin's end."""
+    return SonarScanLine(
+        header=header,
+        angle=ping.angle,
+        intensities=ping.strengths.tobytes(),
+        maxrange_meters=max_range,
+        range_resolution=max_range / len(ping.strengths),
+        sensorAngle=tilt,
+    )
 
 
 def _twist(values: np.ndarray) -> Twist:

@@ -1,137 +1,121 @@
 """The simulator as a node: it is the clock, the odometry, tf and the sonar."""
 
+import itertools
 import math
-import os
 import threading
-import time
-from typing import Any, Callable, Dict
+from pathlib import Path
+from typing import Iterator
 
 import numpy as np
 import rospkg
 import rospy
-import tf2_ros
+from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64
 
 from node_support.node import guarded, make_health
 from node_support.parameters import ParameterError
-from node_support.refused_input import RefusedInput
-from sonar_processing.transforms import matrix_from_message
-from sonar_simulator.default_yaml import GROUPS
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.odometry import Odometry, OdometryParameters
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.script_file import load_script
-from sonar_simulator.sdf import WorldError, load_sdf
-from sonar_simulator.servo import Servo, ServoParameters
-from sonar_simulator.simulation import Simulation, SimulatorParameters
-from sonar_simulator.simulator_messages import BASE_FRAME, SONAR_FRAME
+from sonar_simulator.pace import Pace
+from sonar_simulator.robot_description import DescriptionError, RobotDescription
+from sonar_simulator.simulation import Drive, Moment
+from sonar_simulator.simulation_setup import PACKAGE, Settings, make_setup
 from sonar_simulator.simulator_publisher import SimulatorPublisher
-from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.vehicle import ScriptError
 
-PACKAGE = "underwater_map_construction"
 START_TIME = 1000.0
-MOUNT_TIMEOUT = 20.0
 _WAIT_STEP = 0.05
+_LISTENER_TIME = 0.5
 
 
 class Simulator:
-    """Runs a script against the wall clock, `real_time_factor` times as fast."""
+    """Runs a simulation against the wall clock, `real_time_factor` times as fast."""
 
     def __init__(self) -> None:
-        """Raises ParameterError when a parameter, the world or the script cannot be used."""
+        """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
-        values = dict(rospy.get_param("~", {}))
-        groups: Dict[str, Any] = {name: values.pop(name, {}) for name in GROUPS}
-        self._parameters = SimulatorParameters.from_mapping(values)
-        self._sonar_parameters = SonarParameters.from_mapping(groups["sonar"])
-        self._odometry_parameters = OdometryParameters.from_mapping(groups["odometry"])
-        model = make_echo_model(self._parameters.echo_model, groups["echo"])
-        rng = np.random.default_rng(self._parameters.seed)
-        self._script = _loaded(load_script, self._parameters.script)
-        self._sonar = Sonar(RayCaster(self._load_world()), self._sonar_parameters.pattern(), model, rng)
-        self._servo = Servo(ServoParameters.from_mapping(groups["servo"]))
-        self._publisher = SimulatorPublisher(self._sonar.max_range)
-        rospy.Subscriber("sonar_servo/command", Float64, guarded(self.health, self._take_servo_command), queue_size=10)
+        settings = Settings.from_mapping(rospy.get_param("~", {}))
+        folder = Path(rospkg.RosPack().get_path(PACKAGE))
+        self._parameters = settings.simulator
+        self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
+        self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive)
+        self._publisher.publish_world(self._setup.world)
         self._start_time = START_TIME
+        self._now = 0.0
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        rospy.on_shutdown(self._ended.set)
+        self._subscribe()
         threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
 
-    def _take_servo_command(self, command: Float64) -> None:
-        self._servo.command(command.data)
+    def _subscribe(self) -> None:
+        commands = {"sonar_servo/command": (Float64, self._take_servo_command)}
+        if self._parameters.drive is Drive.COMMANDS:
+            commands["cmd_vel"] = (Twist, self._take_velocity_command)
+        for topic, (kind, take) in commands.items():
+            rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=10, tcp_nodelay=True)
 
-    def _load_world(self) -> object:
-        loaded = _loaded(load_sdf, self._parameters.world)
-        for warning in loaded.warnings:
-            rospy.logwarn("%s", warning)
-        return loaded.world
+    def _take_servo_command(self, command: Float64) -> None:
+        with self._lock:
+            self._setup.servo.command(command.data)
+
+    def _take_velocity_command(self, command: Twist) -> None:
+        linear, angular = command.linear, command.angular
+        twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+        self.health.count("velocity commands")
+        with self._lock:
+            limited = self._setup.commanded.command(self._now, twist)
+        self.health.count("velocity commands limited", int(limited))
 
     def _run(self) -> None:
-        parameters, head = self._parameters, self._sonar_parameters
-        simulation = Simulation(
-            self._script,
-            Odometry(self._odometry_parameters, self._script.pose(0.0)),
-            self._sonar,
-            SonarHead(head.beams_per_turn, head.seconds_per_turn),
-            self._sonar_mount(),
-            self._servo,
-        )
-        if self._parameters.wait_for_listener:
-            self._wait(lambda: self._publisher.has_listener)
-        start = time.monotonic()
-        for moment in simulation.moments(parameters.clock_rate):
-            self._pace(start + moment.time / parameters.real_time_factor)
-            if rospy.core.is_shutdown_requested():
-                return
-            self._publisher.publish(moment, self._stamp(moment.time))
-            self._publisher.publish_progress(moment.time / simulation.duration)
-            self.health.count("moments")
-            self.health.count("beams out", int(moment.ping is not None))
+        if self._parameters.wait_for_listener and self._parameters.drive is Drive.SCRIPT:
+            self._wait_for_listener()
+        simulation, rate = self._setup.simulation, self._parameters.clock_rate
+        pace = Pace(self._parameters.real_time_factor, self._ended.wait)
+        moments = simulation.moments(rate)
+        while self._play(moments, pace):
+            self._publisher.publish_progress(self._now / simulation.duration)
         self._publisher.publish_progress(1.0)
-        self._stand_still(simulation, start)
+        rest = (simulation.moment(tick / rate) for tick in itertools.count(math.floor(self._now * rate) + 1))
+        while self._play(rest, pace):
+            pass
 
-    def _wait(self, ready: Callable[[], bool], timeout: float = math.inf) -> bool:
-        """Let the clock run until something is ready: robot_state_publisher, for one, stands still without it."""
-        deadline = time.monotonic() + timeout
-        while not ready() and time.monotonic() < deadline and not rospy.core.is_shutdown_requested():
-            time.sleep(_WAIT_STEP)
+    def _play(self, moments: Iterator[Moment], pace: Pace) -> bool:
+        """Publish the next moment when its time has come; return False when there is none or the node ends."""
+        with self._lock, self.health.timed():
+            moment = next(moments, None)
+        if moment is None or self._ended.is_set():
+            return False
+        self._keep_pace(moment, pace)
+        if self._ended.is_set():
+            return False
+        self._publisher.publish(moment, self._stamp(moment.time))
+        self._now = moment.time
+        self.health.count("moments")
+        self.health.count("beams out", int(moment.ping is not None))
+        return True
+
+    def _keep_pace(self, moment: Moment, pace: Pace) -> None:
+        lost = pace.lost
+        pace.wait_for(moment.time)
+        if pace.lost > lost:
+            factor = self._parameters.real_time_factor
+            detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with real_time_factor {factor:g}"
+            self.health.problem("delays", detail)
+
+    def _wait_for_listener(self) -> None:
+        """Let the clock run until somebody takes the beams, and until he has had time to learn of tf as well."""
+        start, waited = self._setup.simulation.moment(0.0), 0.0
+        while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
+            waited += _WAIT_STEP if self._publisher.has_listener else 0.0
+            self._publisher.publish_rest(start, rospy.Time.from_sec(self._start_time))
             self._start_time += _WAIT_STEP
-            self._publisher.publish_rest(rospy.Time.from_sec(self._start_time))
-        return ready()
-
-    def _sonar_mount(self) -> np.ndarray:
-        """Return T_base_sonar as the robot's description gives it, with the servo at 0."""
-        buffer = tf2_ros.Buffer(debug=False)
-        listener = tf2_ros.TransformListener(buffer)
-        if not self._wait(lambda: buffer.can_transform_core(BASE_FRAME, SONAR_FRAME, rospy.Time(0))[0], MOUNT_TIMEOUT):
-            raise RefusedInput(
-                "robots without sonar", f"tf knows no {SONAR_FRAME} on {BASE_FRAME}; see robot_description"
-            )
-        transform = buffer.lookup_transform_core(BASE_FRAME, SONAR_FRAME, rospy.Time(0)).transform
-        listener.unregister()
-        return matrix_from_message(transform)
-
-    def _stand_still(self, simulation: Simulation, start: float) -> None:
-        rate, factor = self._parameters.clock_rate, self._parameters.real_time_factor
-        tick = int(simulation.duration * rate) + 1
-        while not rospy.core.is_shutdown_requested():
-            self._pace(start + tick / rate / factor)
-            self._publisher.publish(simulation.moment(tick / rate), self._stamp(tick / rate))
-            tick += 1
 
     def _stamp(self, seconds: float) -> rospy.Time:
         return rospy.Time.from_sec(self._start_time + seconds)
 
-    def _pace(self, when: float) -> None:
-        behind = time.monotonic() - when
-        if behind > 1.0:
-            self.health.show("behind schedule [s]", f"{behind:.1f}")
-        elif behind < 0.0:
-            time.sleep(-behind)
 
-
-def _loaded(load: Any, path: str) -> Any:
-    absolute = os.path.join(rospkg.RosPack().get_path(PACKAGE), os.path.expanduser(path))
+def _robot() -> RobotDescription:
     try:
-        return load(absolute)
-    except (WorldError, ScriptError) as error:
+        return RobotDescription(rospy.get_param("robot_description"))
+    except KeyError as error:
+        raise ParameterError("robot_description is not set: it says where the sonar is mounted") from error
+    except DescriptionError as error:
         raise ParameterError(str(error)) from error

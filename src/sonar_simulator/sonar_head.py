@@ -7,18 +7,26 @@ import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.beam_pattern import BeamPattern
+from sonar_simulator.beam_tracer import BeamTracer
 from sonar_simulator.echo_model import EchoModel
 from sonar_simulator.ray_caster import RayCaster
+
+# Large enough for numpy, small enough for the cache.
+_BATCH = 120
 
 
 @dataclass(frozen=True)
 class SonarParameters(ParameterSet):
     """The head's timing and the shape of its beam."""
 
-    beams_per_turn: int = parameter(120, "beams in a full turn", low=1, high=3600, tunable=False)
+    beams_per_turn: int = parameter(
+        120, "beams in a full turn", low=1, high=3600, thesis_name="step = 360 / beams_per_turn", tunable=False
+    )
     seconds_per_turn: float = parameter(16.0, "time of a full turn", unit="s", low=0.01, high=3600.0, tunable=False)
-    vertical_opening_deg: float = parameter(22.0, "height of the beam", unit="deg", low=0.0, high=179.0)
-    horizontal_opening_deg: float = parameter(2.5, "width of the beam", unit="deg", low=0.0, high=360.0)
+    vertical_opening_deg: float = parameter(
+        22.0, "height of the beam", unit="deg", low=0.0, high=150.0, thesis_name="opening"
+    )
+    horizontal_opening_deg: float = parameter(2.5, "width of the beam", unit="deg", low=0.0, high=150.0)
     ray_rows: int = parameter(50, "rays over the height of a beam", low=1, high=1000)
     ray_columns: int = parameter(10, "rays over the width of a beam", low=1, high=1000)
 
@@ -51,8 +59,7 @@ class Sonar:
     """Hears a world. Same seed and calls, same bytes; a batch draws its random numbers in another order."""
 
     def __init__(self, caster: RayCaster, pattern: BeamPattern, model: EchoModel, rng: np.random.Generator) -> None:
-        self._caster = caster
-        self._pattern = pattern
+        self._tracer = BeamTracer(caster, model.pattern(pattern), model.mirrors)
         self._model = model
         self._rng = rng
 
@@ -71,8 +78,14 @@ class Sonar:
         return self.pings(T_world_sonar[np.newaxis], np.array([angle]))[0]
 
     def pings(self, T_world_sonar: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        """Return the strengths (beams, bins) uint8 at head `angles` (beams,) rad from poses (beams, 4, 4)."""
-        directions = self._pattern.directions(angles, self._rng) @ T_world_sonar[:, :3, :3].transpose(0, 2, 1)
-        origins = np.repeat(T_world_sonar[:, :3, 3], self._pattern.rays, axis=0)
-        distances = self._caster.distances(origins, directions.reshape(-1, 3))
-        return self._model.echoes(distances.reshape(len(angles), -1), self._rng)
+        """Return the strengths (beams, bins) uint8 at head `angles` (beams,) rad from poses (beams, 4, 4).
+
+        Any number of beams: they are taken in batches that fit into memory.
+        """
+        starts = range(0, len(angles), _BATCH)
+        batches = [self._batch(T_world_sonar[i : i + _BATCH], angles[i : i + _BATCH]) for i in starts]
+        return np.concatenate([np.empty((0, self._model.bins), dtype=np.uint8), *batches])
+
+    def _batch(self, T_world_sonar: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        contacts = self._tracer.contacts(T_world_sonar, angles, self._model.max_range, self._rng)
+        return self._model.echoes(contacts, self._rng)

@@ -2,11 +2,12 @@
 
 import math
 from dataclasses import dataclass
-from typing import Any, Mapping, Sequence, Tuple
+from typing import Any, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_simulator.motion import VehicleState
 from sonar_simulator.poses import pose_matrix
 
 # The greatest slope of the minimum-jerk law, reached half way: peak speed over mean speed.
@@ -73,10 +74,33 @@ class Wait(ParameterSet):
         return self.wait
 
 
+@dataclass(frozen=True)
+class Tilt(ParameterSet):
+    """One entry of a script: the sonar's servo turns from now on; the script goes on at once."""
+
+    tilt_deg: float = parameter(0.0, "angle of the servo, positive down", unit="deg", low=-180.0, high=180.0)
+
+    def displacement(self) -> np.ndarray:
+        """Return x, y, z [m] and yaw [rad] to go: none."""
+        return np.zeros(4)
+
+    def duration(self) -> float:
+        """Return the time it takes the vehicle, s: none."""
+        return 0.0
+
+
+class TiltCommand(NamedTuple):
+    """When the servo is told to turn, s since the script's start, and to which angle, rad."""
+
+    time: float
+    angle: float
+
+
 class VehicleScript:
     """Moves one after the other; each follows the minimum-jerk law, so the twist is continuous.
 
-    Before time 0 the vehicle stands at its start, after `duration` where the last move ended.
+    `start` is (4,) x, y, z [m], yaw [rad]; `tilt_commands` are in order of time. Before time 0 the vehicle stands at
+    its start, after `duration` where the last move ended.
     """
 
     def __init__(self, entries: Sequence[Any], start: np.ndarray) -> None:
@@ -84,10 +108,16 @@ class VehicleScript:
         self._durations = np.array([entry.duration() for entry in entries], dtype=np.float64)
         self._ends = np.cumsum(self._durations)
         self._origins = np.vstack([start, start + np.cumsum(self._displacements, axis=0)])
+        self.start = np.array(start, dtype=np.float64)
+        self.tilt_commands: List[TiltCommand] = [
+            TiltCommand(float(end), math.radians(entry.tilt_deg))
+            for entry, end in zip(entries, self._ends)
+            if isinstance(entry, Tilt)
+        ]
 
     @classmethod
     def from_yaml_data(cls, moves: Any, start: Any = None) -> "VehicleScript":
-        """Build from a list of mappings, keys as in `Move` or `Wait`, and a mapping with keys as in `Start`.
+        """Build from a list of mappings, keys as in `Move`, `Wait` or `Tilt`, and a mapping with keys as in `Start`.
 
         Raises ScriptError.
         """
@@ -101,6 +131,10 @@ class VehicleScript:
     def duration(self) -> float:
         """Time from the first move's start to the last one's end, s."""
         return float(self._ends[-1])
+
+    def state(self, time: float) -> VehicleState:
+        """Return the vehicle's state at `time` s, in any order of times."""
+        return VehicleState(self.pose(time), self.twist(time), self.is_still(time))
 
     def pose(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_world_base at `time` [s]; x forward, y left, z up."""
@@ -135,7 +169,8 @@ class VehicleScript:
 
 
 def _kind_of(values: Any) -> type:
-    return Wait if isinstance(values, Mapping) and "wait" in values else Move
+    keys = values if isinstance(values, Mapping) else ()
+    return Wait if "wait" in keys else Tilt if "tilt_deg" in keys else Move
 
 
 def _entry(kind: type, values: Any, name: str) -> Any:

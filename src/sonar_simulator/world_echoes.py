@@ -10,9 +10,10 @@ from sonar_simulator.beam_pattern import BeamPattern
 from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.poses import pose_matrix
 from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sdf import WorldError, load_sdf
 from sonar_simulator.sonar_head import Sonar, SonarParameters
 from sonar_simulator.world import World
+from sonar_simulator.world_error import WorldError
+from sonar_simulator.world_file import load_world
 
 _FULL_STRENGTH_DB = 20.0
 
@@ -65,7 +66,7 @@ class WorldEchoes:
 def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
     """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
     try:
-        world = load_sdf(parameters.world_file).world
+        world = load_world(parameters.world_file).world
     except WorldError as error:
         raise ParameterError(f"world_file: {error}") from error
     position = parameters.x, parameters.y, parameters.z

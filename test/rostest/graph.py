@@ -47,6 +47,15 @@ class Inbox:
         self.messages: List[Any] = []
         self._subscriber = rospy.Subscriber(topic, kind, self._take, queue_size=1000)
 
+    def wait_for_publisher(self, timeout: float = 20.0) -> None:
+        """Wait until a publisher is connected: what is published before that is lost."""
+        ended = threading.Event()
+        for _ in range(int(timeout / 0.05)):
+            if self._subscriber.get_num_connections():
+                return
+            ended.wait(0.05)
+        raise AssertionError(f"{self._topic}: no publisher after {timeout} s")
+
     def _take(self, message: Any) -> None:
         with self._condition:
             self.messages.append(message)

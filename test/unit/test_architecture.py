@@ -29,7 +29,10 @@ ROS_SIDE = {
         "shape_messages", "sonar_control", "sonar_image", "sonar_places", "sonar_to_cloud", "stage_runner",
         "transform_filter", "transforms", "turn_publisher", "velocity_subscriber",
     },
-    "sonar_simulator": {"nodes", "simulator_messages", "simulator_node", "simulator_publisher"},
+    "sonar_simulator": {
+        "bag_tool", "bag_writer", "gazebo_messages", "gazebo_node", "nodes", "simulator_messages", "simulator_node",
+        "simulator_publisher", "world_marker",
+    },
 }  # fmt: skip
 IMPORT_WITHOUT_ROS = """
 import importlib, sys

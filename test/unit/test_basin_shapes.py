@@ -24,7 +24,7 @@ _REMOVER = OutlierRemover(OutlierRemoverParameters())
 def test_walls_in_range_are_found_within_15_cm_and_1_degree(seed, spread):
     pose = anywhere(seed)
     lines = LineDetector(LineDetectorParameters())(_REMOVER(_THRESHOLDER(BasinScans(spread).scan(pose, seed))))
-    assert all(error.is_good for error in wall_errors(lines, pose)), (lines, pose)
+    assert all(error.is_good for error in wall_errors(lines, pose, 48.0)), (lines, pose)
 
 
 @pytest.mark.parametrize("seed", range(3))

@@ -10,7 +10,7 @@ from node_support.refused_input import RefusedInput
 
 @pytest.fixture
 def warnings(monkeypatch):
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: False)
+    monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: False)
     monkeypatch.setattr(rospy, "logerr_throttle", lambda period, text: None)
     return []
 
@@ -44,7 +44,7 @@ def test_an_exception_is_counted_as_an_internal_error_and_named(warnings):
 
 
 def test_an_exception_during_shutdown_is_nobodys_fault(warnings, monkeypatch):
-    monkeypatch.setattr(rospy, "is_shutdown", lambda: True)
+    monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: True)
     assert _called(warnings, OSError("closed")).values == {}
 
 

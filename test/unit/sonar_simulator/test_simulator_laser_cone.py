@@ -4,13 +4,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from node_support.parameters import ParameterError
+from sonar_simulator.contacts import Contacts
 from sonar_simulator.echo_model import make_echo_model
 
 NOISE_FREE = {"spread": 0.0, "noise_echoes": 0}
 
 
 def _echoes(distances, seed=0, **values):
-    return make_echo_model("laser_cone", values).echoes(np.array(distances), np.random.default_rng(seed))
+    beams = make_echo_model("laser_cone", values).echoes(Contacts.of_ranges(distances), np.random.default_rng(seed))
+    return beams[0] if np.ndim(distances) == 1 else beams
 
 
 @settings(derandomize=True, deadline=None)

@@ -4,12 +4,13 @@ import numpy as np
 import pytest
 
 from sonar_simulator.odometry import Odometry, OdometryParameters
+from sonar_simulator.ray_caster import RayCaster
 from sonar_simulator.script_file import load_script
-from sonar_simulator.sdf import load_sdf
 from sonar_simulator.vehicle import ScriptError
+from sonar_simulator.world_file import load_world
 
 ROOT = Path(__file__).resolve().parents[3]
-TOUR = load_script(ROOT / "yaml" / "basin_tour.yaml")
+TOURS = {name: load_script(ROOT / "yaml" / f"{name}_tour.yaml") for name in ("basin", "harbour", "tank")}
 THESIS = load_script(ROOT / "yaml" / "thesis_moves.yaml")
 
 
@@ -19,15 +20,28 @@ def _whole_still_turns(script):
     return [turn for turn in turns if all(script.is_still(time) for time in 16.0 * turn + np.linspace(0, 16, 121))]
 
 
-def test_the_tour_holds_twelve_still_scans():
-    assert _whole_still_turns(TOUR) == [3 * scan for scan in range(12)]
+@pytest.mark.parametrize(("name", "scans"), [("basin", 12), ("harbour", 10), ("tank", 4)])
+def test_every_third_scan_of_a_tour_is_still(name, scans):
+    assert _whole_still_turns(TOURS[name]) == [3 * scan for scan in range(scans)]
 
 
-def test_the_tour_keeps_2_m_away_from_everything_at_its_depth():
-    times = np.arange(0.0, TOUR.duration, 0.2)
-    path = np.array([TOUR.pose(time)[:2, 3] for time in times])
-    for outline in load_sdf(ROOT / "worlds" / "basin.sdf").world.outlines():
-        assert min(_distance_to_polyline(point, outline) for point in path) > 2.0
+@pytest.mark.parametrize(("name", "distance"), [("basin", 2.0), ("harbour", 2.0), ("tank", 0.8)])
+def test_a_tour_keeps_its_distance_from_everything(name, distance):
+    times = np.arange(0.0, TOURS[name].duration, 0.2)
+    path = np.array([TOURS[name].pose(time)[:2, 3] for time in times])
+    world = load_world(ROOT / "worlds" / f"{name}.sdf").world
+    for outline in world.outlines():
+        assert min(_distance_to_polyline(point, outline) for point in path) > distance
+
+
+@pytest.mark.parametrize("name", ["basin", "harbour", "tank"])
+def test_a_tour_stays_between_surface_and_bottom(name):
+    times = np.arange(0.0, TOURS[name].duration, 1.0)
+    path = np.array([TOURS[name].pose(time)[:3, 3] for time in times])
+    caster = RayCaster(load_world(ROOT / "worlds" / f"{name}.sdf").world)
+    below = caster.distances(path, np.tile([0.0, 0.0, -1.0], (len(path), 1)))
+    assert path[:, 2].max() < -0.5
+    assert below.min() > 0.6
 
 
 def _distance_to_polyline(point, outline):
@@ -36,8 +50,8 @@ def _distance_to_polyline(point, outline):
     return np.linalg.norm(start + share[:, np.newaxis] * along - point, axis=1).min()
 
 
-def test_the_tour_brings_every_part_of_every_wall_within_40_m_of_a_still_scan():
-    stops = np.array([TOUR.pose(48.0 * scan)[:2, 3] for scan in range(12)])
+def test_the_basins_tour_brings_every_part_of_every_wall_within_40_m_of_a_still_scan():
+    stops = np.array([TOURS["basin"].pose(48.0 * scan)[:2, 3] for scan in range(12)])
     around = np.arange(-60.0, 60.1, 1.0)
     across = np.arange(-25.0, 25.1, 1.0)
     walls = [(x, y) for x in around for y in (-25, 25)] + [(x, y) for y in across for x in (-60, 60)]
@@ -46,8 +60,9 @@ def test_the_tour_brings_every_part_of_every_wall_within_40_m_of_a_still_scan():
 
 def test_the_thesis_moves_are_4_3_and_minus_8_m_of_odometry():
     assert _whole_still_turns(THESIS) == [0, 2, 4, 6]
-    odometry = Odometry(OdometryParameters(scale_error=0.3), THESIS.pose(0.0))
-    stops = [odometry.pose(THESIS.pose(32.0 * scan))[:2, 3] for scan in range(4)]
+    odometry = Odometry(OdometryParameters(scale_error=0.3), THESIS.pose(0.0), np.random.default_rng(0))
+    times = 32.0 * np.arange(4)
+    stops = [odometry.estimate(time, THESIS.state(time)).T_odom_base[:2, 3] for time in times]
     np.testing.assert_allclose(stops, [(0, 0), (4, 0), (4, 3), (-4, 3)], atol=1e-12)
 
 

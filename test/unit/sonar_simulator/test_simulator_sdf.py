@@ -59,7 +59,7 @@ def test_a_link_without_collision_is_seen_by_its_visuals(load):
     assert [shape.kind for shape in load(_model(f'<visual name="v">{BALL}</visual>')).world.shapes] == ["sphere"]
 
 
-@pytest.mark.parametrize("geometry", ["plane", "mesh", "heightmap", "unheard_of"])
+@pytest.mark.parametrize("geometry", ["mesh", "heightmap", "polyline", "unheard_of"])
 def test_unsupported_geometry_is_one_warning_and_the_rest_loads(load, geometry):
     odd = f'<collision name="odd"><geometry><{geometry}/></geometry></collision>'
     loaded = load(_model(f'{odd}<collision name="c">{BOX}</collision>'))
@@ -126,8 +126,8 @@ def test_a_file_that_is_no_sdf_is_refused_with_its_path(tmp_path, text, reason):
 
 
 def test_a_world_without_shapes_is_refused_and_says_what_was_left_out(load):
-    with pytest.raises(WorldError, match=r"some\.sdf.*no box.*<plane>"):
-        load(_model('<collision name="c"><geometry><plane/></geometry></collision>'))
+    with pytest.raises(WorldError, match=r"some\.sdf.*no box.*<image>"):
+        load(_model('<collision name="c"><geometry><image/></geometry></collision>'))
 
 
 def test_the_basin_loads_without_warnings():

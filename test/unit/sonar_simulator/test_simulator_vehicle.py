@@ -5,7 +5,6 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonar_simulator.odometry import Odometry, OdometryParameters
 from sonar_simulator.poses import pose_matrix, yaw_of
 from sonar_simulator.vehicle import ScriptError, VehicleScript
 
@@ -64,6 +63,15 @@ def test_a_move_takes_the_seconds_asked_for():
     assert VehicleScript.from_yaml_data([{"x": 5.2, "seconds": 15.6}]).duration == 15.6
 
 
+def test_a_tilt_is_commanded_when_the_entries_before_it_are_done_and_takes_no_time():
+    script = VehicleScript.from_yaml_data(
+        [{"wait": 2.0}, {"tilt_deg": 30.0}, {"x": 1.0, "seconds": 3.0}, {"tilt_deg": 0}]
+    )
+    assert script.duration == 5.0
+    assert [(c.time, round(math.degrees(c.angle))) for c in script.tilt_commands] == [(2.0, 30), (5.0, 0)]
+    np.testing.assert_allclose(script.pose(5.0), pose_matrix((1.0, 0.0, -2.0)))
+
+
 def test_a_vehicle_is_still_while_it_waits_and_outside_the_script_only():
     assert [SCRIPT.is_still(time) for time in (-1.0, 0.0, 1.9, 2.0, 2.5)] == [True, True, True, False, False]
     assert [SCRIPT.is_still(SCRIPT.duration + late) for late in (-1.5, -0.5, 0.0, 9.0)] == [
@@ -97,27 +105,3 @@ def test_a_bad_entry_is_refused_with_its_number_key_and_what_is_allowed(moves, t
 def test_a_bad_start_is_refused():
     with pytest.raises(ScriptError, match="start: depth = 2"):
         VehicleScript.from_yaml_data(MOVES, {"depth": 2})
-
-
-START = pose_matrix((10.0, 5.0, -2.0), (0.0, 0.0, 0.4))
-
-
-def test_with_30_percent_error_4_m_of_odometry_are_5_2_m_of_way():
-    odometry = Odometry(OdometryParameters(scale_error=0.3), START)
-    there = pose_matrix((15.2, 5.0, -2.0), (0.0, 0.0, 1.0))
-    np.testing.assert_allclose(odometry.pose(there), pose_matrix((14.0, 5.0, -2.0), (0.0, 0.0, 1.0)))
-
-
-def test_odometry_agrees_with_the_world_at_the_start():
-    np.testing.assert_allclose(Odometry(OdometryParameters(), START).pose(START), START)
-
-
-def test_odometry_gives_velocities_off_by_its_error_and_true_turn_rates():
-    twist = Odometry(OdometryParameters(scale_error=0.25), START).twist(np.array([1.0, 0.5, 0.0, 0.0, 0.0, 0.2]))
-    np.testing.assert_allclose(twist, [0.8, 0.4, 0.0, 0.0, 0.0, 0.2])
-
-
-def test_asking_for_odometry_leaves_the_true_pose_alone():
-    there = pose_matrix((15.2, 5.0, -2.0))
-    Odometry(OdometryParameters(), START).pose(there)
-    np.testing.assert_array_equal(there, pose_matrix((15.2, 5.0, -2.0)))

@@ -1,0 +1,65 @@
+"""The tank of the real recording micron_static.bag, simulated, and how far the strengths of both are apart."""
+
+import os
+from pathlib import Path
+from typing import NamedTuple, Optional
+
+import numpy as np
+import rosbag
+import yaml
+
+from sonar_simulator.echo_model import make_echo_model
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.ray_caster import RayCaster
+from sonar_simulator.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world_file import load_world
+
+ROOT = Path(__file__).resolve().parents[2]
+# The range bands whose histograms are compared. Nearer than half a metre stands a part of the vehicle.
+BANDS = np.arange(0.5, 10.01, 0.5)
+BEAMS_PER_TURN = 200
+# Where the head stands in worlds/tank.sdf: its walls are built around the recording, its depth is fitted.
+HEAD_PLACE = pose_matrix((0.0, 0.0, -0.38), (0.0, 0.0, -0.126))
+
+
+class Beams(NamedTuple):
+    """Head angles (beams,) rad and strengths (beams, bins) uint8 of a sonar that stands still; bins end at 10 m."""
+
+    angles: np.ndarray
+    strengths: np.ndarray
+
+
+def recording() -> Optional[Beams]:
+    """Return the recorded beams, None where the recording is not."""
+    path = Path(os.environ.get("UMC_DATA", str(ROOT.parent / "shared/data"))) / "micron_static.bag"
+    if not path.is_file():
+        return None
+    with rosbag.Bag(str(path)) as bag:
+        messages = [message for _, message, _ in bag.read_messages(["/sonar/raw"])]
+    strengths = np.array([np.frombuffer(message.intensities, dtype=np.uint8) for message in messages])
+    return Beams(np.array([message.angle for message in messages]), strengths)
+
+
+def simulated(angles: np.ndarray, model_name: str = "physical", seed: int = 1) -> Beams:
+    """Return what a model hears in worlds/tank.sdf with the parameters of yaml/sonar_simulator_tank.yaml."""
+    parameters = yaml.safe_load((ROOT / "yaml/sonar_simulator_tank.yaml").read_text())
+    caster = RayCaster(load_world(ROOT / "worlds/tank.sdf").world)
+    model = make_echo_model(model_name, parameters[model_name])
+    sonar = Sonar(caster, SonarParameters(**parameters["sonar"]).pattern(), model, np.random.default_rng(seed))
+    return Beams(angles, sonar.pings(np.repeat(HEAD_PLACE[np.newaxis], len(angles), axis=0), angles))
+
+
+def distances(one: Beams, other: Beams) -> np.ndarray:
+    """Return the Kolmogorov-Smirnov distance of the strengths in each band of range, 0 (alike) to 1."""
+    edges = np.rint(BANDS * one.strengths.shape[1] / 10.0).astype(int)
+    return np.array(
+        [
+            np.abs(_shares(one.strengths[:, low:high]) - _shares(other.strengths[:, low:high])).max()
+            for low, high in zip(edges[:-1], edges[1:])
+        ]
+    )
+
+
+def _shares(strengths: np.ndarray) -> np.ndarray:
+    """Return the share of samples at or below each strength."""
+    return np.cumsum(np.bincount(strengths.ravel(), minlength=256)) / strengths.size

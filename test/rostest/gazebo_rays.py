@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""Ray scans of three types, from a sensor that sees the whole circle and from one that a joint turns, become beams."""
+
+import math
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+import tf2_ros
+from gazebo_scans import FULL_CIRCLE, block_laser, cloud2, header, laser_scan
+from geometry_msgs.msg import TransformStamped
+from graph import Diagnostics, Inbox, wait_for_publisher_links
+from sensor_msgs.msg import JointState, LaserScan, PointCloud, PointCloud2
+from std_msgs.msg import String
+
+from underwater_map_construction.msg import SonarScanLine
+
+PACKAGE = "underwater_map_construction"
+WALL = 12.0
+BEAM = math.radians(2.5)
+
+
+def _publisher(topic: str, kind: type) -> rospy.Publisher:
+    made = rospy.Publisher(topic, kind, queue_size=10)
+    wait_for_publisher_links(made, 1)
+    return made
+
+
+def _strongest(beam: SonarScanLine) -> float:
+    """Return the range of a beam's middle of strength, m."""
+    strengths = np.frombuffer(beam.intensities, dtype=np.uint8).astype(float)
+    return float(np.average(np.arange(len(strengths)) + 0.5, weights=strengths**2)) * beam.range_resolution
+
+
+class GazeboSonar(unittest.TestCase):
+    """The wall stands 12 m ahead."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Connect before the tests begin."""
+        cls.diagnostics = Diagnostics()
+        cls.swept, cls.turned = Inbox("/sonar/raw", SonarScanLine), Inbox("/turning/sonar/raw", SonarScanLine)
+        for inbox in (cls.swept, cls.turned):
+            inbox.wait_for_publisher()
+
+    def _beam_of(self, rays: rospy.Publisher, message: object) -> SonarScanLine:
+        rays.publish(message)
+        return self.swept.wait_for(lambda beam: beam.header.stamp == message.header.stamp)
+
+    def test_a_full_circle_of_each_type_gives_one_beam_after_the_other(self) -> None:
+        """The head steps by one beam with every scan, whatever its type."""
+        joints = _publisher("/joint_states", JointState)
+        joints.publish(JointState(name=["sonar_servo_joint"], position=[0.25]))
+        kinds = ((LaserScan, laser_scan), (PointCloud, block_laser), (PointCloud2, cloud2))
+        for number, (kind, make) in enumerate(kinds):
+            rays = _publisher("/sonar/rays", kind)
+            message = make(header(100.0 + number, "sonar"), FULL_CIRCLE, 721, WALL)
+            beam = self._beam_of(rays, message)
+            self.assertAlmostEqual(beam.angle, math.radians(3.0 * number), places=6)
+            self.assertAlmostEqual(_strongest(beam), WALL / math.cos(beam.angle), delta=0.6)
+            self.assertEqual((beam.header.frame_id, len(beam.intensities), beam.maxrange_meters), ("sonar", 500, 50.0))
+            self.assertAlmostEqual(beam.sensorAngle, 0.25, places=6)
+            rays.unregister()
+
+    def test_a_sensor_on_a_joint_gives_beams_where_tf_says_it_looks(self) -> None:
+        """Also when tf comes after the scan."""
+        rays = _publisher("/turning/sonar/rays", PointCloud)
+        rays.publish(block_laser(header(50.0, "sonar_head"), BEAM, 5, WALL))
+        turned = TransformStamped(header=header(0.0, "sonar"), child_frame_id="sonar_head")
+        turned.transform.rotation.z, turned.transform.rotation.w = math.sin(-0.6), math.cos(-0.6)
+        tf2_ros.StaticTransformBroadcaster().sendTransform(turned)
+        beam = self.turned.wait_for()
+        self.assertAlmostEqual(beam.angle, -1.2, places=6)
+        self.assertAlmostEqual(_strongest(beam), WALL, delta=0.5)
+        self.assertEqual((beam.header.frame_id, beam.header.stamp.to_sec()), ("sonar", 50.0))
+
+    def test_scans_that_cannot_be_used_are_counted_and_the_node_goes_on(self) -> None:
+        """Wrong types, cut arrays, NaN, and a pyramid where a circle is needed."""
+        scan = laser_scan(header(200.0, "sonar"), FULL_CIRCLE, 721, WALL)
+        cut = cloud2(header(201.0, "sonar"), FULL_CIRCLE, 721, WALL)
+        cut.data = cut.data[:-5]
+        nan = block_laser(header(202.0, "sonar"), FULL_CIRCLE, 721, WALL)
+        nan.points[3].x = math.nan
+        away = laser_scan(header(203.0, "sonar"), BEAM, 5, WALL)
+        away.angle_min, away.angle_max = 1.0, 1.0 + BEAM
+        bad = [(String, String("rays")), (LaserScan, LaserScan()), (PointCloud, PointCloud()), (PointCloud2, cut),
+               (PointCloud, nan), (LaserScan, away)]  # fmt: skip
+        for number, (kind, message) in enumerate(bad, 1):
+            rays = _publisher("/sonar/rays", kind)
+            rays.publish(message)
+            self.diagnostics.wait_for("gazebo_sonar", "scans refused", number)
+            rays.unregister()
+        self._beam_of(_publisher("/sonar/rays", LaserScan), scan)
+
+
+if __name__ == "__main__":
+    rospy.init_node("gazebo_rays_test")
+    rostest.rosrun(PACKAGE, "gazebo_rays", GazeboSonar, sys.argv)

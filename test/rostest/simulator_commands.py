@@ -1,0 +1,84 @@
+#!/usr/bin/env python3
+"""Velocity commands move the simulated vehicle, bad ones and none do not."""
+
+import math
+import signal
+import subprocess
+import sys
+import time
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import Twist
+from graph import Diagnostics, Inbox, wait_for_publisher_links
+from nav_msgs.msg import Odometry
+
+PACKAGE = "underwater_map_construction"
+
+
+def _command(surge: float = 0.0, sway: float = 0.0) -> Twist:
+    command = Twist()
+    command.linear.x, command.linear.y = surge, sway
+    return command
+
+
+class SimulatorCommands(unittest.TestCase):
+    """The vehicle starts where the tank's tour does, at (-2.5, 0.6)."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Connect before the tests begin."""
+        cls.truth, cls.diagnostics = Inbox("/ground_truth", Odometry), Diagnostics()
+        cls.commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
+        wait_for_publisher_links(cls.commands, 1)
+
+    def _drive(self, command: Twist, fits: object) -> Odometry:
+        """Repeat a command until the truth fits."""
+        repeating = rospy.Timer(rospy.Duration(0.1), lambda _: self.commands.publish(command))
+        try:
+            return self.truth.wait_for(fits)
+        finally:
+            repeating.shutdown()
+
+    def test_it_follows_commands_and_stops_when_they_cease(self) -> None:
+        """Half a second of simulated time after the last command it slows down."""
+        moving = self._drive(_command(0.4, 0.1), lambda m: m.pose.pose.position.x > -1.5)
+        self.assertAlmostEqual(moving.twist.twist.linear.x, 0.4, delta=0.05)
+        self.assertAlmostEqual(moving.twist.twist.linear.y, 0.1, delta=0.02)
+        still = self.truth.wait_for(lambda m: m.twist.twist.linear.x == 0.0)
+        self.assertLess((still.header.stamp - moving.header.stamp).to_sec(), 8.0)
+        self.assertLess(still.pose.pose.position.x, -0.5)
+
+    def test_bad_commands_are_counted_and_change_nothing(self) -> None:
+        """Neither NaN nor infinity reaches the pose."""
+        still = self.truth.wait_for(lambda m: m.twist.twist.linear.x == 0.0)
+        for bad in (math.nan, math.inf):
+            self.commands.publish(_command(bad))
+            self.diagnostics.wait_for("sonar_simulator", "velocity commands refused", 1)
+        self.diagnostics.wait_for("sonar_simulator", "velocity commands refused", 2)
+        later = self.truth.wait_for(lambda m: m.header.stamp > still.header.stamp + rospy.Duration(1.0))
+        self.assertEqual(later.pose.pose.position, still.pose.pose.position)
+
+    def test_commands_beyond_its_powers_are_limited_and_counted(self) -> None:
+        """The greatest speed is a parameter."""
+        fast = self._drive(_command(-9.0), lambda m: m.twist.twist.linear.x < -0.9)
+        self.assertGreaterEqual(fast.twist.twist.linear.x, -1.0)
+        self.diagnostics.wait_for("sonar_simulator", "velocity commands limited", 1)
+
+    def test_it_ends_within_two_seconds_of_ctrl_c(self) -> None:
+        """Also when its next moment is five seconds away."""
+        command = ["rosrun", PACKAGE, "sonar_simulator", "__ns:=/other", "_wait_for_listener:=false"]
+        others = ["robot_description:=/robot_description", "/clock:=/other_clock", "/tf:=/other_tf"]
+        process = subprocess.Popen([*command, "_real_time_factor:=0.01", *others])
+        self.addCleanup(process.kill)
+        Inbox("/other_clock", rospy.AnyMsg).wait_for()
+        start = time.monotonic()
+        process.send_signal(signal.SIGINT)
+        process.wait(10.0)
+        self.assertLess(time.monotonic() - start, 2.0)
+
+
+if __name__ == "__main__":
+    rospy.init_node("simulator_commands_test")
+    rostest.rosrun(PACKAGE, "simulator_commands", SimulatorCommands, sys.argv)

@@ -1,0 +1,48 @@
+#!/usr/bin/env python3
+"""The demo's graph: the simulated vehicle really moves 1.3 times what its odometry says."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import Diagnostics, Inbox
+from nav_msgs.msg import Odometry
+from std_msgs.msg import Float32
+from visualization_msgs.msg import Marker, MarkerArray
+
+PACKAGE = "underwater_map_construction"
+TRUE_STOPS = np.array([(5.2, 0.0), (5.2, 3.9), (-5.2, 3.9)])
+
+
+def _positions(inbox: Inbox) -> np.ndarray:
+    """Return stamps and positions as (n, 3): s, m, m."""
+    poses = [(m.header.stamp.to_sec(), m.pose.pose.position.x, m.pose.pose.position.y) for m in inbox.messages]
+    return np.array(poses)
+
+
+class SimulatorDemo(unittest.TestCase):
+    """One run, 112 s of simulated time."""
+
+    def test_the_demo_runs_as_configured(self) -> None:
+        """Truth follows the script, odometry errs by its parameter, beams become a map, the world is shown."""
+        truth, odometry = Inbox("/ground_truth", Odometry), Inbox("/odom", Odometry)
+        world, markers = Inbox("/sonar_simulator/world", Marker), Inbox("/MLSM/Markers", MarkerArray)
+        progress, diagnostics = Inbox("/sonar_simulator/progress", Float32), Diagnostics()
+        progress.wait_for(lambda message: message.data >= 1.0, timeout=45.0)
+        true, believed = _positions(truth), _positions(odometry)
+        stamps, where, there = np.intersect1d(true[:, 0], believed[:, 0], return_indices=True)
+        self.assertGreater(len(stamps), 1500)
+        np.testing.assert_allclose(true[where, 1:], 1.3 * believed[there, 1:], atol=1e-6)
+        for stop in TRUE_STOPS:
+            self.assertLess(np.linalg.norm(true[:, 1:] - stop, axis=1).min(), 1e-6)
+        self.assertTrue(world.wait_for().points)
+        self.assertTrue(markers.wait_for(lambda array: any(marker.points for marker in array.markers)))
+        diagnostics.wait_for("sonar_to_cloud", "scans", 6)
+        diagnostics.wait_for("sonar_simulator", "beams out", 800)
+
+
+if __name__ == "__main__":
+    rospy.init_node("simulator_demo_test")
+    rostest.rosrun(PACKAGE, "simulator_demo", SimulatorDemo, sys.argv)

@@ -1,0 +1,131 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rosbag
+import yaml
+
+from sonar_simulator.bag_tool import main
+from sonar_simulator.script_file import load_script
+
+ROOT = Path(__file__).resolve().parents[3]
+SCRIPT = "moves: [{wait: 1}, {x: 2, y: 1, yaw_deg: 40, seconds: 4}, {tilt_deg: 20}, {wait: 1}]"
+QUICK = ["--set", "sonar.ray_rows=5", "--set", "sonar.ray_columns=2", "--quiet"]
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "script.yaml"
+    path.write_text(SCRIPT)
+    return path
+
+
+def _write(tmp_path, script, name="out.bag", *arguments):
+    out = tmp_path / name
+    status = main(["--world", "basin", "--script", str(script), "--out", str(out), *QUICK, *arguments])
+    return status, out
+
+
+def _messages(path, topic):
+    with rosbag.Bag(str(path)) as bag:
+        return [(message, stamp) for _, message, stamp in bag.read_messages([topic])]
+
+
+def test_a_bag_holds_beams_tf_odometry_and_truth(tmp_path, script):
+    status, out = _write(tmp_path, script)
+    with rosbag.Bag(str(out)) as bag:
+        counts = {topic: info.message_count for topic, info in bag.get_type_and_topic_info()[1].items()}
+    assert status == 0
+    assert counts["/sonar/raw"] == 46
+    assert counts["/odom"] == counts["/ground_truth"] == counts["/cmd_vel"] == 121
+    assert counts["/tf"] == counts["/joint_states"] == 121 + 46 - 16
+    assert counts["/tf_static"] == 1
+
+
+def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, script):
+    bags = [_write(tmp_path, script, name, "--set", f"seed={seed}")[1] for name, seed in (("a", 5), ("b", 5), ("c", 6))]
+    first, second, third = (bag.read_bytes() for bag in bags)
+    assert first == second
+    assert first != third
+
+
+def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):
+    _, out = _write(tmp_path, script)
+    placed = {
+        message.transforms[0].header.stamp: {transform.child_frame_id for transform in message.transforms}
+        for message, _ in _messages(out, "/tf")
+    }
+    for beam, stamp in _messages(out, "/sonar/raw"):
+        assert beam.header.stamp == stamp
+        assert placed[stamp] == {"base_link", "sonar"}
+
+
+def test_the_truth_is_the_script_and_the_odometry_errs_as_asked(tmp_path, script):
+    _, out = _write(tmp_path, script, "out.bag", "--set", "odometry.scale_error=0.25")
+    last = [_messages(out, topic)[-1][0].pose.pose.position for topic in ("/ground_truth", "/odom")]
+    end = load_script(script).pose(6.0)[:2, 3]
+    np.testing.assert_allclose([(p.x, p.y) for p in last], [end, end / 1.25], atol=1e-9)
+
+
+def test_the_servo_is_in_the_beams_the_joint_and_the_transform(tmp_path, script):
+    _, out = _write(tmp_path, script)
+    beam, joint = _messages(out, "/sonar/raw")[-1][0], _messages(out, "/joint_states")[-1][0]
+    mount = _messages(out, "/tf")[-1][0].transforms[1]
+    assert joint.name == ["sonar_servo_joint"]
+    assert joint.position[0] == pytest.approx(np.radians(20.0))
+    assert beam.sensorAngle == pytest.approx(np.radians(20.0))
+    assert 2.0 * np.arcsin(mount.transform.rotation.y) == pytest.approx(np.radians(20.0))
+
+
+def test_a_bag_tells_how_it_was_made_and_nothing_of_the_machine(tmp_path, script):
+    _, out = _write(tmp_path, script, "out.bag", "--set", "seed=9")
+    told = yaml.safe_load(_messages(out, "/sonar_simulator/settings")[0][0].data)
+    assert (told["world"], told["script"], told["seed"], told["sonar"]["ray_rows"]) == (
+        "basin.sdf",
+        "script.yaml",
+        9,
+        5,
+    )
+    assert str(tmp_path).encode() not in out.read_bytes()
+
+
+def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):
+    path = tmp_path / "parameters.yaml"
+    path.write_text("seed: 3\nlaser_cone: {bins: 100, max_range: 25.0}")
+    _, out = _write(tmp_path, script, "out.bag", "--parameters", str(path), "--set", "laser_cone.bins=50")
+    beam = _messages(out, "/sonar/raw")[0][0]
+    assert (len(beam.intensities), beam.maxrange_meters) == (50, 25.0)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "line"),
+    [
+        (["--set", "odometry.scale_eror=1"], "odometry: scale_eror = 1: no such parameter"),
+        (["--set", "seed"], "--set seed: must be key=value or group.key=value"),
+        (["--set", "drive=CMD_VEL"], "drive = 'CMD_VEL': a bag has nobody who sends commands"),
+        (["--world", "none.sdf"], "none.sdf"),
+        (["--robot", "none.urdf"], "none.urdf: No such file or directory"),
+        (["--parameters", "none.yaml"], "none.yaml: No such file or directory"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path, script, capsys, arguments, line):
+    status, out = _write(tmp_path, script, "out.bag", *arguments)
+    error = capsys.readouterr().err
+    assert status == 1
+    assert line in error
+    assert error.count("\n") == 1
+    assert not out.exists()
+
+
+def test_a_bag_that_could_not_be_finished_leaves_the_older_one(tmp_path, script, monkeypatch, capsys):
+    _, out = _write(tmp_path, script)
+    before = out.read_bytes()
+
+    def stop(*_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("sonar_simulator.bag_writer.BagWriter.add", stop)
+    assert _write(tmp_path, script)[0] == 130
+    assert "nothing was written" in capsys.readouterr().err
+    assert out.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.bag", "script.yaml"]

@@ -1,0 +1,111 @@
+import numpy as np
+import pytest
+
+from sonar_simulator.mesh_file import load_mesh
+from sonar_simulator.world_error import WorldError
+from sonar_simulator.world_file import load_world
+
+trimesh = pytest.importorskip("trimesh")
+DAE = """<?xml version="1.0"?>
+<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+  <asset><created>2020-01-01T00:00:00</created><modified>2020-01-01T00:00:00</modified>{asset}</asset>
+  <library_geometries><geometry id="g" name="g"><mesh>
+    <source id="p"><float_array id="pa" count="9">0 0 0 100 0 0 0 200 0</float_array>
+      <technique_common><accessor source="#pa" count="3" stride="3">
+        <param name="X" type="float"/><param name="Y" type="float"/><param name="Z" type="float"/>
+      </accessor></technique_common></source>
+    <vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+    <triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>
+  </mesh></geometry></library_geometries>
+  <library_visual_scenes><visual_scene id="s"><node id="n"><translate>0 0 50</translate>
+    <instance_geometry url="#g"/></node></visual_scene></library_visual_scenes>
+  <scene><instance_visual_scene url="#s"/></scene>
+</COLLADA>
+"""
+
+
+@pytest.fixture
+def box():
+    return trimesh.creation.box(extents=(1.0, 2.0, 3.0))
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
+def test_a_mesh_without_unit_and_axis_is_metres_and_z_up(tmp_path, box, suffix):
+    path = tmp_path / f"box.{suffix}"
+    box.export(str(path))
+    vertices, faces = load_mesh(path)
+    assert len(faces) == 12
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), (1, 2, 3), rtol=1e-6)
+
+
+def test_gltf_is_y_up(tmp_path, box):
+    path = tmp_path / "box.glb"
+    box.apply_translation((0.0, 5.0, 0.0))
+    box.export(str(path))
+    vertices, _ = load_mesh(path)
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), (1, 3, 2), rtol=1e-6)
+    np.testing.assert_allclose(vertices[:, 2].mean(), 5.0)
+
+
+@pytest.mark.parametrize(
+    ("asset", "expected"),
+    [
+        ('<unit meter="0.01"/><up_axis>Z_UP</up_axis>', [(0, 0, 0.5), (1, 0, 0.5), (0, 2, 0.5)]),
+        ('<unit meter="0.01"/><up_axis>Y_UP</up_axis>', [(0, -0.5, 0), (1, -0.5, 0), (0, -0.5, 2)]),
+        ('<unit meter="0.01"/><up_axis>X_UP</up_axis>', [(0, -0.5, 0), (0, -0.5, 1), (-2, -0.5, 0)]),
+        ("<up_axis>Z_UP</up_axis>", [(0, 0, 50), (100, 0, 50), (0, 200, 50)]),
+    ],
+)
+def test_collada_says_its_unit_and_up_axis(tmp_path, asset, expected):
+    path = tmp_path / "triangle.dae"
+    path.write_text(DAE.format(asset=asset))
+    vertices, faces = load_mesh(path)
+    np.testing.assert_allclose(vertices[faces[0]], expected, atol=1e-9)
+
+
+def test_every_instance_of_a_scene_is_there(tmp_path, box):
+    scene = trimesh.Scene()
+    for x in (0.0, 10.0):
+        pose = np.eye(4)
+        pose[0, 3] = x
+        scene.add_geometry(box, geom_name="box", node_name=f"node{x}", transform=pose)
+    path = tmp_path / "two.glb"
+    scene.export(str(path))
+    vertices, faces = load_mesh(path)
+    assert len(faces) == 24
+    assert np.ptp(vertices[:, 0]) == pytest.approx(11.0)
+
+
+@pytest.mark.parametrize("suffix", ["dae", "stl", "obj", "ply", "glb"])
+@pytest.mark.parametrize("content", [b"", b"solid nonsense", b"\xff\xfe\x00nothing at all\x00" * 9])
+def test_a_file_that_is_no_mesh_is_refused_with_its_path(tmp_path, suffix, content):
+    path = tmp_path / f"odd.{suffix}"
+    path.write_bytes(content)
+    with pytest.raises(WorldError, match=rf"odd\.{suffix}"):
+        load_mesh(path)
+
+
+def test_a_missing_mesh_is_refused_with_its_path(tmp_path):
+    with pytest.raises(WorldError, match=r"gone\.stl"):
+        load_mesh(tmp_path / "gone.stl")
+
+
+def test_a_vertex_that_is_not_finite_is_refused(tmp_path):
+    path = tmp_path / "nan.obj"
+    path.write_text("v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n")
+    with pytest.raises(WorldError, match=r"nan\.obj: a vertex is not finite"):
+        load_mesh(path)
+
+
+def test_a_bare_mesh_is_a_world(tmp_path, box):
+    path = tmp_path / "wreck.stl"
+    box.export(str(path))
+    loaded = load_world(path)
+    assert (loaded.world.name, loaded.warnings, len(loaded.world.faces)) == ("wreck", (), 12)
+
+
+def test_any_other_file_is_taken_for_sdf(tmp_path):
+    path = tmp_path / "some.world"
+    path.write_text("<robot/>")
+    with pytest.raises(WorldError, match="not an SDF file"):
+        load_world(path)

@@ -1,0 +1,92 @@
+import math
+
+import numpy as np
+import pytest
+
+from sonar_simulator.beam_pattern import BeamPattern
+from sonar_simulator.beam_tracer import BeamTracer
+from sonar_simulator.materials import MATERIALS
+from sonar_simulator.mirrors import Mirrors, legs
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.ray_caster import RayCaster
+from sonar_simulator.side_lobes import FanWithSideLobes
+from sonar_simulator.world import Shape, World
+
+pytest.importorskip("embreex")
+STEEL, ROCK = MATERIALS["steel"], MATERIALS["rock"]
+
+
+def _wall(x, material=STEEL):
+    return Shape("wall", "box", pose_matrix((x, 0, 0)), (1.0, 100.0, 100.0), material)
+
+
+CORRIDOR = RayCaster(World.from_shapes("w", [_wall(5.5), _wall(-3.5)]))
+AHEAD = np.array([[1.0, 0.0, 0.0]])
+
+
+def _legs(caster, mirrors, origin=(0.0, 0.0, -2.0), direction=AHEAD, max_range=50.0):
+    return list(legs(caster, np.array([origin]), direction, mirrors, max_range))
+
+
+def test_between_two_walls_a_ray_meets_them_in_turn():
+    ways = _legs(CORRIDOR, Mirrors(bounces=3))
+    assert [leg.ranges[0] for leg in ways] == pytest.approx([5.0, 13.0, 21.0, 29.0], abs=0.01)
+
+
+def test_every_mirror_takes_its_share_there_and_back():
+    share = (STEEL.reflection**2 * STEEL.mirror) ** 2
+    assert [leg.left[0] for leg in _legs(CORRIDOR, Mirrors(bounces=2))] == pytest.approx([1.0, share, share**2])
+
+
+def test_a_rough_wall_is_no_mirror():
+    caster = RayCaster(World.from_shapes("w", [_wall(5.5, ROCK), _wall(-3.5, ROCK)]))
+    assert np.isinf(_legs(caster, Mirrors(bounces=1))[1].ranges[0])
+
+
+def test_an_echo_off_an_oblique_mirror_comes_from_where_the_mirror_sends_the_sound():
+    oblique = Shape("m", "box", pose_matrix((5.0, 0, 0), (0, 0, math.pi / 4)), (0.001, 4.0, 4.0), STEEL)
+    target = Shape("t", "box", pose_matrix((5.0, 7.5, 0)), (4.0, 1.0, 100.0), STEEL)
+    below = Shape("t", "box", pose_matrix((5.0, -7.5, 0)), (4.0, 1.0, 100.0), STEEL)
+    caster = RayCaster(World.from_shapes("w", [oblique, target, below]))
+    assert _legs(caster, Mirrors(bounces=1), origin=(0.0, 0.0, 0.0))[1].ranges[0] == pytest.approx(12.0, abs=0.02)
+
+
+def test_without_bounces_there_is_one_leg():
+    assert len(_legs(CORRIDOR, Mirrors())) == 1
+
+
+def test_a_ray_is_given_up_beyond_the_range():
+    assert np.isinf(_legs(CORRIDOR, Mirrors(bounces=2), max_range=10.0)[2].ranges[0])
+
+
+def test_the_waters_surface_throws_rays_back_down_and_gives_no_echo_itself():
+    floor = Shape("floor", "box", pose_matrix((0, 0, -5.5)), (200.0, 200.0, 1.0))
+    caster = RayCaster(World.from_shapes("w", [floor]))
+    rising = np.array([[math.cos(0.2), 0.0, math.sin(0.2)]])
+    up, down = _legs(caster, Mirrors(bounces=1, surface=True, surface_loss=0.5), direction=rising)
+    assert np.isinf(up.ranges[0])
+    assert down.ranges[0] == pytest.approx((2.0 + 5.0) / math.sin(0.2), rel=1e-3)
+    assert down.left[0] == pytest.approx(0.25)
+
+
+def test_what_stands_above_the_water_is_not_heard_when_the_surface_is_a_mirror():
+    tower = Shape("tower", "box", pose_matrix((10.0, 0, 3.0)), (1.0, 4.0, 4.0))
+    caster = RayCaster(World.from_shapes("w", [tower]))
+    fan = BeamPattern(math.radians(60.0), math.radians(3.0), 20, 3)
+    poses = pose_matrix((0, 0, -0.5))[np.newaxis]
+    ranges = [
+        BeamTracer(caster, fan, mirrors).contacts(poses, np.zeros(1), 50.0, np.random.default_rng(0)).ranges.min()
+        for mirrors in (Mirrors(), Mirrors(bounces=1, surface=True))
+    ]
+    assert ranges[0] < 10.0
+    assert math.isinf(ranges[1])
+
+
+def test_side_lobes_look_all_around_and_leave_the_nearest_surface_of_the_beam_alone():
+    behind = RayCaster(World.from_shapes("w", [_wall(20.5), _wall(-3.5)]))
+    pattern = FanWithSideLobes(BeamPattern(0.4, 0.05, 5, 3), 40)
+    contacts = BeamTracer(behind, pattern).contacts(np.eye(4)[np.newaxis], np.zeros(1), 50.0, np.random.default_rng(0))
+    assert contacts.ranges[0, 0] == pytest.approx(20.0, abs=1e-3)
+    assert contacts.ranges[0, 16:].min() < 4.0
+    assert contacts.shares[0, 1:16].sum() == pytest.approx(1.0)
+    assert contacts.shares[0, 16:].sum() == pytest.approx(2.0 * math.pi / 0.05)

@@ -1,0 +1,57 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.robot_description import DescriptionError, RobotDescription
+
+CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())
+CHAIN = """<robot name="r">
+  <joint name="a" type="fixed"><parent link="base"/><child link="arm"/><origin xyz="1 0 0" rpy="0 0 1.5707963"/></joint>
+  <joint name="b" type="revolute"><parent link="arm"/><child link="hand"/><origin xyz="2 0 0"/></joint>
+  <joint name="c" type="fixed"><parent link="other"/><child link="base"/></joint>
+</robot>"""
+
+
+def test_charle_carries_its_sonar_on_a_servo():
+    np.testing.assert_allclose(CHARLE.mount("base_link", "sonar"), pose_matrix((0.4, 0.0, 0.2)))
+    assert "sonar" not in [joint.child for joint in CHARLE.fixed_joints]
+
+
+def test_charle_has_four_thrusters_and_a_camera():
+    children = sorted(joint.child for joint in CHARLE.fixed_joints)
+    assert children == ["camera", "thruster_bow", "thruster_port", "thruster_starboard", "thruster_stern"]
+
+
+def test_two_thrusters_push_forward_and_two_up():
+    ways = {
+        name: CHARLE.mount("base_link", f"thruster_{name}")[:3, 0] for name in ("port", "starboard", "bow", "stern")
+    }
+    np.testing.assert_allclose(list(ways.values()), [(1, 0, 0), (1, 0, 0), (0, 0, 1), (0, 0, 1)], atol=1e-4)
+
+
+def test_a_mount_goes_through_all_joints_between():
+    np.testing.assert_allclose(
+        RobotDescription(CHAIN).mount("base", "hand"), pose_matrix((1, 2, 0), (0, 0, np.pi / 2)), atol=1e-6
+    )
+
+
+def test_a_link_on_itself_is_at_the_origin():
+    np.testing.assert_array_equal(RobotDescription(CHAIN).mount("hand", "hand"), np.eye(4))
+
+
+@pytest.mark.parametrize(
+    ("urdf", "text"),
+    [
+        ("<robot", "not XML"),
+        ('<robot><joint name="j"><parent link="a"/></joint></robot>', "joint j has no parent or no child"),
+        (CHAIN.replace("2 0 0", "2 0 x"), "joint b: xyz = '2 0 x': must be three numbers"),
+        (CHAIN.replace("2 0 0", "2 0"), "joint b: xyz = '2 0': must be three numbers"),
+        ("<robot/>", "no joints lead from base to hand"),
+        (CHAIN.replace('"other"', '"hand"'), "no joints lead from sonar to hand"),
+    ],
+)
+def test_a_description_that_cannot_be_used_is_refused_with_what_is_wrong(urdf, text):
+    with pytest.raises(DescriptionError, match=text):
+        RobotDescription(urdf).mount("sonar" if '"hand"/><child link="base"' in urdf else "base", "hand")

@@ -1,0 +1,244 @@
+"""What an SDF world may hold beyond primitives: planes, meshes, included models, materials and colours."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from sonar_simulator.materials import MATERIALS
+from sonar_simulator.sdf import load_sdf
+
+WORLDS = Path(__file__).resolve().parents[3] / "worlds"
+BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
+TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
+
+
+@pytest.fixture
+def load(tmp_path):
+    def load_text(content):
+        path = tmp_path / "some.sdf"
+        namespace = 'xmlns:sonar="https://example.org"'
+        path.write_text(f'<sdf version="1.6" {namespace}><world name="here">{content}</world></sdf>')
+        return load_sdf(path)
+
+    return load_text
+
+
+@pytest.fixture
+def model_file(tmp_path, monkeypatch):
+    """Write models/NAME/model.sdf on the model path."""
+    monkeypatch.setenv("GAZEBO_MODEL_PATH", f"{tmp_path / 'nowhere'}:{tmp_path / 'path'}")
+
+    def write(name, content, config=None, file_name="model.sdf"):
+        folder = tmp_path / "path" / name
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / file_name).write_text(f'<sdf version="1.6">{content}</sdf>')
+        if config:
+            (folder / "model.config").write_text(f"<model>{config}</model>")
+        return folder
+
+    return write
+
+
+def _link(content):
+    return f'<model name="m"><link name="l">{content}</link></model>'
+
+
+def _collision(geometry, extra=""):
+    return _link(f'<collision name="c">{extra}{geometry}</collision>')
+
+
+@given(st.tuples(*(st.floats(-1.0, 1.0) for _ in range(3))).filter(lambda normal: np.linalg.norm(normal) > 0.01))
+def test_the_plane_of_a_collision_has_no_end_and_lies_across_its_normal(tmp_path_factory, normal):
+    geometry = f"<geometry><plane><normal>{' '.join(map(repr, normal))}</normal><size>5 5</size></plane></geometry>"
+    path = tmp_path_factory.getbasetemp() / "plane.sdf"
+    path.write_text(f'<sdf version="1.6"><world name="w">{_collision(geometry)}</world></sdf>')
+    (shape,) = load_sdf(path).world.shapes
+    vertices, _ = shape.triangles()
+    assert np.ptp(vertices, axis=0).max() > 2000.0
+    np.testing.assert_allclose(vertices @ (normal / np.linalg.norm(normal)), 0.0, atol=1e-8)
+    np.testing.assert_allclose(np.linalg.det(shape.pose[:3, :3]), 1.0)
+
+
+def test_the_plane_of_a_visual_is_as_large_as_it_says(load):
+    (shape,) = load(
+        _link('<visual name="v"><geometry><plane><size>6 4</size></plane></geometry></visual>')
+    ).world.shapes
+    assert np.ptp(shape.triangles()[0], axis=0).tolist() == [6.0, 4.0, 0.0]
+
+
+def test_ground_plane_is_known_without_gazebo_and_the_sun_is_no_surface(load):
+    uris = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("ground_plane", "sun"))
+    loaded = load(uris.replace("</uri></include><include>", "</uri><pose>0 0 -5 0 0 0</pose></include><include>"))
+    assert loaded.warnings == ()
+    (plane,) = loaded.world.shapes
+    assert plane.kind == "plane"
+    assert plane.pose[2, 3] == -5.0
+
+
+def test_a_mesh_is_scaled_and_placed(load, tmp_path):
+    (tmp_path / "t.obj").write_text(TETRAHEDRON)
+    mesh = "<geometry><mesh><uri>t.obj</uri><scale>2 3 4</scale></mesh></geometry>"
+    (shape,) = load(_collision(mesh, "<pose>10 0 0 0 0 0</pose>")).world.shapes
+    vertices, faces = shape.triangles()
+    assert len(faces) == 4
+    np.testing.assert_allclose(vertices.min(axis=0), (10, 0, 0))
+    np.testing.assert_allclose(vertices.max(axis=0), (12, 3, 4))
+
+
+@pytest.mark.parametrize("uri", ["file://{folder}/t.obj", "{folder}/t.obj", "model://m/t.obj", "../path/m/t.obj"])
+def test_a_mesh_is_found_by_every_kind_of_uri(load, model_file, uri):
+    folder = model_file("m", "")
+    (folder / "t.obj").write_text(TETRAHEDRON)
+    world = load(_collision(f"<geometry><mesh><uri>{uri.format(folder=folder)}</uri></mesh></geometry>"))
+    assert (world.warnings, len(world.world.faces)) == ((), 4)
+
+
+def test_a_mesh_is_found_in_a_ros_package(load, tmp_path, monkeypatch):
+    pytest.importorskip("rospkg")
+    package = tmp_path / "boats"
+    package.mkdir()
+    (package / "package.xml").write_text(
+        '<package format="2"><name>boats</name><version>1.0.0</version><description>d</description>'
+        '<maintainer email="a@b.cd">m</maintainer><license>BSD</license></package>'
+    )
+    (package / "t.obj").write_text(TETRAHEDRON)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(package))
+    loaded = load(_collision("<geometry><mesh><uri>package://boats/t.obj</uri></mesh></geometry>"))
+    assert (loaded.warnings, len(loaded.world.faces)) == ((), 4)
+
+
+@pytest.mark.parametrize(
+    ("mesh", "reason"),
+    [
+        ("<uri>gone.stl</uri>", "gone.stl is not there"),
+        ("<uri>model://gone/gone.dae</uri>", "model://gone/gone.dae is not there"),
+        ("<uri>some.sdf</uri>", "must be one of .dae"),
+        ("<uri>broken.stl</uri>", "broken.stl: no triangle in it"),
+        ("<uri>t.obj</uri><scale>1 1</scale>", "<scale> is '1 1', must be 3 numbers"),
+        ("<uri>t.obj</uri><submesh><name>keel</name></submesh>", "no mesh 'keel'"),
+        ("", "no <uri>"),
+    ],
+)
+def test_a_mesh_that_cannot_be_given_is_one_line_with_file_and_element_and_the_rest_loads(load, tmp_path, mesh, reason):
+    (tmp_path / "t.obj").write_text(TETRAHEDRON)
+    (tmp_path / "broken.stl").write_bytes(b"\x00" * 7)
+    bad = f'<collision name="bad"><geometry><mesh>{mesh}</mesh></geometry></collision>'
+    loaded = load(_link(f'{bad}<collision name="c">{BOX}</collision>'))
+    assert [shape.name for shape in loaded.world.shapes] == ["m/l/c"]
+    (warning,) = loaded.warnings
+    assert "some.sdf: m/l/bad: " in warning
+    assert reason in warning
+    assert "\n" not in warning
+
+
+def test_an_included_model_stands_where_the_include_says(load, model_file):
+    model_file(
+        "post",
+        '<model name="post"><pose>7 7 7 0 0 0</pose>'
+        f'<link name="l"><collision name="c">{BOX}</collision></link></model>',
+    )
+    loaded = load(
+        "<include><uri>model://post</uri><name>first</name><pose>1 0 0 0 0 0</pose></include>"
+        "<include><uri>model://post</uri></include>"
+    )
+    assert [shape.name for shape in loaded.world.shapes] == ["first/l/c", "model://post/l/c"]
+    assert [shape.pose[0, 3] for shape in loaded.world.shapes] == [1.0, 7.0]
+
+
+def test_an_include_takes_the_newest_version_up_to_1_7(load, model_file):
+    link = f'<link name="l"><collision name="c">{BOX}</collision></link>'
+    config = '<sdf version="1.4">old.sdf</sdf><sdf version="1.7">new.sdf</sdf><sdf version="1.9">future.sdf</sdf>'
+    model_file("m", f'<model name="m">{link}</model>', config, "new.sdf")
+    assert len(load("<include><uri>model://m</uri></include>").world.shapes) == 1
+
+
+def test_a_model_may_include_models(load, model_file):
+    model_file("inner", f'<model name="i"><link name="l"><collision name="c">{BOX}</collision></link></model>')
+    include = "<include><uri>model://inner</uri><pose>0 2 0 0 0 0</pose></include>"
+    model_file("outer", f'<model name="o">{include}</model>')
+    (shape,) = load("<include><uri>model://outer</uri><pose>1 0 0 0 0 0</pose></include>").world.shapes
+    assert shape.pose[:3, 3].tolist() == [1.0, 2.0, 0.0]
+
+
+def test_a_model_that_includes_itself_ends_in_one_warning(load, model_file):
+    model_file("loop", '<model name="l"><include><uri>model://loop</uri></include></model>')
+    (warning,) = load("<include><uri>model://loop</uri></include>" + _collision(BOX)).warnings
+    assert "includes itself" in warning
+
+
+def test_a_warning_in_an_included_file_names_that_file(load, model_file):
+    folder = model_file(
+        "m",
+        '<model name="m"><link name="l"><collision name="c"><geometry><image/></geometry></collision></link></model>',
+    )
+    (warning,) = load("<include><uri>model://m</uri></include>" + _collision(BOX)).warnings
+    assert warning.startswith(f"{folder / 'model.sdf'}: ")
+
+
+def test_a_material_holds_for_what_is_inside(load):
+    loaded = load(
+        '<model name="m"><sonar:material>mud</sonar:material><link name="l">'
+        f'<collision name="a">{BOX}</collision>'
+        f'<collision name="b"><sonar:material>steel</sonar:material>{BOX}</collision></link></model>' + _collision(BOX)
+    )
+    assert [shape.material.name for shape in loaded.world.shapes] == ["mud", "steel", "concrete"]
+    assert [loaded.world.materials[index].name for index in loaded.world.face_material[::12]] == [
+        "mud",
+        "steel",
+        "concrete",
+    ]
+
+
+def test_a_material_of_ones_own_has_properties_as_attributes(load):
+    own = '<sonar:material reflection="0.3" slope="0.02" lambert_db="-30" mirror="0.9">tiles</sonar:material>'
+    (shape,) = load(_collision(BOX, own)).world.shapes
+    material = shape.material
+    assert (material.name, material.reflection, material.slope, material.lambert_db, material.mirror) == (
+        "tiles", 0.3, 0.02, -30.0, 0.9,
+    )  # fmt: skip
+
+
+def test_laser_retro_is_a_reflection(load):
+    (shape,) = load(_collision(BOX, "<laser_retro>0.25</laser_retro>")).world.shapes
+    assert shape.material.reflection == 0.25
+    (shape,) = load(_collision(BOX, "<laser_retro>0</laser_retro>")).world.shapes
+    assert shape.material == MATERIALS["concrete"]
+
+
+@pytest.mark.parametrize(
+    "material",
+    [
+        "<sonar:material>cheese</sonar:material>",
+        '<sonar:material reflection="2">x</sonar:material>',
+        "<laser_retro>x</laser_retro>",
+    ],
+)
+def test_a_material_that_makes_no_sense_is_one_warning_and_the_shape_stays(load, material):
+    loaded = load(_collision(BOX, material))
+    assert len(loaded.world.shapes) == len(loaded.warnings) == 1
+    assert "m/l/c" in loaded.warnings[0]
+
+
+def test_the_colour_of_a_link_is_its_visuals(load):
+    visual = f'<visual name="v">{BOX}<material><diffuse>1 0.5 0 0.8</diffuse></material></visual>'
+    (shape,) = load(_link(f'{visual}<collision name="c">{BOX}</collision>')).world.shapes
+    assert shape.colour == (1.0, 0.5, 0.0, 0.8)
+
+
+@pytest.mark.parametrize(("name", "low", "high"), [("basin", 500, 20000), ("tank", 50, 100), ("harbour", 2300, 2700)])
+def test_a_shipped_world_loads_without_warnings(name, low, high):
+    loaded = load_sdf(WORLDS / f"{name}.sdf")
+    assert loaded.warnings == ()
+    assert low <= len(loaded.world.faces) <= high
+
+
+def test_the_harbours_bed_rises_out_of_the_water_in_the_east():
+    (bed,) = [shape for shape in load_sdf(WORLDS / "harbour.sdf").world.shapes if shape.kind == "mesh"]
+    vertices, _ = bed.triangles()
+    assert vertices[vertices[:, 0] < 5.0, 2].max() < -5.5
+    assert vertices[vertices[:, 0] > 31.0, 2].min() > 0.0
+    assert math.isclose(np.ptp(vertices[:, 0]), 64.0)

@@ -1,0 +1,129 @@
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from node_support.parameters import ParameterError
+from sonar_simulator.poses import pose_matrix
+from sonar_simulator.robot_description import RobotDescription
+from sonar_simulator.simulation import Drive
+from sonar_simulator.simulation_setup import Settings, make_setup
+
+ROOT = Path(__file__).resolve().parents[3]
+CHARLE = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
+QUICK = {"sonar": {"ray_rows": 5, "ray_columns": 3}}
+SCRIPT = """
+start: {x: -2.0, z: -1.2}
+moves:
+  - {wait: 2}
+  - {tilt_deg: 30}
+  - {x: 3, seconds: 4}
+  - {tilt_deg: -10}
+  - {wait: 3}
+"""
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "script.yaml"
+    path.write_text(SCRIPT)
+    return str(path)
+
+
+def _setup(script, **values):
+    settings = Settings.from_mapping({"world": "worlds/tank.sdf", "script": script, **QUICK, **values})
+    return make_setup(settings, ROOT, CHARLE, pytest.fail)
+
+
+def _moments(script, beams_at_once=1, **values):
+    return list(_setup(script, **values).simulation.moments(20.0, beams_at_once))
+
+
+def test_ticks_and_beams_come_in_order_each_at_its_own_rate(script):
+    moments = _moments(script)
+    times = [moment.time for moment in moments]
+    assert times == sorted(times)
+    assert len(set(times)) == len(times)
+    assert [m.time for m in moments if m.is_tick] == pytest.approx(np.arange(181) / 20.0)
+    assert [m.time for m in moments if m.ping] == pytest.approx(np.arange(68) * 16.0 / 120)
+
+
+@pytest.mark.parametrize("beams_at_once", [7, 120])
+def test_casting_many_beams_at_once_leaves_everything_but_their_noise_as_it_is(script, beams_at_once):
+    one_by_one, at_once = _moments(script), _moments(script, beams_at_once)
+    assert len(one_by_one) == len(at_once)
+    for first, second in zip(one_by_one, at_once):
+        assert (first.time, first.tilt, first.is_tick) == (second.time, second.tilt, second.is_tick)
+        assert (first.ping is None) == (second.ping is None)
+        np.testing.assert_array_equal(first.odometry.T_odom_base, second.odometry.T_odom_base)
+
+
+def test_the_servo_follows_the_script_at_its_own_speed(script):
+    tilts = {round(m.time, 2): math.degrees(m.tilt) for m in _moments(script, servo={"speed_deg": 20.0})}
+    assert [tilts[t] for t in (1.9, 2.5, 3.5, 6.0)] == pytest.approx([0.0, 10.0, 30.0, 30.0])
+    assert tilts[9.0] == pytest.approx(-10.0)
+
+
+def test_a_sonar_tilted_down_hears_the_floor_ahead_that_a_level_one_does_not(script):
+    head = {"beams_per_turn": 4, "seconds_per_turn": 2.0}
+    moments = _moments(script, sonar=head, laser_cone={"max_range": 3.0, "spread": 0.0, "noise_echoes": 0})
+    ahead = {moment.time: moment.ping.strengths.any() for moment in moments if moment.ping and moment.ping.angle == 0.0}
+    assert (ahead[0.0], ahead[4.0]) == (False, True)
+
+
+def test_the_same_seed_gives_the_same_beams_and_another_seed_others(script):
+    def beams(**values):
+        return b"".join(m.ping.strengths.tobytes() for m in _moments(script, **values) if m.ping)
+
+    assert beams(seed=3) == beams(seed=3) != beams(seed=4)
+
+
+def test_the_noise_of_the_odometry_leaves_the_beams_alone(script):
+    quiet = [m.ping.strengths for m in _moments(script) if m.ping]
+    noisy = [m.ping.strengths for m in _moments(script, odometry={"speed_noise": 0.5}) if m.ping]
+    np.testing.assert_array_equal(quiet, noisy)
+
+
+def test_a_commanded_vehicle_begins_at_the_scripts_start_and_never_ends(script):
+    setup = _setup(script, drive="CMD_VEL")
+    assert setup.simulation.duration == math.inf
+    np.testing.assert_array_equal(setup.simulation.moment(5.0).truth.T_world_base, pose_matrix((-2.0, 0.0, -1.2)))
+    setup.commanded.command(5.0, np.array([0.5, 0, 0, 0, 0, 0]))
+    assert setup.simulation.moment(6.0).truth.T_world_base[0, 3] > -2.0
+
+
+def test_settings_survive_the_way_to_plain_values_and_back():
+    settings = Settings.from_mapping({"drive": "CMD_VEL", "echo_model": "collision", "odometry": {"scale_error": 0.1}})
+    assert settings.simulator.drive is Drive.COMMANDS
+    assert Settings.from_mapping(settings.to_mapping()) == settings
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [
+        ({"odometry": {"scale_eror": 0.1}}, r"odometry: scale_eror = 0.1: no such parameter; there are scale_error"),
+        ({"sonar": 3}, r"sonar = 3: must be keys and values"),
+        ({"echo_model": "cone"}, r"echo_model = 'cone': must be one of laser_cone, collision, physical"),
+        ({"physical": {"bins": 0}}, r"physical: bins = 0: must be an integer from 1"),
+        ({"drive": "TELEOP"}, r"drive = 'TELEOP': must be one of SCRIPT, CMD_VEL"),
+        ({"wrold": "x"}, r"wrold = 'x': no such parameter"),
+    ],
+)
+def test_bad_settings_are_refused_with_group_key_and_what_is_allowed(values, text):
+    with pytest.raises(ParameterError, match=text):
+        Settings.from_mapping(values)
+
+
+@pytest.mark.parametrize(
+    ("values", "text"),
+    [({"world": "worlds/none.sdf"}, r"none\.sdf"), ({"script": "yaml/none.yaml"}, r"none\.yaml: No such file")],
+)
+def test_files_that_cannot_be_used_are_named(script, values, text):
+    with pytest.raises(ParameterError, match=text):
+        make_setup(Settings.from_mapping({"script": script, **values}), ROOT, CHARLE, pytest.fail)
+
+
+def test_a_robot_without_a_sonar_is_refused(script):
+    with pytest.raises(ParameterError, match="no joints lead from base_link to sonar"):
+        make_setup(Settings.from_mapping({"script": script}), ROOT, RobotDescription("<robot/>"), pytest.fail)
