@@ -39,7 +39,11 @@ def steps() -> List[Step]:
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
         Step("ruff format", ["ruff", "format", "--quiet", "--check", "."]),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
-        Step("unit tests", ["python3", "-m", "pytest", f"--junitxml={unit_report}"], unit_report),
+        Step(
+            "unit tests",
+            ["python3", "-m", "pytest", "-n", "auto", "--dist", "loadfile", f"--junitxml={unit_report}"],
+            unit_report,
+        ),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):
         folder = RESULTS / test.stem
