@@ -5,6 +5,7 @@ from typing import Callable, Dict, List
 
 from benchmarks import (
     map_figures,
+    marina_figures,
     matching_figures,
     processing_figures,
     shape_figures,
@@ -16,6 +17,7 @@ from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map": map_figures.rows,
+    "marina": marina_figures.rows,
     "matching": matching_figures.rows,
     "processing": processing_figures.rows,
     "simulation": simulation_figures.rows,

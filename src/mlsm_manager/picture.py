@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from io import BytesIO
+from itertools import cycle
 from pathlib import Path
 from typing import Sequence
 
@@ -17,7 +18,7 @@ from mlsm_manager.blocks import Blocks, BlockType
 from node_support.files import write_whole
 
 _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
-_LINE_STYLES = ("-", "--", ":")
+_LINE_STYLES = ("-", "--", ":", "-.")
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarr
         label = "walls as they are" if index == 0 else None
         axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
     _draw_blocks(axes, blocks)
-    for path, style in zip(paths, _LINE_STYLES):
+    for path, style in zip(paths, cycle(_LINE_STYLES)):
         axes.plot(*path.points.T, style, color=path.color, linewidth=1.6, label=path.label, zorder=5)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
@@ -45,7 +46,7 @@ def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarr
     axes.autoscale_view()
     figure.tight_layout()
     picture = BytesIO()
-    figure.savefig(picture, format="png")
+    figure.savefig(picture, format="png", bbox_inches="tight")
     plt.close(figure)
     write_whole(file, picture.getvalue())
 

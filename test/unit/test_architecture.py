@@ -20,7 +20,8 @@ ALLOWED = {
 ROS_SIDE = {
     "imagenex_852_driver": {"driver_node", "emulator_node", "log_tools", "messages", "nodes"},
     "mlsm_manager": {
-        "fix_publisher", "map_publisher", "map_transform", "markers", "mlsm_core", "nodes", "odometry_track",
+        "bag_recording", "fix_publisher", "map_bag", "map_publisher", "map_transform", "markers", "mlsm_core", "nodes",
+        "odometry_track",
     },
     "node_support": {"live_parameters", "node", "reconfigure_description"},
     "sonar_processing": {

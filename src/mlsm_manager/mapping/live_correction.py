@@ -8,7 +8,7 @@ import numpy as np
 
 from mlsm_manager.matching.planar import composed, inverse, wrapped
 from mlsm_manager.matching.planar_motion import POSE
-from mlsm_manager.matching.prediction import Belief, advanced_path
+from mlsm_manager.matching.prediction import Belief, advanced, advanced_path
 from mlsm_manager.matching.scan import Track
 
 _MOST_SAMPLES = 4000
@@ -88,8 +88,7 @@ class LiveCorrection:
         if self._state is None or not self._samples:
             return
         before, pose = self._samples[-1]
-        track = Track(np.array([before, time]), np.array([pose, odometry]))
-        self._state[POSE] = advanced_path(self._state, before, track, np.array([time]))[-1]
+        self._state[POSE] = advanced(self._state, time - before, pose, odometry)
 
     def _share_left(self, seconds: float) -> float:
         if self.blend_time <= 0.0:

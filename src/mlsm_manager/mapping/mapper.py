@@ -10,7 +10,7 @@ from mlsm_manager.mapping.correction_history import CorrectionHistory
 from mlsm_manager.matching.matcher import Matcher
 from mlsm_manager.matching.planar import composed, transformed
 from mlsm_manager.matching.planar_motion import ERRORS
-from mlsm_manager.matching.prediction import Belief, OdometryErrors, predicted, prior_of
+from mlsm_manager.matching.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
 from mlsm_manager.matching.result import MatchResult
 from mlsm_manager.matching.scan import Scan, Track
 from mlsm_manager.matching.undistort import corrected_points
@@ -142,7 +142,8 @@ class Mapper:
             self.belief = Belief(scan.reference_time, theta, self.errors.covariance())
         if scan.reference_time <= self.belief.time:
             return self.belief
-        return predicted(self.belief, scan.track, scan.reference_time, self.errors)
+        belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
+        return held_to_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""

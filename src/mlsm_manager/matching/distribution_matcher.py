@@ -52,7 +52,7 @@ class DistributionMatcher:
         found = search(
             motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, parameters.candidates
         )
-        refiner = Refiner(motion, weights, LocalDistributions(target), state)
+        refiner = Refiner(motion, weights, LocalDistributions(target), state, parameters.range_scale_deviation)
         fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
         inflation = max(fits, key=lambda fit: fit.support).inflation
         return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
@@ -95,11 +95,17 @@ class DistributionMatcher:
         yaw = float(np.sqrt(best.covariance[2, 2]))
         if yaw > parameters.max_yaw_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
+        if parameters.min_gain_over_second == 0.0:
+            return MatchStatus.CONVERGED, ""
+        return self._judge_second_places(fits, refiner, vectors[:, -1])
+
+    def _judge_second_places(self, fits: List[Fit], refiner: Refiner, direction: np.ndarray) -> Tuple[MatchStatus, str]:
+        parameters, best = self.parameters, fits[0]
         for other in fits[1:]:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if separation(best.theta, other.theta) >= 0.5 and lead < parameters.min_gain_over_second:
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
-        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, vectors[:, -1])
+        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, direction)
         if lead < parameters.min_gain_over_second:
             return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
         return MatchStatus.CONVERGED, ""

@@ -1,6 +1,7 @@
 """Refines a state so that the points lie where the local distributions expect them (thesis 6.3, all at once)."""
 
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -71,10 +72,17 @@ class _Meeting:
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals."""
+    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals.
+
+    scale_information: of the ranges' common scale. scale_mixed: (8,) what it has in common with the state.
+    scale_gradient: of all points by it.
+    """
 
     information: np.ndarray
     gradient: np.ndarray
+    scale_information: float
+    scale_mixed: np.ndarray
+    scale_gradient: float
     world: np.ndarray
     squared: np.ndarray
     importance: np.ndarray
@@ -86,17 +94,24 @@ class Refiner:
 
     The robust kernel narrows as the iterations go on, until a step is below a tenth of a standard deviation. Points
     that lie near each other in the map err alike; the information is divided by what the sums of their gradients over
-    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share.
+    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share. An error of all ranges
+    in proportion is one more unknown and is integrated out: between walls that converge it looks like a motion.
     """
 
     def __init__(
-        self, motion: PlanarMotion, point_weights: np.ndarray, target: LocalDistributions, prior: PriorState
+        self,
+        motion: PlanarMotion,
+        point_weights: np.ndarray,
+        target: LocalDistributions,
+        prior: PriorState,
+        range_scale_deviation: float = 0.0,
     ) -> None:
-        """`point_weights` is (n,), n > 0."""
+        """`point_weights` is (n,), n > 0; `range_scale_deviation` is relative, 0 where ranges are certain."""
         self._motion = motion
         self._point_weights = point_weights
         self._target = target
         self._prior = prior
+        self._range_scale_deviation = range_scale_deviation
         spots = motion.points(motion.path(prior.mean))
         self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
 
@@ -108,8 +123,9 @@ class Refiner:
             iteration += 1
             normal = self._normal(theta, SCALES[index])
             inflation = self._design_effect(normal) if index == narrowest else 1.0
-            information = normal.information / inflation + self._prior.information
-            step = self._step(theta, normal, information, inflation)
+            points_information, gradient = self._weighed(normal, inflation)
+            information = points_information + self._prior.information
+            step = -np.linalg.solve(information, gradient + self._prior.information @ (theta - self._prior.mean))
             theta = theta + step
             small = bool(step @ information @ step < _LAST_STEP**2)
             converged = small and index == narrowest
@@ -132,9 +148,15 @@ class Refiner:
         """Return the points (n, 2) in map when the state is `theta`."""
         return self._motion.points(self._motion.path(theta))
 
-    def _step(self, theta: np.ndarray, normal: _Normal, information: np.ndarray, inflation: float) -> np.ndarray:
-        objection = self._prior.information @ (theta - self._prior.mean)
-        return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
+    def _weighed(self, normal: _Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
+        """Return information (8, 8) and gradient (8,) of all points, without what they tell only if ranges are sure."""
+        information, gradient = normal.information / inflation, normal.gradient.sum(axis=0) / inflation
+        if self._range_scale_deviation == 0.0:
+            return information, gradient
+        known = normal.scale_information / inflation + self._range_scale_deviation**-2
+        gain = normal.scale_mixed / inflation / known
+        mixed = normal.scale_mixed / inflation
+        return information - np.outer(gain, mixed), gradient - gain * normal.scale_gradient / inflation
 
     def _meeting(self, path: np.ndarray) -> _Meeting:
         world = self._motion.points(path)
@@ -153,7 +175,12 @@ class Refiner:
         lever = (meeting.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
         information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
         gradient = np.einsum("nas,na->ns", lever, meeting.residual)
-        return _Normal(information, gradient, meeting.world, meeting.squared, importance, meeting.distances)
+        arms = meeting.world - path[self._motion.beam, :2]
+        pull = np.einsum("nab,nb->na", meeting.metric, arms) * weights[:, np.newaxis]
+        return _Normal(
+            information, gradient, float((pull * arms).sum()), np.einsum("nas,na->s", lever, arms),
+            float((pull * meeting.residual).sum()), meeting.world, meeting.squared, importance, meeting.distances,
+        )  # fmt: skip
 
     def _importance(self, meeting: _Meeting, scale: float) -> np.ndarray:
         share = self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
@@ -184,7 +211,7 @@ class Refiner:
     def _fit(self, theta: np.ndarray, iterations: int, converged: bool) -> Fit:
         normal = self._normal(theta, SCALES[-1])
         inflation = self._design_effect(normal)
-        covariance = np.linalg.inv(normal.information / inflation + self._prior.information)
+        covariance = np.linalg.inv(self._weighed(normal, inflation)[0] + self._prior.information)
         support = _support(normal.importance, normal.squared)
         return Fit(
             theta, covariance, support, inflation, self._prior.objection(theta), self._on_surface(normal),

@@ -18,6 +18,9 @@ class DistributionMatcherParameters(ParameterSet):
     search_cell: float = parameter(0.5, "step of the search", unit="m", low=0.05, high=10.0)
     candidates: int = parameter(6, "places that the search hands to the refinement", low=1, high=100)
     beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
+    range_scale_deviation: float = parameter(
+        0.0, "how far all ranges may be off in proportion, as by the speed of sound", low=0.0, high=0.5
+    )
     min_points: int = parameter(15, "a scan with fewer points on the map tells nothing", low=3, high=10000)
     max_position_deviation: float = parameter(
         0.5, "a fix whose standard deviation in the worst direction is above this is ambiguous",
@@ -27,7 +30,7 @@ class DistributionMatcherParameters(ParameterSet):
         0.1, "a fix whose heading has a standard deviation above this is ambiguous", unit="rad", low=0.001, high=3.1416
     )
     min_gain_over_second: float = parameter(
-        3.0, "log-likelihood by which the best place must beat the second one", low=0.0, high=100.0
+        3.0, "log-likelihood by which the best place must beat the second one; 0: not asked", low=0.0, high=100.0
     )
     min_significance: float = parameter(
         5.0, "standard deviations by which the matched share must beat what any place would give", low=0.0, high=100.0

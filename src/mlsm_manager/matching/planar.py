@@ -12,7 +12,11 @@ def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = vectors[..., 0], vectors[..., 1]
-    return np.stack([cos * x - sin * y, sin * x + cos * y], axis=-1)
+    first = cos * x - sin * y
+    result = np.empty((*np.shape(first), 2))
+    result[..., 0] = first
+    result[..., 1] = sin * x + cos * y
+    return result
 
 
 def composed(first: np.ndarray, second: np.ndarray) -> np.ndarray:

@@ -130,7 +130,9 @@ def _seen_from(poses: np.ndarray, points: np.ndarray) -> np.ndarray:
 
 def _sum_to_end(steps: np.ndarray) -> np.ndarray:
     """Return (b, 2): minus the sum of the steps (b - 1, 2) from each node to the last one."""
-    return np.vstack([-np.cumsum(steps[::-1], axis=0)[::-1], np.zeros((1, 2))])
+    result = np.zeros((len(steps) + 1, 2))
+    result[:-1] = -np.cumsum(steps[::-1], axis=0)[::-1]
+    return result
 
 
 def _unit(angle: np.ndarray) -> np.ndarray:
@@ -138,4 +140,7 @@ def _unit(angle: np.ndarray) -> np.ndarray:
 
 
 def _quarter_turn(vectors: np.ndarray) -> np.ndarray:
-    return np.stack([-vectors[..., 1], vectors[..., 0]], axis=-1)
+    result = np.empty(np.shape(vectors))
+    result[..., 0] = -vectors[..., 1]
+    result[..., 1] = vectors[..., 0]
+    return result

@@ -1,10 +1,12 @@
 """Carries what is known of pose and odometry errors from scan to scan (an extended Kalman filter's prediction)."""
 
+import math
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.planar import composed, inverse, rotated
+from mlsm_manager.matching.planar import composed, inverse, rotated, wrapped
 from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES
 from mlsm_manager.matching.result import Prior
 from mlsm_manager.matching.scan import Track
@@ -37,6 +39,15 @@ class OdometryErrors(ParameterSet):
     motion_time: float = parameter(
         3600.0, "how long an error of scale or direction lasts", unit="s", low=0.1, high=1e9, tunable=False
     )
+    heading_deviation: float = parameter(
+        0.0, "how far its heading may be off at any time, where a compass holds it; 0: it may drift away",
+        unit="rad", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
+
+    def wandering(self, seconds: float) -> float:
+        """Return the variance [m^2], in each direction, of what errors of the speed add up to within `seconds`."""
+        ratio = seconds / self.rate_time
+        return 2.0 * (self.speed_deviation * self.rate_time) ** 2 * (ratio - 1.0 + float(np.exp(-ratio)))
 
     def covariance(self) -> np.ndarray:
         """Return (8, 8) of [pose, rate, motion] where the pose is known and nothing of the odometry's errors."""
@@ -72,6 +83,15 @@ def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors)
     return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
 
 
+def held_to_heading(belief: Belief, heading: float, deviation: float) -> Belief:
+    """Return the belief after a compass said `heading` [rad] with standard `deviation`; 0 stands for no compass."""
+    if deviation == 0.0:
+        return belief
+    gain = belief.covariance[:, 2] / (belief.covariance[2, 2] + deviation**2)
+    theta = belief.theta + gain * float(wrapped(heading - belief.theta[2]))
+    return Belief(belief.time, theta, belief.covariance - np.outer(gain, belief.covariance[2]))
+
+
 def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
     """Return the belief as a matcher's prior; `odometry_pose` is T_odom_base (3,) at its time."""
     correction = composed(belief.theta[POSE], inverse(odometry_pose))
@@ -90,6 +110,25 @@ def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarr
     shifts = np.cumsum(rotated(steps, theta[5] * middle), axis=0)
     position = theta[:2] + rotated(shifts, theta[2])
     return np.column_stack([position, theta[2] + relative[1:, 2] + theta[5] * (times - start)])
+
+
+def advanced(theta: np.ndarray, seconds: float, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return T_map_base (3,) after one short step of the odometry from `before` to `after` (3,); see advanced_path.
+
+    The same in plain numbers, for whoever follows every message of the odometry.
+    """
+    turned = math.remainder(after[2] - before[2], math.tau)
+    step_x, step_y = _turned(after[0] - before[0], after[1] - before[1], theta[7] - before[2])
+    rate_x, rate_y = _turned(theta[3], theta[4], turned / 2.0)
+    along = (1.0 + theta[6]) * step_x + seconds * rate_x
+    aside = (1.0 + theta[6]) * step_y + seconds * rate_y
+    x, y = _turned(along, aside, theta[2] + theta[5] * seconds / 2.0)
+    return np.array([theta[0] + x, theta[1] + y, theta[2] + turned + theta[5] * seconds])
+
+
+def _turned(x: float, y: float, angle: float) -> Tuple[float, float]:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y
 
 
 def _advanced(theta: np.ndarray, start: float, track: Track, end: float) -> np.ndarray:

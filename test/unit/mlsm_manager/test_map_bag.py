@@ -1,0 +1,134 @@
+"""map_bag as it is run: bags in, files, figures and one-line errors out."""
+
+import json
+import os
+import pty
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+import rosbag
+
+ROOT = Path(__file__).resolve().parents[3]
+BASIN = ROOT / "test/data/basin.bag"
+FILES = {"map.ply", "map.png", "trajectory.csv", "summary.json"}
+COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
+
+
+def run(*arguments):
+    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False)
+
+
+def refused(*arguments):
+    """Return the one line with which map_bag refuses."""
+    done = run(*arguments)
+    lines = done.stderr.strip().splitlines()
+    assert (done.returncode, len(lines)) == (1, 1), done.stderr
+    return lines[0]
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def basin(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("basin")
+    done = run(BASIN, "--out", folder, "--truth", "/ground_truth", "--refine")
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+@pytest.fixture(scope="module")
+def marina(tmp_path_factory):
+    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_first.bag"
+    if not bag.is_file():
+        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
+    folder = tmp_path_factory.mktemp("marina")
+    assert run(bag, "--out", folder, "--truth", "/ground_truth").returncode == 0
+    return summary_of(folder)
+
+
+def test_a_simulated_bag_gives_all_files(basin):
+    assert {path.name for path in basin.iterdir()} == FILES
+
+
+def test_the_summary_has_the_promised_keys(basin):
+    summary = summary_of(basin)
+    counts = {"scans", "matched", "rejected", "blocks", "seconds", "times_real_time"}
+    assert counts <= set(summary)
+    for name in ("dead_reckoning", "corrected", "refined"):
+        assert set(summary[name]) == {"mean", "sd", "max"}
+    assert summary["matched"] >= 8
+
+
+def test_a_simulated_basin_is_mapped_where_it_is(basin):
+    table = np.genfromtxt(basin / "trajectory.csv", delimiter=",", names=True)
+    assert {"time", "odometry_x", "corrected_yaw", "refined_y"} <= set(table.dtype.names)
+    summary = summary_of(basin)
+    assert summary["corrected"]["mean"] < 1.2
+    assert summary["refined"]["mean"] < 1.0
+    assert summary["calibration"]["edge_half_width"] == 0.0
+
+
+def test_the_marina_is_corrected_as_the_issue_wants(marina):
+    assert marina["corrected"]["mean"] < 1.6
+    assert marina["corrected"]["max"] < 4.5
+    assert marina["dead_reckoning"]["mean"] > 6.0
+
+
+def test_a_missing_bag_is_named(tmp_path):
+    assert refused("/no/such.bag", "--out", tmp_path) == "map_bag: /no/such.bag: No such file or directory"
+
+
+def test_a_missing_topic_is_answered_with_those_there_are(tmp_path):
+    line = refused(BASIN, "--out", tmp_path, "--truth", "/gps")
+    assert "no topic /gps" in line
+    assert "/ground_truth" in line
+
+
+def test_an_empty_bag_is_refused(tmp_path):
+    rosbag.Bag(str(tmp_path / "empty.bag"), "w").close()
+    assert "there are none at all" in refused(tmp_path / "empty.bag", "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bag_without_tf_is_refused(tmp_path):
+    with rosbag.Bag(str(BASIN)) as whole, rosbag.Bag(str(tmp_path / "beams.bag"), "w") as beams:
+        for topic, message, stamp in whole.read_messages(topics=["/sonar/raw"]):
+            beams.write(topic, message, stamp)
+    assert "no /tf" in refused(tmp_path / "beams.bag", "--out", tmp_path / "out")
+
+
+def test_a_parameter_out_of_range_is_answered_with_the_range(tmp_path):
+    line = refused(BASIN, "--out", tmp_path, "--set", "edge_half_width=3")
+    assert line == "map_bag: edge_half_width = 3: must be a number from 0 to 0.3 rad"
+
+
+def test_an_unknown_parameter_is_named(tmp_path):
+    assert "no_such = 1: no such parameter" in refused(BASIN, "--out", tmp_path, "--set", "no_such=1")
+
+
+def test_parameters_of_a_file_are_taken_and_held(tmp_path):
+    (tmp_path / "mine.yaml").write_text("sonar_delay: 0.25\nmin_points: 20\n")
+    done = run(BASIN, "--out", tmp_path / "out", "--parameters", tmp_path / "mine.yaml", "--set", "range_scale=0.99")
+    assert done.returncode == 0, done.stderr
+    calibration = summary_of(tmp_path / "out")["calibration"]
+    assert (calibration["sonar_delay"], calibration["range_scale"]) == (0.25, 0.99)
+
+
+def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
+    terminal, end = pty.openpty()
+    process = subprocess.Popen([*COMMAND, str(BASIN), "--out", str(tmp_path), "--refine"], stderr=end)
+    shown = b""
+    while b"match" not in shown:
+        shown += os.read(terminal, 4096)
+    process.send_signal(signal.SIGINT)
+    start = time.monotonic()
+    assert process.wait(timeout=10) == 1
+    assert time.monotonic() - start < 2.0
+    assert list(tmp_path.iterdir()) == []
