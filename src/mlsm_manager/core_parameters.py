@@ -1,20 +1,14 @@
 """Parameters of mlsm_core."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from enum import Enum
-from typing import Type, TypeVar
 
 from mlsm_manager.mapping.mapper import MapSettings
-from mlsm_manager.matching.matcher import Matcher
-from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters, SegmentsMatcherParameters
-from mlsm_manager.matching.matchers import MATCHERS, MatcherName
+from mlsm_manager.mapping.matcher_choice import MatcherChoice
 from mlsm_manager.matching.prediction import OdometryErrors
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 MAX_PREALLOCATED_CELLS = 16_000_000
-
-
-Part = TypeVar("Part", bound=ParameterSet)
 
 
 class MatchInput(Enum):
@@ -26,11 +20,8 @@ class MatchInput(Enum):
 
 @dataclass(frozen=True)
 class MatchingParameters(ParameterSet):
-    """Which matcher runs on what, and what becomes of its answers."""
+    """What is matched, and what becomes of the answers."""
 
-    matcher: MatcherName = parameter(
-        MatcherName.DISTRIBUTIONS, "the default matcher, or the thesis's to compare with", tunable=False
-    )
     match_input: MatchInput = parameter(
         MatchInput.ECHOES, "points that are matched: sonar/scan/echoes or sonar/scan/cleaned", tunable=False
     )
@@ -96,22 +87,11 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MlsmCoreParameters(
-    SegmentsMatcherParameters, DistributionMatcherParameters, OdometryErrors, MatchingParameters, MapParameters
-):
+class MlsmCoreParameters(MatcherChoice, OdometryErrors, MatchingParameters, MapParameters):
     """All of mlsm_core's parameters, in one namespace."""
-
-    def part(self, kind: Type[Part]) -> Part:
-        """Return those that belong to one of the sets that this one is made of."""
-        return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
 
     def settings(self) -> MapSettings:
         """Return what the mapper's grids are made from."""
         return MapSettings(
             self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points
         )
-
-    def build_matcher(self) -> Matcher:
-        """Return the matcher that `matcher` names."""
-        kind = MATCHERS[self.matcher]
-        return kind.build(self.part(kind.parameters))

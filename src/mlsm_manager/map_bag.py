@@ -8,6 +8,7 @@ from typing import Any, Dict, List, Optional
 from tqdm import tqdm
 
 from mlsm_manager.bag_recording import BagNames, read_recording
+from mlsm_manager.live_file import write_live
 from mlsm_manager.map_bag_arguments import map_bag_arguments
 from mlsm_manager.mapping.calibration import calibrated
 from mlsm_manager.mapping.recording import Recording, RecordingError, scans_of
@@ -45,6 +46,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     run = _run(replayed, _refined(recording, replayed) if options.refine else None)
     errors = errors_of(run, recording)
     write_run(options.out, options.bag.name, run, recording)
+    write_live(options.out / "live.yaml", parameters, names.odom_frame, names.base_frame)
     seconds = time.monotonic() - start
     summary = {
         **run.counts,
@@ -109,4 +111,4 @@ def _told(summary: Dict[str, Any], options: Namespace) -> List[str]:
         if name in summary:
             error = summary[name]
             lines.append(f"{name}: mean {error['mean']} m, sd {error['sd']} m, max {error['max']} m")
-    return [*lines, f"in {options.out}: map.ply map.png trajectory.csv summary.json"]
+    return [*lines, f"in {options.out}: map.ply map.png trajectory.csv live.yaml summary.json"]

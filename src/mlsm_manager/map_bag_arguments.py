@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Tuple
 
 import yaml
 
+from mlsm_manager.live_file import replay_values
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from mlsm_manager.matching.matchers import MatcherName
 from node_support.parameters import ParameterError
@@ -28,7 +29,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         action="store_false",
         help="take sonar_delay, range_scale and edge_half_width as they are set, do not estimate them",
     )
-    parser.add_argument("--parameters", type=Path, help="yaml file of parameters; --set goes before it")
+    parser.add_argument("--parameters", type=Path, help="yaml file (a live.yaml, too); --set goes before it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     parser.add_argument("--beams", default="/sonar/raw", help="topic of the beams (default: %(default)s)")
     parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
@@ -50,7 +51,7 @@ def _from_file(path: Path) -> Dict[str, Any]:
         raise ParameterError(f"{path}: {getattr(error, 'strerror', None) or 'no yaml'}") from None
     if not isinstance(values, dict):
         raise ParameterError(f"{path}: must hold lines of KEY: VALUE")
-    return values
+    return replay_values(values)
 
 
 def _pair(text: str, parser: argparse.ArgumentParser) -> Tuple[str, Any]:

@@ -15,6 +15,7 @@ from mlsm_manager.map_transform import MapTransform
 from mlsm_manager.mapping.live_correction import LiveCorrection
 from mlsm_manager.mapping.mapper import CloudUpdate, Mapper, ScanUpdate
 from mlsm_manager.mapping.relocalisation import relocalised, relocaliser
+from mlsm_manager.mapping.sensor_model import trusted
 from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
 from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.scan import Scan, Track
@@ -155,7 +156,8 @@ class MlsmCore:
             if self._mapper.matching:
                 raise
             return None
-        return Scan.from_stamps(cloud.points, cloud.time_stamps, time, track)
+        scan = Scan.from_stamps(cloud.points, cloud.time_stamps, time, track)
+        return trusted(scan, self._live.current.edge_half_width)
 
     def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
         if update.result is None or not update.accepted:
@@ -213,7 +215,7 @@ class MlsmCore:
             if scan is None:
                 return TriggerResponse(False, "no scan yet")
             parameters = self._live.current
-            matcher = relocaliser(parameters.part(DistributionMatcherParameters))
+            matcher = relocaliser(parameters.as_wide_as_heard().part(DistributionMatcherParameters))
             result = relocalised(scan, self._mapper.matched.blocks, matcher, self._mapper.errors)
             if not result.accepted:
                 return TriggerResponse(False, f"{result.status.value}: {result.reason}")

@@ -28,6 +28,8 @@ class Beam:
     sensor_angle: float = 0.0
 
     def __post_init__(self) -> None:
+        if self.stamp_ns < 0:
+            raise RefusedInput("beams refused", f"stamp {self.stamp_ns * 1e-9:.3f} s, below 0; check sonar_delay")
         bins = self.intensities.size
         if not 1 <= bins <= MAX_BINS:
             raise RefusedInput("beams refused", f"{bins} bins, must be 1 to {MAX_BINS}; check the driver")

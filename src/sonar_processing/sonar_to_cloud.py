@@ -59,7 +59,7 @@ class SonarToCloud:
         self.health.count("beams in")
         beam = beam_from_message(message)
         self.health.count("points in", beam.intensities.size)
-        self._filter.add(beam, self._is_moving(beam.stamp_ns))
+        self._filter.add(self._live.current.corrected(beam), self._is_moving(beam.stamp_ns))
 
     def _is_moving(self, stamp_ns: int) -> bool:
         parameters = self._live.current

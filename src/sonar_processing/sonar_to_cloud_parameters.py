@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from node_support.parameters import ParameterSet, parameter
+from sonar_processing.beam_correction import BeamCorrection
 
 
 class ScanMode(Enum):
@@ -41,8 +42,8 @@ class VelocityType(Enum):
 
 
 @dataclass(frozen=True)
-class SonarToCloudParameters(ParameterSet):
-    """Parameters of sonar_to_cloud."""
+class ScanParameters(ParameterSet):
+    """How beams become points, points become scans, and when the vehicle counts as still."""
 
     mode: ScanMode = parameter(
         ScanMode.SONAR, "all bins or one bin of each beam; CONT: a cloud per beam", thesis_name="mode"
@@ -81,3 +82,8 @@ class SonarToCloudParameters(ParameterSet):
     still_turn_rate: float = parameter(
         0.005, "turning slower than this counts as still", unit="rad/s", low=0.0, high=1.0
     )
+
+
+@dataclass(frozen=True)
+class SonarToCloudParameters(BeamCorrection, ScanParameters):
+    """Parameters of sonar_to_cloud."""

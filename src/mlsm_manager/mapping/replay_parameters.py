@@ -1,33 +1,21 @@
 """Parameters of map_bag: those of the echo extractor, the sensor model, the odometry, the matchers and the maps."""
 
-from dataclasses import dataclass, fields
-from typing import Type, TypeVar
+from dataclasses import dataclass
 
 from mlsm_manager.mapping.mapper import Mapper, MapSettings
+from mlsm_manager.mapping.matcher_choice import MatcherChoice
 from mlsm_manager.mapping.sensor_model import SensorModel
-from mlsm_manager.matching.matcher import Matcher
-from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters, SegmentsMatcherParameters
-from mlsm_manager.matching.matchers import MATCHERS, MatcherName
 from mlsm_manager.matching.prediction import OdometryErrors
-from node_support.parameters import ParameterSet, parameter
+from node_support.parameters import parameter
 from sonar_processing.echo_extraction import EchoExtractorParameters, ExtractionMode
 
 _LIMIT = 10000.0
 
-Part = TypeVar("Part", bound=ParameterSet)
-
 
 @dataclass(frozen=True)
-class ReplayParameters(
-    SegmentsMatcherParameters,
-    DistributionMatcherParameters,
-    OdometryErrors,
-    SensorModel,
-    EchoExtractorParameters,
-):
+class ReplayParameters(MatcherChoice, OdometryErrors, SensorModel, EchoExtractorParameters):
     """All that --set may change; where a default differs from the live nodes', it is what recordings showed."""
 
-    matcher: MatcherName = parameter(MatcherName.DISTRIBUTIONS, "the default matcher, or the thesis's to compare with")
     resolution: float = parameter(0.5, "side of a cell of the map that is written", unit="m", low=0.01, high=100.0)
     match_resolution: float = parameter(
         1.0, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0
@@ -36,16 +24,6 @@ class ReplayParameters(
     mode: ExtractionMode = parameter(
         ExtractionMode.LEADING_EDGE, "the peak of an echo, where it begins, or points all along it"
     )
-    sonar_delay: float = parameter(
-        0.0, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0
-    )
-    range_scale: float = parameter(
-        1.0, "true range over the range that the sonar reports, as of another speed of sound", low=0.5, high=2.0
-    )
-    edge_half_width: float = parameter(
-        0.0, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
-        unit="rad", low=0.0, high=0.3,
-    )  # fmt: skip
     range_scale_deviation: float = parameter(
         0.02, "how far all ranges may be off in proportion, as by the speed of sound", low=0.0, high=0.5
     )
@@ -78,10 +56,6 @@ class ReplayParameters(
         low=1.0, high=100.0,
     )  # fmt: skip
 
-    def part(self, kind: Type[Part]) -> Part:
-        """Return those that belong to one of the sets that this one is made of."""
-        return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
-
     def echoes(self) -> EchoExtractorParameters:
         """Return how echoes are found."""
         return self.part(EchoExtractorParameters)
@@ -89,12 +63,6 @@ class ReplayParameters(
     def sensor_model(self) -> SensorModel:
         """Return how echoes lie against surfaces."""
         return self.part(SensorModel)
-
-    def build_matcher(self) -> Matcher:
-        """Return the matcher; it knows that echoes come from as wide a beam as the sensor model says."""
-        kind = MATCHERS[self.matcher]
-        wide = self.changed({"beam_width": max(self.beam_width, 2.0 * self.edge_half_width)})
-        return kind.build(wide.part(kind.parameters))
 
     def build_mapper(self) -> Mapper:
         """Return an empty mapper that matches from the start."""

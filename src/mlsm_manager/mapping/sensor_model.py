@@ -9,6 +9,7 @@ from scipy.spatial import cKDTree
 from mlsm_manager.matching.planar import inverse, rotated, transformed
 from mlsm_manager.matching.scan import Scan
 from node_support.parameters import ParameterSet, parameter
+from sonar_processing.beam_correction import BeamCorrection
 
 _NEIGHBOURS = 10
 _REACH = 4.0
@@ -20,21 +21,18 @@ _MOST_SHIFT = 0.8
 
 
 @dataclass(frozen=True)
-class SensorModel(ParameterSet):
-    """How the echoes of a scan lie against the surfaces that made them."""
+class BeamEdge(ParameterSet):
+    """How far to its sides a beam hears surfaces."""
 
-    sonar_delay: float = parameter(
-        0.0, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0,
-        tunable=False,
-    )  # fmt: skip
-    range_scale: float = parameter(
-        1.0, "true range over the range that the sonar reports, as of another speed of sound", low=0.5, high=2.0,
-        tunable=False,
-    )  # fmt: skip
     edge_half_width: float = parameter(
         0.0, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
-        unit="rad", low=0.0, high=0.3, tunable=False,
+        unit="rad", low=0.0, high=0.25, tunable=False,
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SensorModel(BeamEdge, BeamCorrection):
+    """How the echoes of a scan lie against the surfaces that made them."""
 
     def applied(self, scan: Scan) -> Scan:
         """Return the scan with stamps and points put right; see `restamped`, `rescaled` and `trusted`."""
