@@ -15,7 +15,7 @@ import rosbag
 
 ROOT = Path(__file__).resolve().parents[3]
 BASIN = ROOT / "test/data/basin.bag"
-FILES = {"map.ply", "map.png", "trajectory.csv", "summary.json"}
+FILES = {"map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json"}
 COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
 
 
@@ -73,6 +73,15 @@ def test_a_simulated_basin_is_mapped_where_it_is(basin):
     assert summary["corrected"]["mean"] < 1.2
     assert summary["refined"]["mean"] < 1.0
     assert summary["calibration"]["edge_half_width"] == 0.0
+
+
+def test_what_it_used_is_left_for_the_live_nodes_and_for_another_run(basin, tmp_path):
+    assert run(BASIN, "--out", tmp_path, "--parameters", basin / "live.yaml").returncode == 0
+    assert (tmp_path / "live.yaml").read_text() == (basin / "live.yaml").read_text()
+    columns = ("corrected_x", "corrected_y", "corrected_yaw")
+    tables = [np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True) for folder in (basin, tmp_path)]
+    for name in columns:
+        np.testing.assert_array_equal(tables[0][name], tables[1][name])
 
 
 def test_the_marina_is_corrected_as_the_issue_wants(marina):

@@ -1,0 +1,95 @@
+"""live.yaml takes what map_bag did to the live nodes, and back."""
+
+import subprocess
+from pathlib import Path
+
+import pytest
+import yaml
+
+from mlsm_manager.live_file import NODES, live_values, replay_values, write_live
+from mlsm_manager.mapping.replay_parameters import ReplayParameters
+from node_support.parameters import ParameterError
+
+ROOT = Path(__file__).resolve().parents[3]
+USED = ReplayParameters().changed(
+    {"sonar_delay": 0.9, "range_scale": 0.97, "edge_half_width": 0.06, "matcher": "SEGMENTS", "spacing": 0.7}
+)
+
+
+@pytest.fixture
+def written(tmp_path):
+    path = tmp_path / "live.yaml"
+    write_live(path, USED, "dead_reckoning", "hull")
+    return path
+
+
+def test_every_node_takes_its_part(written):
+    values = yaml.safe_load(written.read_text())
+    assert set(values) == set(NODES)
+    cloud, echoes, core = (NODES[name].from_mapping(values[name]) for name in NODES)
+    assert (cloud.sonar_delay, cloud.range_scale, echoes.spacing, core.edge_half_width) == (0.9, 0.97, 0.7, 0.06)
+    assert (cloud.target_frame, core.odom_frame, core.base_frame) == ("dead_reckoning", "dead_reckoning", "hull")
+    assert core.start_matching
+
+
+def test_a_comment_says_what_it_is_for(written):
+    assert written.read_text().startswith(
+        "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take"
+    )
+
+
+def test_the_live_matcher_and_mapper_are_those_of_the_replay(written):
+    core = NODES["mlsm_core"].from_mapping(yaml.safe_load(written.read_text())["mlsm_core"])
+    assert vars(core.build_matcher()) == vars(USED.build_matcher())
+    live, replayed = core.settings(), USED.build_mapper().settings
+    assert (live.match_resolution, live.fewest_blocks) == (replayed.match_resolution, replayed.fewest_blocks)
+
+
+def test_map_bag_takes_it_back(written):
+    assert ReplayParameters.from_mapping(replay_values(yaml.safe_load(written.read_text()))) == USED
+
+
+def test_plain_keys_stay_as_they_are():
+    assert replay_values({"min_points": 20, "no_such": 1}) == {"min_points": 20, "no_such": 1}
+
+
+def test_what_only_the_live_node_knows_is_left_out():
+    assert replay_values({"sonar_to_cloud": {"scan_size": 200, "beam_width": 0.1}}) == {}
+
+
+@pytest.mark.parametrize("group", [{"sonar_delay": 99.0}, {"no_such": 1}, [1]])
+def test_what_a_node_would_refuse_is_refused_by_its_name(group):
+    with pytest.raises(ParameterError, match="sonar_to_cloud"):
+        replay_values({"sonar_to_cloud": group})
+
+
+def launched(launch, *arguments):
+    """Return the parameters that a launch file would set."""
+    command = ["roslaunch", "--dump-params", str(ROOT / "launch" / launch), *arguments]
+    return yaml.safe_load(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+
+
+LAUNCHES = [
+    ("mapping.launch", "processes:=one"),
+    ("mapping.launch", "processes:=many"),
+    ("vehicle.launch", "odom_frame:=dead_reckoning", "base_frame:=hull"),
+    ("play_bag.launch", "bag:=/no.bag", "processes:=many"),
+]
+
+
+@pytest.mark.parametrize("launch", LAUNCHES, ids=" ".join)
+def test_launch_files_load_it_over_the_nodes_own(launch, written):
+    found = launched(*launch, f"parameters:={written}")
+    for node, values in live_values(USED, "dead_reckoning", "hull").items():
+        assert {key: found[f"/{node}/{key}"] for key in values} == values
+    assert found["/sonar_to_cloud/scan_size"] == 120
+
+
+def test_without_it_the_nodes_own_hold():
+    assert launched("mapping.launch")["/mlsm_core/edge_half_width"] == 0.0
+
+
+def test_an_argument_goes_before_it(written):
+    assert launched("mapping.launch", f"parameters:={written}", "matcher:=DISTRIBUTIONS")["/mlsm_core/matcher"] == (
+        "DISTRIBUTIONS"
+    )
