@@ -10,7 +10,7 @@ from mlsm_manager.matching.matcher_parameters import DistributionMatcherParamete
 from mlsm_manager.matching.matchers import MATCHERS, MatcherName
 from mlsm_manager.matching.prediction import OdometryErrors
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.echo_extraction import EchoExtractorParameters, ExtractionMode
+from sonar_processing.echo_extraction import EchoExtractorParameters
 
 _LIMIT = 10000.0
 
@@ -30,12 +30,9 @@ class ReplayParameters(
     matcher: MatcherName = parameter(MatcherName.DISTRIBUTIONS, "the default matcher, or the thesis's to compare with")
     resolution: float = parameter(0.5, "side of a cell of the map that is written", unit="m", low=0.01, high=100.0)
     match_resolution: float = parameter(
-        1.0, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0
+        0.5, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0
     )
     blend_time: float = parameter(1.0, "the correction goes over to a new fix within this time", unit="s", low=0.0)
-    mode: ExtractionMode = parameter(
-        ExtractionMode.LEADING_EDGE, "the peak of an echo, where it begins, or points all along it"
-    )
     sonar_delay: float = parameter(
         0.0, "what to add to the beams' stamps so that they agree with the odometry's", unit="s", low=-10.0, high=10.0
     )
