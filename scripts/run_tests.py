@@ -34,16 +34,14 @@ class Step:
 
 def steps() -> List[Step]:
     """Return all steps, quick ones first."""
-    unit_report = RESULTS / "unit.xml"
+    unit_report, recordings_report = RESULTS / "unit.xml", RESULTS / "recordings.xml"
+    pytest = ["python3", "-m", "pytest"]
     found = [
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
         Step("ruff format", ["ruff", "format", "--quiet", "--check", "."]),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
-        Step(
-            "unit tests",
-            ["python3", "-m", "pytest", "-n", "auto", "--dist", "loadfile", f"--junitxml={unit_report}"],
-            unit_report,
-        ),
+        Step("unit tests", [*pytest, "-n", "auto", "--dist", "loadfile", f"--junitxml={unit_report}"], unit_report),
+        Step("recordings", [*pytest, "test/recordings", f"--junitxml={recordings_report}"], recordings_report),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):
         folder = RESULTS / test.stem

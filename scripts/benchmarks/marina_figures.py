@@ -11,6 +11,7 @@ from typing import Any, Dict, List
 from benchmarks.table import Row
 from mlsm_manager.bag_recording import BagNames, read_recording
 from mlsm_manager.mapping.calibration import Calibrator
+from mlsm_manager.mapping.echo_form import echo_form_of, suited
 from mlsm_manager.mapping.recording import scans_of
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from mlsm_manager.mapping.sensor_model import SensorModel, at_beam_edge
@@ -55,7 +56,8 @@ def _error_row(name: str, error: Dict[str, float], wanted: str) -> Row:
 def _calibration_rows(bag: Path) -> List[Row]:
     """Return the residuals that decide the sensor model; the truth is not read."""
     recording = read_recording(bag, BagNames("/sonar/raw", "odom", "base_link", None))
-    parameters = ReplayParameters(range_scale_deviation=0.0)
+    form = echo_form_of([placed.beam for placed in recording.beams])
+    parameters = suited(ReplayParameters(range_scale_deviation=0.0), form, held=())
     scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
     width = half_width_of(scans)
     result: List[Row] = []

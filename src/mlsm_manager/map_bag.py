@@ -11,6 +11,7 @@ from mlsm_manager.bag_recording import BagNames, read_recording
 from mlsm_manager.live_file import write_live
 from mlsm_manager.map_bag_arguments import map_bag_arguments
 from mlsm_manager.mapping.calibration import calibrated
+from mlsm_manager.mapping.echo_form import echo_form_of, suited
 from mlsm_manager.mapping.recording import Recording, RecordingError, scans_of
 from mlsm_manager.mapping.refinement import Refined, refine
 from mlsm_manager.mapping.replay import Replayed, replay
@@ -18,6 +19,7 @@ from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from mlsm_manager.matching.scan import Scan
 from mlsm_manager.run_files import CORRECTED, ODOMETRY, REFINED, Run, errors_of, write_run, write_summary
 from node_support.parameters import ParameterError
+from sonar_processing.beam_correction import BeamCorrection
 
 
 def run_map_bag() -> None:
@@ -40,9 +42,10 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
     recording = read_recording(options.bag, names)
     options.out.mkdir(parents=True, exist_ok=True)
-    scans = _scans(recording, options)
-    parameters = _calibrated(scans, options)
-    replayed = _replayed(recording, scans, parameters)
+    parameters = _fitted_to_echoes(recording, options)
+    parameters = _calibrated(_scans(recording, parameters, options), parameters, options)
+    recording = recording.corrected(parameters.part(BeamCorrection))
+    replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
     run = _run(replayed, _refined(recording, replayed) if options.refine else None)
     errors = errors_of(run, recording)
     write_run(options.out, options.bag.name, run, recording)
@@ -53,17 +56,24 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
-        "calibration": {name: round(value, 4) for name, value in parameters.sensor_model().to_mapping().items()},
+        "calibration": _calibration(parameters),
         **errors,
     }
     write_summary(options.out, summary)
     return summary
 
 
-def _scans(recording: Recording, options: Namespace) -> List[Scan]:
+def _fitted_to_echoes(recording: Recording, options: Namespace) -> ReplayParameters:
+    if not options.calibrate:
+        return options.parameters
+    form = echo_form_of([placed.beam for placed in recording.beams])
+    return suited(options.parameters, form, options.held)
+
+
+def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
     with _bar(len(recording.beams), "beam", "echoes") as bar:
         scans = []
-        for scan, beams in scans_of(recording, options.parameters.echoes()):
+        for scan, beams in scans_of(recording, parameters.echoes()):
             scans.append(scan)
             bar.update(beams)
     if not scans:
@@ -71,11 +81,17 @@ def _scans(recording: Recording, options: Namespace) -> List[Scan]:
     return scans
 
 
-def _calibrated(scans: List[Scan], options: Namespace) -> ReplayParameters:
+def _calibrated(scans: List[Scan], parameters: ReplayParameters, options: Namespace) -> ReplayParameters:
     if not options.calibrate:
-        return options.parameters
+        return parameters
     with _bar(None, "", "calibrate"):
-        return calibrated(scans, options.parameters, options.held)
+        return calibrated(scans, parameters, options.held)
+
+
+def _calibration(parameters: ReplayParameters) -> Dict[str, Any]:
+    model = {name: round(value, 4) for name, value in parameters.sensor_model().to_mapping().items()}
+    chosen = parameters.to_mapping()
+    return {**{name: chosen[name] for name in ("mode", "match_resolution", "scale_deviation")}, **model}
 
 
 def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParameters) -> Replayed:

@@ -17,6 +17,7 @@ from mlsm_manager.mapping.mapper import CloudUpdate, Mapper, ScanUpdate
 from mlsm_manager.mapping.relocalisation import relocalised, relocaliser
 from mlsm_manager.mapping.sensor_model import trusted
 from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.planar import matrices
 from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.scan import Scan, Track
 from mlsm_manager.odometry_track import OdometryTrack
@@ -162,10 +163,7 @@ class MlsmCore:
     def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
         if update.result is None or not update.accepted:
             return
-        x, y, yaw = update.result.correction(update.scan)
-        T_map_odom = np.eye(4)
-        T_map_odom[:2, :2] = [[np.cos(yaw), -np.sin(yaw)], [np.sin(yaw), np.cos(yaw)]]
-        T_map_odom[:2, 3] = x, y
+        T_map_odom = matrices(update.result.correction(update.scan))
         T_map_base = T_map_odom @ self._odometry.matrix(update.scan.reference_time)
         self._fix.publish(update.result, T_map_base, stamp_ns)
 

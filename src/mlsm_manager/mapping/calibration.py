@@ -20,6 +20,7 @@ from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.result import MatchResult, Prior
 from mlsm_manager.matching.scan import Scan
 from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from sonar_processing.echo_extraction import ExtractionMode
 
 _DELAY_DEVIATION = 1.0
 _RANGE_SCALE_DEVIATION = 0.03
@@ -32,14 +33,21 @@ _OUTLIER = 3.0
 
 
 def calibrated(scans: List[Scan], parameters: ReplayParameters, held: Collection[str]) -> ReplayParameters:
-    """Return `parameters` with those of the sensor model that are not `held` estimated from raw `scans`."""
+    """Return `parameters` with those of the sensor model and `scale_deviation` estimated from raw `scans`.
+
+    Those that are `held` stay. Only the leading edge of an echo lies beside the axis of a wide beam; its peak does not.
+    An odometry that disagrees with the sonar by more than both may be wrong is taken for as wrong as that.
+    """
     model = parameters.sensor_model()
-    if "edge_half_width" not in held:
+    if "edge_half_width" not in held and parameters.mode is ExtractionMode.LEADING_EDGE:
         model = model.changed({"edge_half_width": half_width_of(scans)})
     # A fit that takes the scale of its ranges for unknown would not show it.
     matcher = parameters.changed({**model.to_mapping(), "range_scale_deviation": 0.0}).build_matcher()
     calibrator = Calibrator(matcher, parameters.part(OdometryErrors), parameters.match_resolution)
-    return parameters.changed(calibrator.calibrated(scans, model, held).to_mapping())
+    model, scale = calibrator.calibrated(scans, model, held)
+    if "scale_deviation" not in held and calibrator.contradicts(scale):
+        parameters = parameters.changed({"scale_deviation": abs(scale.value)})
+    return parameters.changed(model.to_mapping())
 
 
 @dataclass(frozen=True)
@@ -65,15 +73,20 @@ class Calibrator:
     errors: OdometryErrors
     resolution: float
 
-    def calibrated(self, scans: List[Scan], model: SensorModel, held: Collection[str]) -> SensorModel:
-        """Return `model` with delay and scale, where they are not `held`, estimated from raw `scans`."""
+    def calibrated(self, scans: List[Scan], model: SensorModel, held: Collection[str]) -> Tuple[SensorModel, Estimate]:
+        """Return `model` with delay and scale, where they are not `held`, estimated from raw `scans`; and `scale`."""
         if "sonar_delay" not in held:
             found = self.delay([model.applied(scan) for scan in scans])
             model = model.changed({"sonar_delay": model.sonar_delay + found.shrunk(_DELAY_DEVIATION)})
-        if "range_scale" not in held:
-            found = self.scale([model.applied(scan) for scan in scans])
-            model = model.changed({"range_scale": model.range_scale / (1.0 + self._share_of_sonar(found))})
-        return model
+        scale = self.scale([model.applied(scan) for scan in scans])
+        if "range_scale" not in held and not self.contradicts(scale):
+            model = model.changed({"range_scale": model.range_scale / (1.0 + self._share_of_sonar(scale))})
+        return model, scale
+
+    def contradicts(self, scale: Estimate) -> bool:
+        """Whether a disagreement in scale is more than odometry and speed of sound can explain as they are expected."""
+        expected = np.hypot(_RANGE_SCALE_DEVIATION, self.errors.scale_deviation)
+        return scale.pairs >= _FEWEST_PAIRS and abs(scale.value) > _OUTLIER * float(np.hypot(expected, scale.deviation))
 
     def delay(self, scans: List[Scan]) -> Estimate:
         """Return by how much the sonar's stamps are early against the odometry's heading, s."""

@@ -1,12 +1,14 @@
 """What a bag holds, as the cores take it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Iterator, List, Optional, Tuple
 
 import numpy as np
 
+from mlsm_manager.matching.planar import composed, inverse, matrices
 from mlsm_manager.matching.scan import Scan, Track
 from node_support.refused_input import RefusedInput
+from sonar_processing.beam_correction import BeamCorrection
 from sonar_processing.echo_extraction import EchoExtractorParameters
 from sonar_processing.echo_extractor import EchoExtractor
 from sonar_processing.placed_beam import PlacedBeam
@@ -41,6 +43,24 @@ class Recording:
     unplaced: int
     track: Track
     truth: Optional[Truth]
+
+    def corrected(self, correction: BeamCorrection) -> "Recording":
+        """Return the recording with all beams corrected, each placed by the odometry at its new stamp.
+
+        Beams that the track does not reach then count as unplaced; depth and tilt of the others stay.
+        """
+        if correction == BeamCorrection():
+            return self
+        times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
+        later = times + correction.sonar_delay
+        reached = (later >= self.track.times[0]) & (later <= self.track.times[-1])
+        moves = matrices(composed(self.track.at(later), inverse(self.track.at(times))))
+        beams = [
+            PlacedBeam(correction.corrected(placed.beam), move @ placed.T_target_sonar, placed.is_moving)
+            for placed, move, kept in zip(self.beams, moves, reached)
+            if kept
+        ]
+        return replace(self, beams=beams, unplaced=self.unplaced + len(self.beams) - len(beams))
 
     @property
     def seconds(self) -> float:

@@ -9,6 +9,7 @@ from mlsm_manager.mapping.live_correction import LiveCorrection
 from mlsm_manager.mapping.mapper import Mapper, ScanUpdate
 from mlsm_manager.mapping.recording import Recording
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
+from mlsm_manager.mapping.sensor_model import trusted
 from mlsm_manager.matching.planar import composed
 from mlsm_manager.matching.scan import Scan
 
@@ -41,16 +42,15 @@ class Replayed:
 def replay(
     recording: Recording, scans: Sequence[Scan], parameters: ReplayParameters, on_scans: Callable[[int], None]
 ) -> Replayed:
-    """Match the raw `scans` of a recording one after the other; `on_scans` is told with 1 that one is done.
+    """Match the `scans` of corrected beams one after the other; `on_scans` is told with 1 that one is done.
 
     A scan is used from the moment on at which its last beam and the odometry of that time were known.
     """
-    mapper, sensor = parameters.build_mapper(), parameters.sensor_model()
-    live = LiveCorrection(parameters.blend_time)
+    mapper, live = parameters.build_mapper(), LiveCorrection(parameters.blend_time)
     track, corrections, updates = recording.track, np.empty((len(recording.track.times), 3)), []
     done = 0
-    for raw in scans:
-        scan = sensor.applied(raw)
+    for untrusted in scans:
+        scan = trusted(untrusted, parameters.edge_half_width)
         known = int(np.searchsorted(track.times, scan.reference_time, side="left"))
         done = _follow(live, recording, corrections, done, known)
         updates.append(mapper.take_echoes(scan))

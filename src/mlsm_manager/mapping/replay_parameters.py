@@ -7,7 +7,7 @@ from mlsm_manager.mapping.matcher_choice import MatcherChoice
 from mlsm_manager.mapping.sensor_model import SensorModel
 from mlsm_manager.matching.prediction import OdometryErrors
 from node_support.parameters import parameter
-from sonar_processing.echo_extraction import EchoExtractorParameters, ExtractionMode
+from sonar_processing.echo_extraction import EchoExtractorParameters
 
 _LIMIT = 10000.0
 
@@ -18,12 +18,9 @@ class ReplayParameters(MatcherChoice, OdometryErrors, SensorModel, EchoExtractor
 
     resolution: float = parameter(0.5, "side of a cell of the map that is written", unit="m", low=0.01, high=100.0)
     match_resolution: float = parameter(
-        1.0, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0
+        0.5, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0
     )
     blend_time: float = parameter(1.0, "the correction goes over to a new fix within this time", unit="s", low=0.0)
-    mode: ExtractionMode = parameter(
-        ExtractionMode.LEADING_EDGE, "the peak of an echo, where it begins, or points all along it"
-    )
     range_scale_deviation: float = parameter(
         0.02, "how far all ranges may be off in proportion, as by the speed of sound", low=0.0, high=0.5
     )

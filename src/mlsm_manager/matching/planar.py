@@ -39,3 +39,14 @@ def transformed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     result = np.array(points, dtype=np.float64)
     result[:, :2] = pose[..., :2] + rotated(result[:, :2], pose[..., 2])
     return result
+
+
+def matrices(pose: np.ndarray) -> np.ndarray:
+    """Return T_a_b (..., 3) as (..., 4, 4), at the same height and level."""
+    pose = np.asarray(pose, dtype=np.float64)
+    result = np.zeros((*pose.shape[:-1], 4, 4))
+    result[..., :2, 0] = rotated(np.array([1.0, 0.0]), pose[..., 2])
+    result[..., :2, 1] = rotated(np.array([0.0, 1.0]), pose[..., 2])
+    result[..., :2, 3] = pose[..., :2]
+    result[..., 2, 2] = result[..., 3, 3] = 1.0
+    return result

@@ -43,16 +43,6 @@ def basin(tmp_path_factory):
     return folder
 
 
-@pytest.fixture(scope="module")
-def marina(tmp_path_factory):
-    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_first.bag"
-    if not bag.is_file():
-        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
-    folder = tmp_path_factory.mktemp("marina")
-    assert run(bag, "--out", folder, "--truth", "/ground_truth").returncode == 0
-    return summary_of(folder)
-
-
 def test_a_simulated_bag_gives_all_files(basin):
     assert {path.name for path in basin.iterdir()} == FILES
 
@@ -73,21 +63,15 @@ def test_a_simulated_basin_is_mapped_where_it_is(basin):
     assert summary["corrected"]["mean"] < 1.2
     assert summary["refined"]["mean"] < 1.0
     assert summary["calibration"]["edge_half_width"] == 0.0
+    assert summary["calibration"]["mode"] == "MATCHED_FILTER"
 
 
 def test_what_it_used_is_left_for_the_live_nodes_and_for_another_run(basin, tmp_path):
     assert run(BASIN, "--out", tmp_path, "--parameters", basin / "live.yaml").returncode == 0
     assert (tmp_path / "live.yaml").read_text() == (basin / "live.yaml").read_text()
-    columns = ("corrected_x", "corrected_y", "corrected_yaw")
     tables = [np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True) for folder in (basin, tmp_path)]
-    for name in columns:
+    for name in ("corrected_x", "corrected_y", "corrected_yaw"):
         np.testing.assert_array_equal(tables[0][name], tables[1][name])
-
-
-def test_the_marina_is_corrected_as_the_issue_wants(marina):
-    assert marina["corrected"]["mean"] < 1.6
-    assert marina["corrected"]["max"] < 4.5
-    assert marina["dead_reckoning"]["mean"] > 6.0
 
 
 def test_a_missing_bag_is_named(tmp_path):

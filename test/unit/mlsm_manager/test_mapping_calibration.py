@@ -8,6 +8,7 @@ from mlsm_manager.mapping.calibration import Calibrator, Estimate, calibrated
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from mlsm_manager.mapping.straightness import half_width_of
 from mlsm_manager.matching.prediction import OdometryErrors
+from sonar_processing.echo_extraction import ExtractionMode
 
 PARAMETERS = ReplayParameters(range_scale_deviation=0.0)
 
@@ -46,6 +47,20 @@ def test_what_is_held_stays():
 def test_too_few_scans_change_nothing():
     found = calibrated(heard(path(60.0), delay=0.8, half_width=0.06), PARAMETERS, ())
     assert found.sensor_model().to_mapping() == {"sonar_delay": 0.0, "range_scale": 1.0, "edge_half_width": 0.0}
+
+
+def test_only_leading_edges_are_turned():
+    scans = heard(path(), half_width=0.06)
+    held = ("sonar_delay", "range_scale")
+    edges = PARAMETERS.changed({"mode": ExtractionMode.LEADING_EDGE})
+    assert calibrated(scans, edges, held).edge_half_width == pytest.approx(0.06, abs=0.02)
+    assert calibrated(scans, PARAMETERS, held).edge_half_width == 0.0
+
+
+def test_an_odometry_that_no_speed_of_sound_explains_is_contradicted():
+    assert calibrator().contradicts(Estimate(0.3, 0.05, 20))
+    assert not calibrator().contradicts(Estimate(0.054, 0.028, 20))
+    assert not calibrator().contradicts(Estimate(0.3, 0.05, 3))
 
 
 def test_an_estimate_is_drawn_to_zero_as_far_as_it_is_uncertain():

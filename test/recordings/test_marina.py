@@ -1,0 +1,40 @@
+"""map_bag on the recorded marina: the figures that the position fix must keep, from the recording alone."""
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+@pytest.fixture(scope="module")
+def marina(tmp_path_factory):
+    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_first.bag"
+    if not bag.is_file():
+        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
+    folder = tmp_path_factory.mktemp("marina")
+    command = [sys.executable, str(ROOT / "nodes/map_bag"), str(bag), "--out", str(folder)]
+    subprocess.run([*command, "--truth", "/ground_truth", "--refine"], check=True, stdout=subprocess.DEVNULL)
+    return json.loads((folder / "summary.json").read_text())
+
+
+def test_the_position_known_at_each_moment_errs_by_less_than_1_6_m_in_the_mean_and_4_5_m_at_most(marina):
+    assert marina["corrected"]["mean"] < 1.6
+    assert marina["corrected"]["max"] < 4.5
+
+
+def test_the_smoothed_way_errs_by_less_than_1_4_m_in_the_mean_and_3_5_m_at_most(marina):
+    assert marina["refined"]["mean"] < 1.4
+    assert marina["refined"]["max"] < 3.5
+
+
+def test_the_odometry_alone_errs_by_more_than_6_m(marina):
+    assert marina["dead_reckoning"]["mean"] > 6.0
+
+
+def test_nearly_all_scans_are_matched(marina):
+    assert marina["matched"] >= 0.9 * marina["scans"]

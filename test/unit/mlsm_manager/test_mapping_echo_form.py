@@ -1,0 +1,36 @@
+"""Peaks and plateaus: what the strengths of a recording say of its echoes."""
+
+import numpy as np
+import pytest
+
+from mlsm_manager.mapping.echo_form import EchoForm, echo_form_of, suited
+from mlsm_manager.mapping.replay_parameters import ReplayParameters
+from sonar_processing.beam import Beam
+from sonar_processing.echo_extraction import ExtractionMode
+
+
+def beams(strengths):
+    return [Beam(10**9, "sonar", 0.0, np.array(strengths, dtype=np.uint8), 0.1)]
+
+
+@pytest.mark.parametrize("strongest", [1, 127, 255])
+def test_strengths_that_say_something_or_nothing_are_plateaus(strongest):
+    assert echo_form_of(beams([0, 0, strongest, strongest, strongest, 0])) is EchoForm.PLATEAU
+
+
+def test_strengths_that_differ_are_peaks():
+    assert echo_form_of(beams([0, 3, 60, 127, 127, 80, 5, 0])) is EchoForm.PEAK
+
+
+def test_a_recording_of_silence_has_no_plateaus():
+    assert echo_form_of(beams([0, 0, 0])) is EchoForm.PEAK
+
+
+def test_plateaus_are_taken_where_they_begin_and_matched_coarsely():
+    parameters = suited(ReplayParameters(), EchoForm.PLATEAU, held=())
+    assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.LEADING_EDGE, 1.0)
+
+
+def test_what_the_user_set_is_held():
+    parameters = suited(ReplayParameters(match_resolution=0.7), EchoForm.PLATEAU, held=("match_resolution",))
+    assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.LEADING_EDGE, 0.7)
