@@ -1,0 +1,27 @@
+#!/usr/bin/env python3
+"""play_bag.launch maps a recording by itself, whatever else the recording holds."""
+
+import sys
+import unittest
+
+import rospy
+import rostest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph import Inbox, rows
+from sensor_msgs.msg import PointCloud2
+
+
+class PlayBag(unittest.TestCase):
+    """Waits for what the launch file alone brings about."""
+
+    def test_a_map_grows_and_scans_are_matched(self) -> None:
+        """Without anybody to start the player."""
+        maps = Inbox("/MLSM/cloud", PointCloud2)
+        fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        fixes.wait_for(lambda _: len(fixes.messages) >= 2)
+        self.assertGreater(len(rows(maps.messages[-1])), 300)
+
+
+if __name__ == "__main__":
+    rospy.init_node("play_bag_test")
+    rostest.rosrun("underwater_map_construction", "play_bag", PlayBag, sys.argv)
