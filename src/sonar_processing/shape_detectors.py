@@ -1,5 +1,6 @@
 """The ROS side of line_detector and circle_detector: clouds in, shapes and markers out (thesis 6.5.5)."""
 
+from abc import ABC, abstractmethod
 from typing import Any, Sequence, Tuple
 
 import numpy as np
@@ -24,7 +25,7 @@ INPUT_TOPIC = "sonar/scan/cleaned"
 QUEUE_SIZE = 10
 
 
-class ShapeDetectorNode:
+class ShapeDetectorNode(ABC):
     """What both detectors share; `_detect` finds the shapes of a scan and says how they are shown."""
 
     name: str
@@ -44,11 +45,13 @@ class ShapeDetectorNode:
         self._markers = rospy.Publisher(f"{self.topic}/markers", MarkerArray, queue_size=QUEUE_SIZE)
         subscribe_to_clouds(INPUT_TOPIC, guarded(self.health, self._take))
 
+    @abstractmethod
     def _use_parameters(self, parameters: RansacParameters) -> None:
-        raise NotImplementedError
+        """Make the detector anew."""
 
+    @abstractmethod
     def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Any, MarkerArray]:
-        raise NotImplementedError
+        """Return the shapes of a scan, the message that holds them, and how rviz shows them."""
 
     def _take(self, message: StampedIntensityCloudArrays) -> None:
         cloud = cloud_from_message(message)
