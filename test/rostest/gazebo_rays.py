@@ -43,7 +43,7 @@ class GazeboSonar(unittest.TestCase):
         cls.diagnostics = Diagnostics()
         cls.swept, cls.turned = Inbox("/sonar/raw", SonarScanLine), Inbox("/turning/sonar/raw", SonarScanLine)
         for inbox in (cls.swept, cls.turned):
-            inbox.wait_for_publisher()
+            inbox.wait_for_link()
 
     def _beam_of(self, rays: rospy.Publisher, message: object) -> SonarScanLine:
         rays.publish(message)

@@ -39,26 +39,23 @@ def _report_skip(name: str, reason: str) -> None:
 
 
 class Inbox:
-    """The newest message of a topic, and a wait for one that fits."""
+    """What came on a topic, and a wait for a message that fits."""
 
     def __init__(self, topic: str, kind: Any) -> None:
         self._topic = topic
         self._condition = threading.Condition()
-        self.messages: List[Any] = []
+        self._messages: List[Any] = []
         self._subscriber = rospy.Subscriber(topic, kind, self._take, queue_size=1000)
 
-    def wait_for_publisher(self, timeout: float = 20.0) -> None:
-        """Wait until a publisher is connected: what is published before that is lost."""
-        ended = threading.Event()
-        for _ in range(int(timeout / 0.05)):
-            if self._subscriber.get_num_connections():
-                return
-            ended.wait(0.05)
-        raise AssertionError(f"{self._topic}: no publisher after {timeout} s")
+    @property
+    def messages(self) -> List[Any]:
+        """A copy of all that came so far: it does not grow while a test looks at it."""
+        with self._condition:
+            return list(self._messages)
 
     def _take(self, message: Any) -> None:
         with self._condition:
-            self.messages.append(message)
+            self._messages.append(message)
             self._condition.notify_all()
 
     def wait_for_link(self, timeout: float = 20.0) -> None:
@@ -73,9 +70,9 @@ class Inbox:
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = 20.0) -> Any:
         """Return the newest message once it fits; raises AssertionError after `timeout` seconds of wall time."""
         with self._condition:
-            if self._condition.wait_for(lambda: bool(self.messages) and fits(self.messages[-1]), timeout):
-                return self.messages[-1]
-        raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {len(self.messages)} messages came")
+            if self._condition.wait_for(lambda: bool(self._messages) and fits(self._messages[-1]), timeout):
+                return self._messages[-1]
+        raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {len(self._messages)} messages came")
 
 
 class Diagnostics:
