@@ -6,7 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.distributions import LocalDistributions
-from mlsm_manager.matching.planar_motion import PlanarMotion
+from mlsm_manager.matching.planar_motion import STATES, PlanarMotion
+from mlsm_manager.matching.residual_covariance import Clusters, residual_covariance
 from mlsm_manager.matching.robust import geman_mcclure, geman_mcclure_cost
 
 SCALES = (8.0, 4.0, 2.5)
@@ -71,10 +72,15 @@ class _Meeting:
 
 @dataclass(frozen=True)
 class _Normal:
-    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals."""
+    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals.
+
+    jacobian, lever: (n, 2, 8) derivative of each place, and the same times its weighted metric.
+    """
 
     information: np.ndarray
     gradient: np.ndarray
+    jacobian: np.ndarray
+    lever: np.ndarray
     world: np.ndarray
     squared: np.ndarray
     importance: np.ndarray
@@ -132,6 +138,22 @@ class Refiner:
         """Return the points (n, 2) in map when the state is `theta`."""
         return self._motion.points(self._motion.path(theta))
 
+    def residual_covariance(self, fit: Fit) -> np.ndarray:
+        """Return the covariance (8, 8) of a fit as its residuals tell it, prior included."""
+        normal = self._normal(fit.theta, SCALES[-1])
+        cluster = _clusters(normal.world)
+        gradient = np.zeros((cluster.max() + 1, STATES))
+        information = np.zeros((cluster.max() + 1, STATES, STATES))
+        np.add.at(gradient, cluster, normal.gradient / fit.inflation)
+        np.add.at(information, cluster, normal.jacobian.transpose(0, 2, 1) @ normal.lever / fit.inflation)
+        clusters = Clusters(gradient, information)
+        return residual_covariance(
+            fit.theta, clusters, lambda theta: self._gradient(theta) / fit.inflation, self._prior.information
+        )
+
+    def _gradient(self, theta: np.ndarray) -> np.ndarray:
+        return self._normal(theta, SCALES[-1]).gradient.sum(axis=0)
+
     def _step(self, theta: np.ndarray, normal: _Normal, information: np.ndarray, inflation: float) -> np.ndarray:
         objection = self._prior.information @ (theta - self._prior.mean)
         return -np.linalg.solve(information, normal.gradient.sum(axis=0) / inflation + objection)
@@ -153,7 +175,9 @@ class Refiner:
         lever = (meeting.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
         information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
         gradient = np.einsum("nas,na->ns", lever, meeting.residual)
-        return _Normal(information, gradient, meeting.world, meeting.squared, importance, meeting.distances)
+        return _Normal(
+            information, gradient, jacobian, lever, meeting.world, meeting.squared, importance, meeting.distances
+        )
 
     def _importance(self, meeting: _Meeting, scale: float) -> np.ndarray:
         share = self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
@@ -171,8 +195,7 @@ class Refiner:
         return map_support / (map_support + scan_support)
 
     def _design_effect(self, normal: _Normal) -> float:
-        cell = np.floor(normal.world / _CLUSTER).astype(np.int64)
-        _, cluster = np.unique(cell[:, 0] * 2**32 + cell[:, 1], return_inverse=True)
+        cluster = _clusters(normal.world)
         sums = np.stack([np.bincount(cluster, weights=column) for column in normal.gradient.T], axis=1)
         whitening = np.linalg.inv(normal.information + self._prior.information)
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
@@ -190,6 +213,12 @@ class Refiner:
             theta, covariance, support, inflation, self._prior.objection(theta), self._on_surface(normal),
             normal.distances, iterations, converged,
         )  # fmt: skip
+
+
+def _clusters(world: np.ndarray) -> np.ndarray:
+    """Return for points (n, 2) the number (n,) of the square of 3 m that each lies in."""
+    cell = np.floor(world / _CLUSTER).astype(np.int64)
+    return np.unique(cell[:, 0] * 2**32 + cell[:, 1], return_inverse=True)[1]
 
 
 def _support(importance: np.ndarray, squared: np.ndarray) -> float:

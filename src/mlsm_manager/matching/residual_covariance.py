@@ -1,0 +1,131 @@
+"""How sure a fit is, as its residuals tell it (a sandwich estimate: White 1980; Liang and Zeger 1986).
+
+What echoes err by depends on pulse, beam, surface and echo extraction, and is not known beforehand: a deviation that
+each point is given serves to weigh the points, not to say how far off the fix is. Three things are measured instead,
+in the scan at hand:
+
+- noise: the sums of the gradients over clusters of neighbouring points, which err alike. A fit makes the residuals of
+  what it leans on too small; each cluster is corrected by its own leverage (Bell and McCaffrey 2002, "CR2"). Few
+  clusters tell a mean better than a matrix: what they say of each direction is drawn to what they say of all.
+- curvature: how the gradient changes over the two standard deviations in which the fit may lie. A point that is moved
+  meets another block, so that this is less than the points' information.
+- the map: its points were laid by a scan like this one, with the error of that scan's pose, which all of them share.
+  Later scans were laid on the first and repeat its error, so that no number of them takes it away.
+"""
+
+from dataclasses import dataclass
+from typing import Callable
+
+import numpy as np
+from scipy.linalg import eigh
+
+from mlsm_manager.matching.planar_motion import POSE, STATES
+
+_GREATEST_LEVERAGE = 0.95
+_LEAST_CURVATURE = 0.1
+_SPAN = 2.0
+_LEAST_SPAN = 0.1
+_TOLD_BY_PRIOR = 0.95
+Gradient = Callable[[np.ndarray], np.ndarray]
+"""From a state (8,) to the gradient (8,) of all points."""
+
+
+@dataclass(frozen=True)
+class Clusters:
+    """What clusters of points say at a fit. gradient: (k, 8). information: (k, 8, 8)."""
+
+    gradient: np.ndarray
+    information: np.ndarray
+
+
+@dataclass(frozen=True)
+class _Basis:
+    """States in which the points' and the prior's information are diagonal and add up to the identity.
+
+    vectors: (8, 8), a column each. share: (8,) of the information that is the points'. metric: (8, 8) the sum of both.
+    """
+
+    vectors: np.ndarray
+    share: np.ndarray
+    metric: np.ndarray
+
+    def information(self, inside: np.ndarray) -> np.ndarray:
+        """Return an information (8, 8) of this basis in the states' own units."""
+        back = self.metric @ self.vectors
+        return back @ inside @ back.T
+
+
+def residual_covariance(
+    theta: np.ndarray, clusters: Clusters, gradient: Gradient, prior_information: np.ndarray
+) -> np.ndarray:
+    """Return the covariance (8, 8) of a fit at `theta` (8,), prior included."""
+    information = clusters.information.sum(axis=0)
+    metric = information + prior_information
+    share, vectors = eigh(information, metric)
+    basis = _Basis(vectors, np.clip(share, 0.0, 1.0), metric)
+    noise, scale = _noise(basis, clusters)
+    curvature = _curvature(basis, theta, gradient, np.clip(_SPAN * np.sqrt(scale), _LEAST_SPAN, 1.0))
+    gain = np.linalg.inv(curvature)
+    of_scan = vectors @ gain @ (noise + np.diag(1.0 - basis.share)) @ gain @ vectors.T
+    of_prior = (vectors @ gain @ vectors.T @ prior_information)[:, POSE]
+    laid = _map_covariance(basis, information, curvature, scale)
+    return _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
+
+
+def _noise(basis: _Basis, clusters: Clusters) -> tuple:
+    """Return the covariance (8, 8) of the gradient, and how many times the points' information it is, on average."""
+    leverage = basis.vectors.T @ clusters.information @ basis.vectors
+    values, vectors = np.linalg.eigh(leverage)
+    stretch = (1.0 - np.clip(values, 0.0, _GREATEST_LEVERAGE)) ** -0.5
+    sums = clusters.gradient @ basis.vectors
+    sums = np.einsum("kab,kb,kcb,kc->ka", vectors, stretch, vectors, sums)
+    weight = np.trace(leverage, axis1=1, axis2=2)
+    scale = float((sums**2).sum() / max(weight.sum(), 1e-9))
+    effective = weight.sum() ** 2 / max(float((weight**2).sum()), 1e-9)
+    known = effective / (effective + STATES)
+    return known * sums.T @ sums + (1.0 - known) * scale * np.diag(basis.share), scale
+
+
+def _curvature(basis: _Basis, theta: np.ndarray, gradient: Gradient, span: float) -> np.ndarray:
+    """Return the derivative (8, 8) of the whole gradient, as differences over `span` to either side.
+
+    It is 1 where the residuals are linear, and in directions of which the prior tells nearly all.
+    """
+    result = np.eye(STATES)
+    for column in np.flatnonzero(basis.share > 1.0 - _TOLD_BY_PRIOR):
+        step = span * basis.vectors[:, column]
+        change = basis.vectors.T @ (gradient(theta + step) - gradient(theta - step)) / (2.0 * span)
+        result[:, column] = change
+        result[column, column] += 1.0 - basis.share[column]
+    values, vectors = np.linalg.eigh(_symmetric(result))
+    return (vectors * np.clip(values, _LEAST_CURVATURE, 1.0)) @ vectors.T
+
+
+def _map_covariance(basis: _Basis, information: np.ndarray, curvature: np.ndarray, scale: float) -> np.ndarray:
+    """Return (3, 3): the covariance of the pose of a scan like this one whose motion is known."""
+    points = basis.information(curvature - np.diag(1.0 - basis.share))[POSE, POSE]
+    pose_information = information[POSE, POSE]
+    share, vectors = eigh(points, pose_information)
+    return scale * (vectors * np.clip(share, _LEAST_CURVATURE, 1.0) ** -2) @ vectors.T
+
+
+def _shared(basis: _Basis, laid: np.ndarray, prior_information: np.ndarray, of_prior: np.ndarray) -> np.ndarray:
+    """Return (8, 8) what the map's error adds, given that the prior comes from fixes in the same map.
+
+    laid: (3, 3) covariance of that error; the prior shares no more of it than it has. of_prior: (8, 3) derivative of
+    the fit by the prior's pose. Of an error that both share, weighing them against each other takes nothing away.
+    """
+    prior = np.linalg.inv(prior_information)[POSE, POSE]
+    ratio, vectors = eigh(laid, prior)
+    back = prior @ vectors
+    shared = (back * np.minimum(ratio, 1.0)) @ back.T
+    whole = np.zeros((STATES, STATES))
+    whole[POSE, POSE] = shared
+    inside = basis.vectors.T @ basis.metric @ (whole - of_prior @ shared @ of_prior.T) @ basis.metric @ basis.vectors
+    values, vectors = np.linalg.eigh(_symmetric(inside))
+    turned = basis.vectors @ vectors
+    return (turned * np.maximum(values, 0.0)) @ turned.T
+
+
+def _symmetric(matrix: np.ndarray) -> np.ndarray:
+    return (matrix + matrix.T) / 2.0
