@@ -16,6 +16,7 @@ _ITERATIONS_PER_SCALE = 4
 _CLUSTER = 3.0
 _GREATEST_INFLATION = 30.0
 _LAST_STEP = 0.1
+_LEAST_IMPORTANCE = 1e-9
 _NEIGHBOURS = 12
 INLIER = 3.0
 
@@ -146,10 +147,20 @@ class Refiner:
         information = np.zeros((cluster.max() + 1, STATES, STATES))
         np.add.at(gradient, cluster, normal.gradient / fit.inflation)
         np.add.at(information, cluster, normal.jacobian.transpose(0, 2, 1) @ normal.lever / fit.inflation)
-        clusters = Clusters(gradient, information)
+        clusters = Clusters(gradient, information, self._hidden_share(normal))
         return residual_covariance(
             fit.theta, clusters, lambda theta: self._gradient(theta) / fit.inflation, self._prior.information
         )
+
+    def _hidden_share(self, normal: _Normal) -> float:
+        """Return how much of the map's error the residuals do not show, as a share of the noise that they show.
+
+        A map of t scans averages the noise of its points, and the residuals show s^2 (1 + 1/t) per point. The error of
+        the pose at which it was laid stays that of one scan, s^2: (1 - 1/t) of it are hidden.
+        """
+        _, nearest = self._target.nearest(normal.world)
+        share = np.average(self._map_share(nearest), weights=normal.importance + _LEAST_IMPORTANCE)
+        return max(2.0 * float(share) - 1.0, 0.0)
 
     def _gradient(self, theta: np.ndarray) -> np.ndarray:
         return self._normal(theta, SCALES[-1]).gradient.sum(axis=0)

@@ -11,7 +11,8 @@ in the scan at hand:
 - curvature: how the gradient changes over the two standard deviations in which the fit may lie. A point that is moved
   meets another block, so that this is less than the points' information.
 - the map: its points were laid by a scan like this one, with the error of that scan's pose, which all of them share.
-  Later scans were laid on the first and repeat its error, so that no number of them takes it away.
+  Later scans were laid on the first and repeat its error: no number of them takes it away, but the more they are the
+  less of it do the residuals show.
 """
 
 from dataclasses import dataclass
@@ -34,10 +35,15 @@ Gradient = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class Clusters:
-    """What clusters of points say at a fit. gradient: (k, 8). information: (k, 8, 8)."""
+    """What clusters of points say at a fit.
+
+    gradient: (k, 8). information: (k, 8, 8). hidden: how large the part of the map's error is that the residuals do not
+    show, as a multiple of the noise that they show.
+    """
 
     gradient: np.ndarray
     information: np.ndarray
+    hidden: float
 
 
 @dataclass(frozen=True)
@@ -70,7 +76,7 @@ def residual_covariance(
     gain = np.linalg.inv(curvature)
     of_scan = vectors @ gain @ (noise + np.diag(1.0 - basis.share)) @ gain @ vectors.T
     of_prior = (vectors @ gain @ vectors.T @ prior_information)[:, POSE]
-    laid = _map_covariance(basis, information, curvature, scale)
+    laid = _map_covariance(basis, information, curvature, scale * clusters.hidden)
     return _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
 
 
@@ -104,7 +110,7 @@ def _curvature(basis: _Basis, theta: np.ndarray, gradient: Gradient, span: float
 
 
 def _map_covariance(basis: _Basis, information: np.ndarray, curvature: np.ndarray, scale: float) -> np.ndarray:
-    """Return (3, 3): the covariance of the pose of a scan like this one whose motion is known."""
+    """Return (3, 3): the covariance of the pose of a scan like this one, its motion known, for `scale` of its noise."""
     points = basis.information(curvature - np.diag(1.0 - basis.share))[POSE, POSE]
     pose_information = information[POSE, POSE]
     share, vectors = eigh(points, pose_information)
