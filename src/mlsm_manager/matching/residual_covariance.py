@@ -87,11 +87,12 @@ def _noise(basis: _Basis, clusters: Clusters) -> Tuple[np.ndarray, float]:
     stretch = (1.0 - np.clip(values, 0.0, _GREATEST_LEVERAGE)) ** -0.5
     sums = clusters.gradient @ basis.vectors
     sums = np.einsum("kab,kb,kcb,kc->ka", vectors, stretch, vectors, sums)
-    weight = np.trace(leverage, axis1=1, axis2=2)
-    scale = max(float((sums**2).sum() / max(weight.sum(), 1e-9)), _LEAST_SCALE)
-    effective = weight.sum() ** 2 / max(float((weight**2).sum()), 1e-9)
+    scale = max(float((sums**2).sum() / max(basis.share.sum(), 1e-9)), _LEAST_SCALE)
+    by_direction = np.einsum("kaa->ka", leverage)
+    effective = by_direction.sum(axis=0) ** 2 / np.maximum((by_direction**2).sum(axis=0), 1e-12)
     known = effective / (effective + STATES)
-    return known * sums.T @ sums + (1.0 - known) * scale * np.diag(basis.share), scale
+    measured = np.sqrt(np.outer(known, known)) * (sums.T @ sums)
+    return measured + np.diag((1.0 - known) * scale * basis.share), scale
 
 
 def _curvature(basis: _Basis, theta: np.ndarray, gradient: Gradient, span: float) -> np.ndarray:
