@@ -6,8 +6,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.distributions import LocalDistributions
-from mlsm_manager.matching.planar_motion import STATES, PlanarMotion
-from mlsm_manager.matching.residual_covariance import Clusters, residual_covariance
+from mlsm_manager.matching.planar_motion import PlanarMotion
+from mlsm_manager.matching.residual_covariance import PointEvidence, residual_covariance
 from mlsm_manager.matching.robust import geman_mcclure, geman_mcclure_cost
 
 SCALES = (8.0, 4.0, 2.5)
@@ -142,14 +142,12 @@ class Refiner:
     def residual_covariance(self, fit: Fit) -> np.ndarray:
         """Return the covariance (8, 8) of a fit as its residuals tell it, prior included."""
         normal = self._normal(fit.theta, SCALES[-1])
-        cluster = _clusters(normal.world)
-        gradient = np.zeros((cluster.max() + 1, STATES))
-        information = np.zeros((cluster.max() + 1, STATES, STATES))
-        np.add.at(gradient, cluster, normal.gradient / fit.inflation)
-        np.add.at(information, cluster, normal.jacobian.transpose(0, 2, 1) @ normal.lever / fit.inflation)
-        clusters = Clusters(gradient, information, self._hidden_share(normal))
+        points = PointEvidence(
+            normal.gradient / fit.inflation, normal.jacobian.transpose(0, 2, 1) @ normal.lever / fit.inflation,
+            _clusters(normal.world), self._hidden_share(normal),
+        )  # fmt: skip
         return residual_covariance(
-            fit.theta, clusters, lambda theta: self._gradient(theta) / fit.inflation, self._prior.information
+            fit.theta, points, lambda theta: self._gradient(theta) / fit.inflation, self._prior.information
         )
 
     def _hidden_share(self, normal: _Normal) -> float:

@@ -5,9 +5,10 @@ each point is given serves to weigh the points, not to say how far off the fix i
 in the scan at hand:
 
 - noise: the sums of the gradients over clusters of neighbouring points, which err alike. A fit makes the residuals of
-  what it leans on too small; each cluster is corrected by its own leverage (Bell and McCaffrey 2002, "CR2"). Few
-  clusters tell a mean better than a matrix: what they say of each direction is drawn to what they say of all. It
-  is never less than a tenth of the points' deviations, about a centimetre: no map of cells is finer.
+  what it leans on too small; each cluster is corrected by its own leverage (Bell and McCaffrey 2002, "CR2"). A place
+  may hang on one small object: what few clusters say of a direction is drawn to what the points say of it one by one,
+  times by how much clusters vary more than points everywhere; and what few points say to what all say. It is never
+  less than a tenth of the points' deviations, about a centimetre: no map of cells is finer.
 - curvature: how the gradient changes over the two standard deviations in which the fit may lie. A point that is moved
   meets another block, so that this is less than the points' information.
 - the map: its points were laid by a scan like this one, with the error of that scan's pose, which all of them share.
@@ -34,16 +35,23 @@ Gradient = Callable[[np.ndarray], np.ndarray]
 
 
 @dataclass(frozen=True)
-class Clusters:
-    """What clusters of points say at a fit.
+class PointEvidence:
+    """What the points say at a fit.
 
-    gradient: (k, 8). information: (k, 8, 8). hidden: how large the part of the map's error is that the residuals do not
-    show, as a multiple of the noise that they show.
+    gradient: (n, 8). information: (n, 8, 8). cluster: (n,) int, 0 to k - 1, which points are neighbours. hidden: how
+    large the part of the map's error is that the residuals do not show, as a multiple of the noise that they show.
     """
 
     gradient: np.ndarray
     information: np.ndarray
+    cluster: np.ndarray
     hidden: float
+
+    def summed(self, values: np.ndarray) -> np.ndarray:
+        """Return the sums (k, ...) of `values` (n, ...) over the clusters."""
+        sums = np.zeros((self.cluster.max() + 1, *values.shape[1:]))
+        np.add.at(sums, self.cluster, values)
+        return sums
 
 
 @dataclass(frozen=True)
@@ -64,35 +72,51 @@ class _Basis:
 
 
 def residual_covariance(
-    theta: np.ndarray, clusters: Clusters, gradient: Gradient, prior_information: np.ndarray
+    theta: np.ndarray, points: PointEvidence, gradient: Gradient, prior_information: np.ndarray
 ) -> np.ndarray:
     """Return the covariance (8, 8) of a fit at `theta` (8,), prior included."""
-    information = clusters.information.sum(axis=0)
+    information = points.information.sum(axis=0)
     metric = information + prior_information
     share, vectors = eigh(information, metric)
     basis = _Basis(vectors, np.clip(share, 0.0, 1.0), metric)
-    noise, scale = _noise(basis, clusters)
+    noise, scale = _noise(basis, points)
     curvature = _curvature(basis, theta, gradient, np.clip(_SPAN * np.sqrt(scale), _LEAST_SPAN, 1.0))
     gain = np.linalg.inv(curvature)
     of_scan = vectors @ gain @ (noise + np.diag(1.0 - basis.share)) @ gain @ vectors.T
     of_prior = (vectors @ gain @ vectors.T @ prior_information)[:, POSE]
-    laid = _map_covariance(basis, information, curvature, scale * clusters.hidden)
+    laid = _map_covariance(basis, information, curvature, scale * points.hidden)
     return _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
 
 
-def _noise(basis: _Basis, clusters: Clusters) -> Tuple[np.ndarray, float]:
+def _noise(basis: _Basis, points: PointEvidence) -> Tuple[np.ndarray, float]:
     """Return the covariance (8, 8) of the gradient, and how many times the points' information it is, on average."""
-    leverage = basis.vectors.T @ clusters.information @ basis.vectors
+    gradient = points.gradient @ basis.vectors
+    leverage = basis.vectors.T @ points.information @ basis.vectors
+    single = gradient + np.einsum("nab,nb->na", leverage, gradient) / 2.0
+    single_scale = max(_mean_scale(basis, single), _LEAST_SCALE)
+    of_points = _drawn(single_scale * np.diag(basis.share), single, leverage)
+    leverage = points.summed(leverage)
     values, vectors = np.linalg.eigh(leverage)
     stretch = (1.0 - np.clip(values, 0.0, _GREATEST_LEVERAGE)) ** -0.5
-    sums = clusters.gradient @ basis.vectors
-    sums = np.einsum("kab,kb,kcb,kc->ka", vectors, stretch, vectors, sums)
-    scale = max(float((sums**2).sum() / max(basis.share.sum(), 1e-9)), _LEAST_SCALE)
-    by_direction = np.einsum("kaa->ka", leverage)
-    effective = by_direction.sum(axis=0) ** 2 / np.maximum((by_direction**2).sum(axis=0), 1e-12)
+    sums = np.einsum("kab,kb,kcb,kc->ka", vectors, stretch, vectors, points.summed(gradient), optimize=True)
+    scale = max(_mean_scale(basis, sums), single_scale)
+    return _drawn(of_points * scale / single_scale, sums, leverage), scale
+
+
+def _mean_scale(basis: _Basis, gradients: np.ndarray) -> float:
+    return float((gradients**2).sum() / max(basis.share.sum(), 1e-9))
+
+
+def _drawn(expected: np.ndarray, gradients: np.ndarray, leverage: np.ndarray) -> np.ndarray:
+    """Return (8, 8) what the `gradients` (k, 8) vary by, drawn to what is `expected` (8, 8) where few tell.
+
+    leverage: (k, 8, 8). As many of them as there are states count half.
+    """
+    each = np.einsum("kaa->ka", leverage)
+    effective = each.sum(axis=0) ** 2 / np.maximum((each**2).sum(axis=0), 1e-12)
     known = effective / (effective + STATES)
-    measured = np.sqrt(np.outer(known, known)) * (sums.T @ sums)
-    return measured + np.diag((1.0 - known) * scale * basis.share), scale
+    measured = np.sqrt(np.outer(known, known)) * (gradients.T @ gradients)
+    return measured + np.sqrt(np.outer(1.0 - known, 1.0 - known)) * expected
 
 
 def _curvature(basis: _Basis, theta: np.ndarray, gradient: Gradient, span: float) -> np.ndarray:
