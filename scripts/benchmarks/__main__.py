@@ -1,6 +1,7 @@
 """Prints the figures of the sections that were asked for, all of them when none was."""
 
 import argparse
+from functools import partial
 from typing import Callable, Dict, List
 
 from benchmarks import (
@@ -32,8 +33,10 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
     for name in SECTIONS:
         parser.add_argument(f"--{name}", action="append_const", const=name, dest="chosen", help=f"figures of {name}")
-    chosen = parser.parse_args().chosen or list(SECTIONS)
-    print_table([row for name in chosen for row in SECTIONS[name]()])
+    parser.add_argument("--first-seed", type=int, default=0, help="of --matching: other seeds than the published ones")
+    arguments = parser.parse_args()
+    sections = {**SECTIONS, "matching": partial(matching_figures.rows, arguments.first_seed)}
+    print_table([row for name in arguments.chosen or list(SECTIONS) for row in sections[name]()])
 
 
 if __name__ == "__main__":

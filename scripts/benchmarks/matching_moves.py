@@ -61,12 +61,12 @@ def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
     return np.array(rows)
 
 
-def sessions(kind: SonarKind) -> Dict[MatcherName, np.ndarray]:
+def sessions(kind: SonarKind, first_seed: int = 0) -> Dict[MatcherName, np.ndarray]:
     """Return (SEEDS, scans, 5) of `session_errors` for each matcher; both see the same scans."""
     maker = ScanMaker("basin", kind)
     times = np.linspace(-1.0, _VEHICLE.duration, 2400)
     track = Track(times, odometry_path(times))
-    scans = [session_scans(maker, seed, track) for seed in range(SEEDS)]
+    scans = [session_scans(maker, seed, track) for seed in range(first_seed, first_seed + SEEDS)]
     return {name: np.array([session_errors(session, name) for session in scans]) for name in MatcherName}
 
 
@@ -104,11 +104,11 @@ def nees_band(count: int) -> Tuple[float, float]:
     return float(low), float(high)
 
 
-def rows() -> List[Row]:
+def rows(first_seed: int = 0) -> List[Row]:
     """Return the figures of the moves."""
     result: List[Row] = []
     for kind in KINDS:
-        by_matcher = sessions(kind)
+        by_matcher = sessions(kind, first_seed)
         for name, errors in by_matcher.items():
             result += move_rows(kind, name, errors)
         result.append(consistency_row(kind, by_matcher[MatcherName.DISTRIBUTIONS]))

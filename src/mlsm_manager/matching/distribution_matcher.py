@@ -1,6 +1,7 @@
 """The default matcher: a correlative search, then one path for the whole scan among local distributions."""
 
 import time
+from dataclasses import replace
 from typing import List, Tuple
 
 import numpy as np
@@ -40,7 +41,10 @@ class DistributionMatcher:
             return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
         fits, refiner = self._fits(scan, motion, target, state)
         status, reason = self._judge(fits, refiner, state, target)
-        return _result(status, reason, motion, fits[0], start)
+        best = fits[0]
+        if status is MatchStatus.CONVERGED:
+            best = replace(best, covariance=refiner.residual_covariance(best))
+        return _result(status, reason, motion, best, start)
 
     def _fits(self, scan: Scan, motion: PlanarMotion, target: Blocks, state: PriorState) -> Tuple[List[Fit], Refiner]:
         parameters = self.parameters

@@ -1,23 +1,20 @@
 """Refines a state so that the points lie where the local distributions expect them (thesis 6.3, all at once)."""
 
 from dataclasses import dataclass
-from typing import Tuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.distributions import LocalDistributions
+from mlsm_manager.matching.normal_equations import Normal, PointEquations, support
 from mlsm_manager.matching.planar_motion import PlanarMotion
-from mlsm_manager.matching.robust import geman_mcclure, geman_mcclure_cost
+from mlsm_manager.matching.residual_covariance import PointEvidence, residual_covariance
 
 SCALES = (8.0, 4.0, 2.5)
-_GATE = 0.75
 _ITERATIONS_PER_SCALE = 4
 _CLUSTER = 3.0
 _GREATEST_INFLATION = 30.0
 _LAST_STEP = 0.1
-_NEIGHBOURS = 12
-INLIER = 3.0
+_LEAST_IMPORTANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -58,44 +55,12 @@ class Fit:
         return self.support / inflation - self.objection
 
 
-@dataclass(frozen=True)
-class _Meeting:
-    """How the points meet the map: places (n, 2), metric (n, 2, 2), residuals and what each point is worth."""
-
-    world: np.ndarray
-    nearest: np.ndarray
-    distances: np.ndarray
-    metric: np.ndarray
-    residual: np.ndarray
-    squared: np.ndarray
-
-
-@dataclass(frozen=True)
-class _Normal:
-    """Normal equations at a state: information (8, 8), gradient of each point (n, 8), places and residuals.
-
-    scale_information: of the ranges' common scale. scale_mixed: (8,) what it has in common with the state.
-    scale_gradient: of all points by it.
-    """
-
-    information: np.ndarray
-    gradient: np.ndarray
-    scale_information: float
-    scale_mixed: np.ndarray
-    scale_gradient: float
-    world: np.ndarray
-    squared: np.ndarray
-    importance: np.ndarray
-    distances: np.ndarray
-
-
 class Refiner:
     """Minimises the points' robust squared Mahalanobis distances plus the prior's.
 
     The robust kernel narrows as the iterations go on, until a step is below a tenth of a standard deviation. Points
     that lie near each other in the map err alike; the information is divided by what the sums of their gradients over
-    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share. An error of all ranges
-    in proportion is one more unknown and is integrated out: between walls that converge it looks like a motion.
+    clusters of 3 m show of that (a design effect), so that the prior keeps its honest share.
     """
 
     def __init__(
@@ -108,12 +73,9 @@ class Refiner:
     ) -> None:
         """`point_weights` is (n,), n > 0; `range_scale_deviation` is relative, 0 where ranges are certain."""
         self._motion = motion
-        self._point_weights = point_weights
         self._target = target
         self._prior = prior
-        self._range_scale_deviation = range_scale_deviation
-        spots = motion.points(motion.path(prior.mean))
-        self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
+        self._points = PointEquations(motion, point_weights, target, prior.mean, range_scale_deviation)
 
     def refine(self, start: np.ndarray, max_iterations: int) -> Fit:
         """Return the fit found from `start` (8,)."""
@@ -121,9 +83,9 @@ class Refiner:
         index, iteration, converged = 0, 0, False
         while iteration < max_iterations and not converged:
             iteration += 1
-            normal = self._normal(theta, SCALES[index])
+            normal = self._points.normal(theta, SCALES[index])
             inflation = self._design_effect(normal) if index == narrowest else 1.0
-            points_information, gradient = self._weighed(normal, inflation)
+            points_information, gradient = self._points.weighed(normal, inflation)
             information = points_information + self._prior.information
             step = -np.linalg.solve(information, gradient + self._prior.information @ (theta - self._prior.mean))
             theta = theta + step
@@ -135,99 +97,58 @@ class Refiner:
 
     def matched(self, theta: np.ndarray) -> np.ndarray:
         """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
-        meeting = self._meeting(self._motion.path(theta))
-        return (meeting.squared < INLIER**2) & (meeting.distances < _GATE * SCALES[-1])
+        return self._points.matched(theta, SCALES[-1])
 
     def gain(self, theta: np.ndarray, inflation: float) -> float:
         """Return what `Fit.gain` would be if a fit ended at `theta`."""
-        meeting = self._meeting(self._motion.path(theta))
-        importance = self._importance(meeting, SCALES[-1])
-        return _support(importance, meeting.squared) / inflation - self._prior.objection(theta)
+        return self._points.support(theta, SCALES[-1]) / inflation - self._prior.objection(theta)
 
     def world(self, theta: np.ndarray) -> np.ndarray:
         """Return the points (n, 2) in map when the state is `theta`."""
         return self._motion.points(self._motion.path(theta))
 
-    def _weighed(self, normal: _Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
-        """Return information (8, 8) and gradient (8,) of all points, without what they tell only if ranges are sure."""
-        information, gradient = normal.information / inflation, normal.gradient.sum(axis=0) / inflation
-        if self._range_scale_deviation == 0.0:
-            return information, gradient
-        known = normal.scale_information / inflation + self._range_scale_deviation**-2
-        gain = normal.scale_mixed / inflation / known
-        mixed = normal.scale_mixed / inflation
-        return information - np.outer(gain, mixed), gradient - gain * normal.scale_gradient / inflation
-
-    def _meeting(self, path: np.ndarray) -> _Meeting:
-        world = self._motion.points(path)
-        distances, nearest = self._target.nearest(world)
-        residual = world - self._target.mean[nearest]
-        metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(path))
-        squared = np.einsum("na,nab,nb->n", residual, metric, residual)
-        return _Meeting(world, nearest, distances, metric, residual, squared)
-
-    def _normal(self, theta: np.ndarray, scale: float) -> _Normal:
-        path = self._motion.path(theta)
-        meeting = self._meeting(path)
-        importance = self._importance(meeting, scale)
-        weights = importance * geman_mcclure(meeting.squared, scale)
-        jacobian = self._motion.point_jacobian(path, theta)
-        lever = (meeting.metric * weights[:, np.newaxis, np.newaxis]) @ jacobian
-        information = np.tensordot(jacobian, lever, axes=([0, 1], [0, 1]))
-        gradient = np.einsum("nas,na->ns", lever, meeting.residual)
-        arms = meeting.world - path[self._motion.beam, :2]
-        pull = np.einsum("nab,nb->na", meeting.metric, arms) * weights[:, np.newaxis]
-        return _Normal(
-            information, gradient, float((pull * arms).sum()), np.einsum("nas,na->s", lever, arms),
-            float((pull * meeting.residual).sum()), meeting.world, meeting.squared, importance, meeting.distances,
+    def residual_covariance(self, fit: Fit) -> np.ndarray:
+        """Return the covariance (8, 8) of a fit as its residuals tell it, prior included."""
+        normal = self._points.normal(fit.theta, SCALES[-1])
+        gain, _ = self._points.scale_gain(normal, fit.inflation)
+        evidence = PointEvidence(
+            *self._points.evidence(normal, gain, fit.inflation), _clusters(normal.meeting.world),
+            self._hidden_share(normal),
         )  # fmt: skip
+        return residual_covariance(
+            fit.theta,
+            evidence,
+            lambda theta: self._points.gradient(theta, SCALES[-1], gain) / fit.inflation,
+            self._prior.information,
+        )
 
-    def _importance(self, meeting: _Meeting, scale: float) -> np.ndarray:
-        share = self._target.weight[meeting.nearest] * self._map_share(meeting.nearest)
-        return self._point_weights * share * (meeting.distances < _GATE * scale)
+    def _hidden_share(self, normal: Normal) -> float:
+        """Return how much of the map's error the residuals do not show, as a share of the noise that they show.
 
-    def _map_share(self, nearest: np.ndarray) -> np.ndarray:
-        """Return (n,) the share of the points' information that is left after the map's own noise.
-
-        k points of a scan that are compared with the same m points of the map err by s^2/k + s^2/m together, and the
-        fit cannot see the second part.
+        A map of t scans averages the noise of its points, and the residuals show s^2 (1 + 1/t) per point. The error of
+        the pose at which it was laid stays that of one scan, s^2: (1 - 1/t) of it are hidden.
         """
-        window = self._target.window[nearest][:, np.newaxis]
-        scan_support = np.exp(-0.5 * (self._apart / window) ** 2).sum(axis=1)
-        map_support = self._target.support[nearest]
-        return map_support / (map_support + scan_support)
+        shares = self._points.map_share(normal.meeting.nearest)
+        return max(2.0 * float(np.average(shares, weights=normal.importance + _LEAST_IMPORTANCE)) - 1.0, 0.0)
 
-    def _design_effect(self, normal: _Normal) -> float:
-        cell = np.floor(normal.world / _CLUSTER).astype(np.int64)
-        _, cluster = np.unique(cell[:, 0] * 2**32 + cell[:, 1], return_inverse=True)
+    def _design_effect(self, normal: Normal) -> float:
+        cluster = _clusters(normal.meeting.world)
         sums = np.stack([np.bincount(cluster, weights=column) for column in normal.gradient.T], axis=1)
         whitening = np.linalg.inv(normal.information + self._prior.information)
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
         return float(np.clip(np.trace(whitening @ (sums.T @ sums)) / independent, 1.0, _GREATEST_INFLATION))
 
-    def _on_surface(self, normal: _Normal) -> np.ndarray:
-        return (normal.squared < INLIER**2) & (normal.importance > 0.0)
-
     def _fit(self, theta: np.ndarray, iterations: int, converged: bool) -> Fit:
-        normal = self._normal(theta, SCALES[-1])
+        normal = self._points.normal(theta, SCALES[-1])
         inflation = self._design_effect(normal)
-        covariance = np.linalg.inv(self._weighed(normal, inflation)[0] + self._prior.information)
-        support = _support(normal.importance, normal.squared)
+        covariance = np.linalg.inv(self._points.weighed(normal, inflation)[0] + self._prior.information)
         return Fit(
-            theta, covariance, support, inflation, self._prior.objection(theta), self._on_surface(normal),
-            normal.distances, iterations, converged,
+            theta, covariance, support(normal.importance, normal.meeting.squared, SCALES[-1]), inflation,
+            self._prior.objection(theta), normal.on_surface, normal.meeting.distances, iterations, converged,
         )  # fmt: skip
 
 
-def _support(importance: np.ndarray, squared: np.ndarray) -> float:
-    saved = SCALES[-1] ** 2 / 2.0 - geman_mcclure_cost(squared, SCALES[-1])
-    return float((importance * saved).sum())
-
-
-def _inverse(matrices: np.ndarray) -> np.ndarray:
-    """Return the inverses of symmetric matrices (n, 2, 2)."""
-    a, b, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
-    result = np.empty_like(matrices)
-    result[:, 0, 0], result[:, 1, 1] = d, a
-    result[:, 0, 1] = result[:, 1, 0] = -b
-    return result / (a * d - b * b)[:, np.newaxis, np.newaxis]
+def _clusters(world: np.ndarray) -> np.ndarray:
+    """Return for points (n, 2) the number (n,) of the square of 3 m that each lies in."""
+    cell = np.floor(world / _CLUSTER).astype(np.int64)
+    return np.unique(cell[:, 0] * 2**32 + cell[:, 1], return_inverse=True)[1]

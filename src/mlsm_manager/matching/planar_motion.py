@@ -95,6 +95,16 @@ class PlanarMotion:
         arms = _quarter_turn(rotated(self.local, path[self.beam, 2]))
         return jacobian[self.beam, :2] + arms[:, :, np.newaxis] * jacobian[self.beam, 2][:, np.newaxis, :]
 
+    def gradient_of(self, force: np.ndarray, arms: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Return the (8,) sum over the points of `force` (n, 2) times the derivative of their places by the state.
+
+        arms: (n, 2) m from the vehicle to each point, in map.
+        """
+        torque = arms[:, 0] * force[:, 1] - arms[:, 1] * force[:, 0]
+        along = (force[:, 0], force[:, 1], torque)
+        per_beam = np.stack([np.bincount(self.beam, part, len(self.beam_times)) for part in along], axis=1)
+        return np.tensordot(per_beam, self.jacobian(theta), axes=([0, 1], [0, 1]))
+
     def point_covariance(self, path: np.ndarray) -> np.ndarray:
         """Return (n, 2, 2) m^2 in map: what a beam's width leaves open of each point's bearing."""
         sideways = _quarter_turn(rotated(self.local, path[self.beam, 2])) * self._bearing_deviation
