@@ -42,7 +42,7 @@ class ReplayParameters(MatcherChoice, OdometryErrors, SensorModel, EchoExtractor
         unit="m", low=0.001, high=100.0,
     )  # fmt: skip
     min_agreement: float = parameter(
-        0.0, "mean of the share of the scan that lies on the map and the share of the map in reach that is heard",
+        0.0, "share of the echoes that the map explains times the share of the map that no echo denies",
         low=0.0, high=1.0,
     )  # fmt: skip
     min_gain_over_second: float = parameter(

@@ -7,21 +7,25 @@ from typing import List, Tuple
 import numpy as np
 
 from mlsm_manager.blocks import Blocks
+from mlsm_manager.matching.agreement import agreement
 from mlsm_manager.matching.correlative_search import YAW_STEP, SearchWindow, search, separation
 from mlsm_manager.matching.distributions import LocalDistributions
 from mlsm_manager.matching.gauss_newton import Fit, PriorState, Refiner
 from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.planar import wrapped
 from mlsm_manager.matching.planar_motion import MOTION, POSE, RATE, STATES, PlanarMotion
 from mlsm_manager.matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.scan import Scan
 from mlsm_manager.matching.score_field import ScoreField
-from mlsm_manager.matching.significance import heard_share, lead_along, significance
+from mlsm_manager.matching.significance import lead_along, significance
 
 _WINDOW_DEVIATIONS = 3.0
 _OBJECTION_SHARE = 0.01
 _MOST_RATES = 9
 _LEAST_VARIANCE = 1e-12
 _FIELD_CELLS = 2.0
+_APART = 0.5
+_EXCLUDED = 4.0
 
 
 class DistributionMatcher:
@@ -40,10 +44,11 @@ class DistributionMatcher:
             reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
             return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
         fits, refiner = self._fits(scan, motion, target, state)
-        status, reason = self._judge(fits, refiner, state, target)
         best = fits[0]
+        status, reason = self._judge(best, refiner, state, target)
         if status is MatchStatus.CONVERGED:
             best = replace(best, covariance=refiner.residual_covariance(best))
+            status, reason = self._judge_second_places(best, fits[1:], refiner)
         return _result(status, reason, motion, best, start)
 
     def _fits(self, scan: Scan, motion: PlanarMotion, target: Blocks, state: PriorState) -> Tuple[List[Fit], Refiner]:
@@ -72,8 +77,8 @@ class DistributionMatcher:
             yaw_rates=np.arange(-rates, rates + 1) * step,
         )
 
-    def _judge(self, fits: List[Fit], refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
-        parameters, best = self.parameters, fits[0]
+    def _judge(self, best: Fit, refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
+        parameters = self.parameters
         if not best.converged:
             return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
         used = int(np.count_nonzero(best.inliers))
@@ -85,39 +90,42 @@ class DistributionMatcher:
         jump = float(np.sqrt(2.0 * state.objection(best.theta)))
         if jump > parameters.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
-        agreement = self._agreement(best, refiner, target)
-        if agreement < parameters.min_agreement:
-            return MatchStatus.DIVERGED, f"scan and map agree by {agreement:.2f} only, another place perhaps"
-        return self._judge_certainty(fits, refiner)
+        agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[:2], target.mean[:, :2])
+        if agreed < parameters.min_agreement:
+            return MatchStatus.DIVERGED, f"scan and map agree by {agreed:.2f} only, another place perhaps"
+        return self._judge_certainty(best)
 
-    def _judge_certainty(self, fits: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
-        parameters, best = self.parameters, fits[0]
-        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
-        position = float(np.sqrt(values[-1]))
+    def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
+        parameters = self.parameters
+        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
         if position > parameters.max_position_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
         yaw = float(np.sqrt(best.covariance[2, 2]))
         if yaw > parameters.max_yaw_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
-        if parameters.min_gain_over_second == 0.0:
-            return MatchStatus.CONVERGED, ""
-        return self._judge_second_places(fits, refiner, vectors[:, -1])
+        return MatchStatus.CONVERGED, ""
 
-    def _judge_second_places(self, fits: List[Fit], refiner: Refiner, direction: np.ndarray) -> Tuple[MatchStatus, str]:
-        parameters, best = self.parameters, fits[0]
-        for other in fits[1:]:
+    def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
+        """Refuse a fix whose covariance excludes a place that fits nearly as well."""
+        least = self.parameters.min_gain_over_second
+        if least == 0.0:
+            return MatchStatus.CONVERGED, ""
+        for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
-            if separation(best.theta, other.theta) >= 0.5 and lead < parameters.min_gain_over_second:
+            if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
-        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, direction)
-        if lead < parameters.min_gain_over_second:
+        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
+        excluded = _EXCLUDED * float(np.sqrt(values[-1]))
+        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, vectors[:, -1], excluded)
+        if lead < least:
             return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
         return MatchStatus.CONVERGED, ""
 
-    def _agreement(self, fit: Fit, refiner: Refiner, target: Blocks) -> float:
-        """Return the mean of the share of the scan that is on the map and the share of the map that is heard."""
-        heard = heard_share(refiner.world(fit.theta), fit.theta[:2], target.mean[:, :2])
-        return (float(fit.inliers.mean()) + heard) / 2.0
+
+def _excluded(fit: Fit, theta: np.ndarray) -> bool:
+    difference = (theta - fit.theta)[POSE]
+    difference[2] = wrapped(difference[2])
+    return bool(difference @ np.linalg.solve(fit.covariance[POSE, POSE], difference) > _EXCLUDED**2)
 
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:

@@ -1,13 +1,12 @@
 """Whether a match says more than chance would, and more than the places beside it.
 
 Clutter always finds something of a map to lie on, and two long walls match wherever the scan lies along them: what
-decides then is a handful of points. And where scan and map are of different places, some of both is left over.
+decides then is a handful of points.
 """
 
 from typing import Callable
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.planar_motion import STATES
 
@@ -17,9 +16,6 @@ _LEAST_DEVIATION = 0.02
 _LEAST_SHIFT = 1.5
 _GREATEST_SHIFT = 10.0
 _SHIFT_STEP = 0.5
-_REACH_QUANTILE = 0.9
-_HEARD_DISTANCE = 1.0
-_HEARD_ANGLE = 0.04
 Matched = Callable[[np.ndarray], np.ndarray]
 """From a state (8,) to which points (n,) bool lie on the map."""
 
@@ -37,26 +33,14 @@ def significance(matched: Matched, theta: np.ndarray, seed: int = 0) -> float:
     return float((matched(theta).mean() - shares.mean()) / max(shares.std(), _LEAST_DEVIATION))
 
 
-def lead_along(gain: Callable[[np.ndarray], float], theta: np.ndarray, direction: np.ndarray) -> float:
-    """Return by how much the gain at `theta` (8,) beats that of the best place beside it.
+def lead_along(gain: Callable[[np.ndarray], float], theta: np.ndarray, direction: np.ndarray, nearest: float) -> float:
+    """Return by how much the gain at `theta` (8,) beats that of the best place beside it; inf where none is beside.
 
-    Those places lie 1.5 m to 10 m away, to both sides along `direction` (2,), a unit vector in map.
+    Those places lie `nearest`, but at least 1.5 m, to 10 m away, to both sides along `direction` (2,), a unit vector in
+    map.
     """
     shifts = np.arange(_LEAST_SHIFT, _GREATEST_SHIFT + _SHIFT_STEP / 2.0, _SHIFT_STEP)
+    shifts = shifts[shifts >= nearest]
     beside = np.tile(theta, (2 * len(shifts), 1))
     beside[:, :2] += np.concatenate([-shifts, shifts])[:, np.newaxis] * direction
-    return gain(theta) - max(gain(state) for state in beside)
-
-
-def heard_share(points: np.ndarray, position: np.ndarray, blocks: np.ndarray) -> float:
-    """Return the share of the map's blocks (m, 2) within the scan's reach that its points (n, 2) in map lie near.
-
-    The reach is what nine tenths of the points keep from `position` (2,). 1 when there are no blocks within it.
-    """
-    reach = np.quantile(np.linalg.norm(points - position, axis=1), _REACH_QUANTILE)
-    ranges = np.linalg.norm(blocks - position, axis=1)
-    inside = ranges < reach
-    if not inside.any():
-        return 1.0
-    distances, _ = cKDTree(points).query(blocks[inside])
-    return float(np.mean(distances < np.maximum(_HEARD_DISTANCE, _HEARD_ANGLE * ranges[inside])))
+    return gain(theta) - max((gain(state) for state in beside), default=-np.inf)
