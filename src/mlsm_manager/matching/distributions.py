@@ -4,9 +4,11 @@ A block is too small to tell the direction of the wall it belongs to, so each is
 a Gaussian window. A window shows a long wall as if it were as long as the window, and the end of what a scan saw of a
 wall as if the wall ended there: both would pull the next scan back to where the last one was taken. So the extent along
 the structure comes from a window twice as wide, and what the window itself accounts for, up to a margin, is taken away.
-Along a wall a point may slide, while a buoy holds it on all sides.
+Along a wall a point may slide, while a buoy holds it on all sides. Three points of a far wall often lie across it: the
+direction comes from that of the two windows which is surer of it.
 """
 
+from dataclasses import dataclass
 from typing import Tuple
 
 import numpy as np
@@ -43,12 +45,9 @@ class LocalDistributions:
         self.window = window
         near = np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
         self.support = (near * blocks.count[neighbours]).sum(axis=1)
-        mass = np.sqrt(blocks.count)[neighbours]
-        weights = _window_weights(mass, distances, window)
-        self.mean, covariance = _moments(weights, neighbours, blocks)
-        _, broad = _moments(_window_weights(mass, distances, 2.0 * window), neighbours, blocks)
-        members = _members(weights, blocks.count[neighbours])
-        self.deviation, self.covariance, thickness = _structure(covariance, broad, members, 2.0 * window)
+        close, broad = (_Window.around(blocks, distances, neighbours, width) for width in (window, 2.0 * window))
+        self.mean = close.mean
+        self.deviation, self.covariance, thickness = _structure(close, broad)
         self.weight = (1.0 + thickness / _SURFACE_DEVIATION**2) ** -2
 
     def nearest(self, points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -56,9 +55,36 @@ class LocalDistributions:
         return self._tree.query(points)
 
 
-def _window_weights(mass: np.ndarray, distances: np.ndarray, window: np.ndarray) -> np.ndarray:
-    weights = mass * np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
-    return weights / weights.sum(axis=1, keepdims=True)
+@dataclass(frozen=True)
+class _Window:
+    """What lies in one window around each block.
+
+    mean: (n, 2) m. covariance: (n, 2, 2) m^2. vectors: (n, 2, 2) its axes as columns, the longer one last. turn: (n,)
+    rad^2, about the variance of their direction. members: (n,) to how many points it comes. width: (n,) m.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    vectors: np.ndarray
+    turn: np.ndarray
+    members: np.ndarray
+    width: np.ndarray
+
+    @staticmethod
+    def around(blocks: Blocks, distances: np.ndarray, neighbours: np.ndarray, width: np.ndarray) -> "_Window":
+        """Return windows of `width` (n,) over the `neighbours` (n, k) of each block, at `distances` (n, k) m."""
+        counts = blocks.count[neighbours]
+        weights = np.sqrt(counts) * np.exp(-0.5 * (distances / width[:, np.newaxis]) ** 2)
+        weights = weights / weights.sum(axis=1, keepdims=True)
+        mean, covariance = _moments(weights, neighbours, blocks)
+        values, vectors = np.linalg.eigh(covariance)
+        members = 1.0 / (weights**2 / counts).sum(axis=1)
+        turn = (values[:, 0] + _LEAST_DEVIATION**2) / (values[:, 1] + _LEAST_DEVIATION**2) / members
+        return _Window(mean, covariance, vectors, turn, members, width)
+
+    def along(self, axes: np.ndarray) -> np.ndarray:
+        """Return the variance (n,) along `axes` (n, 2)."""
+        return np.einsum("na,nab,nb->n", axes, self.covariance, axes)
 
 
 def _moments(weights: np.ndarray, neighbours: np.ndarray, blocks: Blocks) -> Tuple[np.ndarray, np.ndarray]:
@@ -72,24 +98,18 @@ def _moments(weights: np.ndarray, neighbours: np.ndarray, blocks: Blocks) -> Tup
     return mean, covariance
 
 
-def _members(weights: np.ndarray, counts: np.ndarray) -> np.ndarray:
-    """Return (n,) to how many equally weighted points each window comes."""
-    return weights.sum(axis=1) ** 2 / (weights**2 / counts).sum(axis=1)
-
-
-def _structure(
-    covariance: np.ndarray, broad: np.ndarray, members: np.ndarray, broad_window: np.ndarray
-) -> Tuple[float, np.ndarray]:
-    values, vectors = np.linalg.eigh(covariance)
-    sure = (members >= 3.0) & (values[:, 0] < _SURFACE_DEVIATION**2)
-    typical = max(float(np.median(values[sure, 0])) if sure.any() else 0.0, _LEAST_DEVIATION**2)
+def _structure(close: _Window, broad: _Window) -> Tuple[float, np.ndarray, np.ndarray]:
+    """Return how far echoes typically lie from a line [m]; of each block covariance (n, 2, 2) and thickness (n,)."""
+    vectors = np.where((broad.turn < close.turn)[:, np.newaxis, np.newaxis], broad.vectors, close.vectors)
+    across, members = close.along(vectors[:, :, 0]), close.members
+    sure = (members >= 3.0) & (across < _SURFACE_DEVIATION**2)
+    typical = max(float(np.median(across[sure])) if sure.any() else 0.0, _LEAST_DEVIATION**2)
     # With few members a line through them fits too well; the deviation found elsewhere counts as two more.
-    across = (members * values[:, 0] + _PRIOR_POINTS * typical) / (members + _PRIOR_POINTS)
+    across = (members * across + _PRIOR_POINTS * typical) / (members + _PRIOR_POINTS)
     # Two points always lie on a line: whether they are a structure or clutter, only a third can tell.
     known = np.clip((members - 1.0) / 2.0, 0.0, 1.0)
     across = known * across + (1.0 - known) * np.maximum(_LONE_DEVIATION**2, across)
-    along = np.einsum("na,nab,nb->n", vectors[:, :, 1], broad, vectors[:, :, 1])
-    along = np.maximum(along, across)
-    information = np.maximum(1.0 / along - _ALONG_MARGIN / broad_window**2, _UNBOUNDED**-2)
+    along = np.maximum(broad.along(vectors[:, :, 1]), across)
+    information = np.maximum(1.0 / along - _ALONG_MARGIN / broad.width**2, _UNBOUNDED**-2)
     values = np.column_stack([across, 1.0 / information])
     return float(np.sqrt(typical)), np.einsum("iak,ik,ibk->iab", vectors, values, vectors), across

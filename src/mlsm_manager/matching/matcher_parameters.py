@@ -36,7 +36,7 @@ class DistributionMatcherParameters(ParameterSet):
         5.0, "standard deviations by which the matched share must beat what any place would give", low=0.0, high=100.0
     )
     min_agreement: float = parameter(
-        0.78, "share of the echoes that the map explains times the share of the map that no echo denies",
+        0.8, "share of the echoes that the map explains times the share of the map that no echo denies",
         low=0.0, high=1.0,
     )  # fmt: skip
     max_jump: float = parameter(
