@@ -89,7 +89,9 @@ def residual_covariance(
     of_scan = vectors @ gain @ (noise + np.diag(1.0 - basis.share)) @ gain @ vectors.T
     of_prior = (vectors @ gain @ vectors.T @ prior_information)[:, POSE]
     laid = _map_covariance(basis, metric - prior_information, curvature, scale * points.hidden)
-    return _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
+    whole = _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
+    # Noise that is measured in few places may seem more than the prior: what was known before a scan is not lost by it.
+    return _bounded(whole, np.linalg.inv(prior_information))
 
 
 def _noise(basis: _Basis, points: PointEvidence) -> Tuple[np.ndarray, float]:
@@ -151,16 +153,20 @@ def _shared(basis: _Basis, laid: np.ndarray, prior_information: np.ndarray, of_p
     laid: (3, 3) covariance of that error; the prior shares no more of it than it has. of_prior: (8, 3) derivative of
     the fit by the prior's pose. Of an error that both share, weighing them against each other takes nothing away.
     """
-    prior = np.linalg.inv(prior_information)[POSE, POSE]
-    ratio, vectors = eigh(laid, prior)
-    back = prior @ vectors
-    shared = (back * np.minimum(ratio, 1.0)) @ back.T
+    shared = _bounded(laid, np.linalg.inv(prior_information)[POSE, POSE])
     whole = np.zeros((STATES, STATES))
     whole[POSE, POSE] = shared
     inside = basis.vectors.T @ basis.metric @ (whole - of_prior @ shared @ of_prior.T) @ basis.metric @ basis.vectors
     values, vectors = np.linalg.eigh(_symmetric(inside))
     turned = basis.vectors @ vectors
     return (turned * np.maximum(values, 0.0)) @ turned.T
+
+
+def _bounded(covariance: np.ndarray, bound: np.ndarray) -> np.ndarray:
+    """Return the covariance (n, n), in each direction no more than `bound` (n, n)."""
+    ratio, vectors = eigh(covariance, bound)
+    back = bound @ vectors
+    return (back * np.minimum(ratio, 1.0)) @ back.T
 
 
 def _symmetric(matrix: np.ndarray) -> np.ndarray:
