@@ -89,9 +89,9 @@ def residual_covariance(
     of_scan = vectors @ gain @ (noise + np.diag(1.0 - basis.share)) @ gain @ vectors.T
     of_prior = (vectors @ gain @ vectors.T @ prior_information)[:, POSE]
     laid = _map_covariance(basis, metric - prior_information, curvature, scale * points.hidden)
-    whole = _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
     # Noise that is measured in few places may seem more than the prior: what was known before a scan is not lost by it.
-    return _bounded(whole, np.linalg.inv(prior_information))
+    of_scan = _bounded(_symmetric(of_scan), np.linalg.inv(prior_information))
+    return _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
 
 
 def _noise(basis: _Basis, points: PointEvidence) -> Tuple[np.ndarray, float]:
