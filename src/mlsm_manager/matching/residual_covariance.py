@@ -29,6 +29,7 @@ _LEAST_SCALE = 0.01
 _LEAST_CURVATURE = 0.1
 _SPAN = 2.0
 _LEAST_SPAN = 0.1
+_LEAST_INFORMATION = 1e-6
 _TOLD_BY_PRIOR = 0.95
 Gradient = Callable[[np.ndarray], np.ndarray]
 """From a state (8,) to the gradient (8,) of all points."""
@@ -88,7 +89,7 @@ def residual_covariance(
     gain = np.linalg.inv(curvature)
     of_scan = vectors @ gain @ (noise + np.diag(1.0 - basis.share)) @ gain @ vectors.T
     of_prior = (vectors @ gain @ vectors.T @ prior_information)[:, POSE]
-    laid = _map_covariance(basis, metric - prior_information, curvature, scale * points.hidden)
+    laid = _map_covariance(basis, curvature, scale * points.hidden)
     # Noise that is measured in few places may seem more than the prior: what was known before a scan is not lost by it.
     of_scan = _bounded(_symmetric(of_scan), np.linalg.inv(prior_information))
     return _symmetric(of_scan + _shared(basis, laid, prior_information, of_prior))
@@ -139,11 +140,12 @@ def _curvature(basis: _Basis, theta: np.ndarray, gradient: Gradient, span: float
     return (vectors * np.clip(values, _LEAST_CURVATURE, 1.0)) @ vectors.T
 
 
-def _map_covariance(basis: _Basis, information: np.ndarray, curvature: np.ndarray, scale: float) -> np.ndarray:
+def _map_covariance(basis: _Basis, curvature: np.ndarray, scale: float) -> np.ndarray:
     """Return (3, 3): the covariance of the pose of a scan like this one, its motion known, for `scale` of its noise."""
-    points = basis.information(curvature - basis.of_prior)[POSE, POSE]
-    pose_information = information[POSE, POSE]
-    share, vectors = eigh(points, pose_information)
+    of_points = basis.information(np.eye(STATES) - basis.of_prior)[POSE, POSE]
+    # What no point tells stays as good as unknown.
+    pose_information = of_points + _LEAST_INFORMATION * basis.metric[POSE, POSE]
+    share, vectors = eigh(basis.information(curvature - basis.of_prior)[POSE, POSE], pose_information)
     return scale * (vectors * np.clip(share, _LEAST_CURVATURE, 1.0) ** -2) @ vectors.T
 
 

@@ -7,6 +7,7 @@ from scipy.stats import chi2
 
 from mlsm_manager.matching.distribution_matcher import DistributionMatcher
 from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
+from mlsm_manager.matching.residual_covariance import PointEvidence, residual_covariance
 
 SCANS = 40
 DEVIATIONS = np.array([0.5, 0.5, 0.05, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])
@@ -74,3 +75,14 @@ def test_what_the_scan_does_not_tell_is_left_as_sure_as_the_prior_had_it():
     sure = np.array([0.1, 1.0, 0.1, 1e-3, 1e-3, 1e-4, 1e-3, 1e-3])
     result = matched(scan, map_of(wall((-25, 10), (25, 10))), np.zeros(3), sure)
     assert result.covariance[0, 0] == pytest.approx(0.1**2, rel=0.2)
+
+
+def test_noise_that_seems_more_than_the_prior_does_not_make_the_vehicle_forget_it():
+    """As along a corridor: forty scattered echoes contradict each other by far more than they say."""
+    prior = np.diag(DEVIATIONS**-2)
+    along = np.eye(8)[0]
+    information = np.tile(0.01 * np.outer(along, along), (40, 1, 1))
+    gradient = np.resize([2.0, -1.0], 40)[:, np.newaxis] * along
+    points = PointEvidence(gradient, information, np.zeros((8, 8)), np.arange(40) // 2, hidden=0.0)
+    covariance = residual_covariance(np.zeros(8), points, lambda theta: information.sum(axis=0) @ theta, prior)
+    assert covariance[0, 0] <= DEVIATIONS[0] ** 2 * (1.0 + 1e-9)
