@@ -84,7 +84,7 @@ class DistributionMatcher:
         used = int(np.count_nonzero(best.inliers))
         if used < parameters.min_points:
             return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {parameters.min_points} or more"
-        certainty = significance(refiner.matched, best.theta)
+        certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
         if certainty < parameters.min_significance:
             return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
         jump = float(np.sqrt(2.0 * state.objection(best.theta)))
@@ -116,7 +116,7 @@ class DistributionMatcher:
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
         values, vectors = np.linalg.eigh(best.covariance[:2, :2])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
-        lead = lead_along(lambda theta: refiner.gain(theta, best.inflation), best.theta, vectors[:, -1], excluded)
+        lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
             return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
         return MatchStatus.CONVERGED, ""

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.matching.distributions import LocalDistributions
 from mlsm_manager.matching.normal_equations import Normal, PointEquations, support
-from mlsm_manager.matching.planar_motion import PlanarMotion
+from mlsm_manager.matching.planar_motion import POSE, PlanarMotion
 from mlsm_manager.matching.residual_covariance import PointEvidence, residual_covariance
 
 SCALES = (8.0, 4.0, 2.5)
@@ -95,13 +95,16 @@ class Refiner:
                 index = min(index + 1, narrowest)
         return self._fit(theta, iteration, converged)
 
-    def matched(self, theta: np.ndarray) -> np.ndarray:
-        """Return (n,) bool: points that lie on a surface of the map when the state is `theta`."""
-        return self._points.matched(theta, SCALES[-1])
+    def matched_shares(self, theta: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Return (k,) which share of the points lies on the map when the pose of `theta` is moved by `moves` (k, 3)."""
+        return self._points.matched_shares(theta, moves, SCALES[-1])
 
-    def gain(self, theta: np.ndarray, inflation: float) -> float:
-        """Return what `Fit.gain` would be if a fit ended at `theta`."""
-        return self._points.support(theta, SCALES[-1]) / inflation - self._prior.objection(theta)
+    def gains(self, fit: Fit, moves: np.ndarray) -> np.ndarray:
+        """Return (k,) what `fit.gain` would be if it had ended at its state moved by `moves` (k, 3)."""
+        supports = self._points.supports(fit.theta, moves, SCALES[-1])
+        moved = np.tile(fit.theta, (len(moves), 1))
+        moved[:, POSE] += moves
+        return supports / fit.inflation - np.array([self._prior.objection(theta) for theta in moved])
 
     def world(self, theta: np.ndarray) -> np.ndarray:
         """Return the points (n, 2) in map when the state is `theta`."""
@@ -143,7 +146,7 @@ class Refiner:
         inflation = self._design_effect(normal)
         covariance = np.linalg.inv(self._points.weighed(normal, inflation)[0] + self._prior.information)
         return Fit(
-            theta, covariance, support(normal.importance, normal.meeting.squared, SCALES[-1]), inflation,
+            theta, covariance, support(normal, SCALES[-1]), inflation,
             self._prior.objection(theta), normal.on_surface, normal.meeting.distances, iterations, converged,
         )  # fmt: skip
 

@@ -89,11 +89,15 @@ class PlanarMotion:
         poses = path[self.beam]
         return poses[:, :2] + rotated(self.local, poses[:, 2])
 
-    def point_jacobian(self, path: np.ndarray, theta: np.ndarray) -> np.ndarray:
-        """Return the derivative (n, 2, 8) of `points` by the state; `path` is that of `theta`."""
+    def arms(self, points: np.ndarray, path: np.ndarray) -> np.ndarray:
+        """Return (n, 2) m in map: from the vehicle, as it was then, to each of the `points` (n, 2)."""
+        return points - path[self.beam, :2]
+
+    def point_jacobian(self, arms: np.ndarray, theta: np.ndarray) -> np.ndarray:
+        """Return the derivative (n, 2, 8) of `points` by the state; `arms` are those of `theta`."""
         jacobian = self.jacobian(theta)
-        arms = _quarter_turn(rotated(self.local, path[self.beam, 2]))
-        return jacobian[self.beam, :2] + arms[:, :, np.newaxis] * jacobian[self.beam, 2][:, np.newaxis, :]
+        across = _quarter_turn(arms)
+        return jacobian[self.beam, :2] + across[:, :, np.newaxis] * jacobian[self.beam, 2][:, np.newaxis, :]
 
     def gradient_of(self, force: np.ndarray, arms: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Return the (8,) sum over the points of `force` (n, 2) times the derivative of their places by the state.
@@ -105,9 +109,9 @@ class PlanarMotion:
         per_beam = np.stack([np.bincount(self.beam, part, len(self.beam_times)) for part in along], axis=1)
         return np.tensordot(per_beam, self.jacobian(theta), axes=([0, 1], [0, 1]))
 
-    def point_covariance(self, path: np.ndarray) -> np.ndarray:
-        """Return (n, 2, 2) m^2 in map: what a beam's width leaves open of each point's bearing."""
-        sideways = _quarter_turn(rotated(self.local, path[self.beam, 2])) * self._bearing_deviation
+    def point_covariance(self, arms: np.ndarray) -> np.ndarray:
+        """Return (n, 2, 2) m^2 in map: what a beam's width leaves open of the bearing of points at `arms` (n, 2)."""
+        sideways = _quarter_turn(arms) * self._bearing_deviation
         return sideways[:, :, np.newaxis] * sideways[:, np.newaxis, :]
 
     def velocity(self, theta: np.ndarray) -> np.ndarray:

@@ -8,39 +8,36 @@ from typing import Callable
 
 import numpy as np
 
-from mlsm_manager.matching.planar_motion import STATES
-
 _PLACES = 48
 _SHIFT = 8.0
 _LEAST_DEVIATION = 0.02
 _LEAST_SHIFT = 1.5
 _GREATEST_SHIFT = 10.0
 _SHIFT_STEP = 0.5
-Matched = Callable[[np.ndarray], np.ndarray]
-"""From a state (8,) to which points (n,) bool lie on the map."""
+OfMoves = Callable[[np.ndarray], np.ndarray]
+"""From moves (k, 3) of a fit's pose, x y [m] yaw [rad], to a value (k,) of each."""
 
 
-def significance(matched: Matched, theta: np.ndarray, seed: int = 0) -> float:
-    """Return by how many standard deviations the matched share at `theta` (8,) beats that of other places.
+def significance(matched_shares: OfMoves, seed: int = 0) -> float:
+    """Return by how many standard deviations the matched share of a fit beats that of other places.
 
     The other places lie up to 8 m away with any heading.
     """
     rng = np.random.default_rng(seed)
-    elsewhere = np.zeros((_PLACES, STATES))
-    elsewhere[:, :2] = rng.uniform(-_SHIFT, _SHIFT, (_PLACES, 2))
-    elsewhere[:, 2] = rng.uniform(-np.pi, np.pi, _PLACES)
-    shares = np.array([matched(theta + place).mean() for place in elsewhere])
-    return float((matched(theta).mean() - shares.mean()) / max(shares.std(), _LEAST_DEVIATION))
+    places = rng.uniform(-_SHIFT, _SHIFT, (_PLACES, 2))
+    moves = np.column_stack([places, rng.uniform(-np.pi, np.pi, _PLACES)])
+    shares = matched_shares(np.vstack([np.zeros(3), moves]))
+    return float((shares[0] - shares[1:].mean()) / max(shares[1:].std(), _LEAST_DEVIATION))
 
 
-def lead_along(gain: Callable[[np.ndarray], float], theta: np.ndarray, direction: np.ndarray, nearest: float) -> float:
-    """Return by how much the gain at `theta` (8,) beats that of the best place beside it; inf where none is beside.
+def lead_along(gains: OfMoves, direction: np.ndarray, nearest: float) -> float:
+    """Return by how much the gain of a fit beats that of the best place beside it; inf where none is beside.
 
     Those places lie `nearest`, but at least 1.5 m, to 10 m away, to both sides along `direction` (2,), a unit vector in
     map.
     """
     shifts = np.arange(_LEAST_SHIFT, _GREATEST_SHIFT + _SHIFT_STEP / 2.0, _SHIFT_STEP)
     shifts = shifts[shifts >= nearest]
-    beside = np.tile(theta, (2 * len(shifts), 1))
-    beside[:, :2] += np.concatenate([-shifts, shifts])[:, np.newaxis] * direction
-    return gain(theta) - max((gain(state) for state in beside), default=-np.inf)
+    moves = np.outer(np.concatenate([[0.0], -shifts, shifts]), np.append(direction, 0.0))
+    found = gains(moves)
+    return float(found[0] - found[1:].max(initial=-np.inf))

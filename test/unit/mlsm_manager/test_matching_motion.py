@@ -30,7 +30,8 @@ def test_the_derivative_of_the_path_is_what_differences_say(velocity, theta):
 @given(VELOCITIES, STATE)
 def test_the_derivative_of_the_points_is_what_differences_say(velocity, theta):
     motion = PlanarMotion(scan_of(harbour(), at_velocity(velocity)))
-    found = motion.point_jacobian(motion.path(theta), theta)
+    path = motion.path(theta)
+    found = motion.point_jacobian(motion.arms(motion.points(path), path), theta)
     for state in range(STATES):
         change = np.zeros(STATES)
         change[state] = 1e-6
