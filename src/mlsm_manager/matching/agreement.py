@@ -37,7 +37,8 @@ def agreement(points: np.ndarray, on_map: np.ndarray, position: np.ndarray, bloc
     inside = block_range < np.quantile(ranges, _REACH_QUANTILE)
     heard = inside & (distances < tolerance)
     denied = inside & ~heard & (block_range < first - tolerance) & np.isfinite(first)
-    return explained * np.count_nonzero(heard) / max(np.count_nonzero(heard | denied), 1)
+    reached = np.count_nonzero(heard | denied)
+    return explained * (np.count_nonzero(heard) / reached if reached else 1.0)
 
 
 def _beside(values: np.ndarray, merged: np.ufunc) -> np.ndarray:

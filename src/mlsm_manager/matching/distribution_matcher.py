@@ -24,6 +24,7 @@ _OBJECTION_SHARE = 0.01
 _MOST_RATES = 9
 _LEAST_VARIANCE = 1e-12
 _FIELD_CELLS = 2.0
+_MARGIN = 15.0
 _APART = 0.5
 _EXCLUDED = 4.0
 
@@ -40,10 +41,12 @@ class DistributionMatcher:
         state = prior_state(prior, scan)
         motion = PlanarMotion(scan, self.parameters.beam_width / np.sqrt(12.0))
         fewest = self.parameters.min_points
+        window = self._window(motion, state)
+        target = _in_reach(target, motion, state, window)
         if len(scan) < fewest or len(target) < fewest:
             reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
             return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
-        fits, refiner = self._fits(scan, motion, target, state)
+        fits, refiner = self._fits(motion, target, state, window)
         best = fits[0]
         status, reason = self._judge(best, refiner, state, target)
         if status is MatchStatus.CONVERGED:
@@ -51,10 +54,11 @@ class DistributionMatcher:
             status, reason = self._judge_second_places(best, fits[1:], refiner)
         return _result(status, reason, motion, best, start)
 
-    def _fits(self, scan: Scan, motion: PlanarMotion, target: Blocks, state: PriorState) -> Tuple[List[Fit], Refiner]:
+    def _fits(
+        self, motion: PlanarMotion, target: Blocks, state: PriorState, window: SearchWindow
+    ) -> Tuple[List[Fit], Refiner]:
         parameters = self.parameters
-        weights = np.ones(len(scan))
-        window = self._window(motion, state)
+        weights = np.ones(len(motion.local))
         margin = window.distance + 2.0 * parameters.search_cell
         field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
         pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
@@ -120,6 +124,14 @@ class DistributionMatcher:
         if lead < least:
             return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
         return MatchStatus.CONVERGED, ""
+
+
+def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
+    """Return the blocks that points of the scan can meet, so that a match takes no longer in a map of a whole survey."""
+    offsets = motion.points(motion.path(state.mean)) - state.mean[:2]
+    reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
+    distances = np.linalg.norm(target.mean[:, :2] - state.mean[:2], axis=1)
+    return Blocks(target.rows[distances < reach], target.resolution)
 
 
 def _excluded(fit: Fit, theta: np.ndarray) -> bool:

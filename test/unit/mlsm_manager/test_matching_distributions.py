@@ -57,6 +57,14 @@ def test_the_path_ends_at_the_pose():
     assert result.beam_times[-1] == scan.reference_time
 
 
+def test_what_lies_beyond_the_reach_of_a_scan_changes_nothing():
+    scan = scan_of(harbour(), still())
+    alone = match(scan, map_of(harbour()), [0.5, 0.5, 0.1])
+    beside = match(scan, map_of(np.vstack([harbour(), harbour() + [500.0, 0.0]])), [0.5, 0.5, 0.1])
+    np.testing.assert_allclose(beside.pose, alone.pose, atol=1e-9)
+    np.testing.assert_allclose(beside.covariance, alone.covariance, rtol=1e-6)
+
+
 def test_a_scale_error_of_the_odometry_is_found_while_it_moves():
     truth = at_velocity((0.3, 0.0, 0.0))
     scan = scan_of(harbour(), truth, at_velocity((0.2, 0.0, 0.0)), moving=True)
