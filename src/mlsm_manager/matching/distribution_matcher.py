@@ -127,7 +127,7 @@ class DistributionMatcher:
 
 
 def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
-    """Return the blocks that points of the scan can meet, so that a match takes no longer in a map of a whole survey."""
+    """Return the blocks that points of the scan can meet: a match takes no longer in the map of a whole survey."""
     offsets = motion.points(motion.path(state.mean)) - state.mean[:2]
     reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
     distances = np.linalg.norm(target.mean[:, :2] - state.mean[:2], axis=1)

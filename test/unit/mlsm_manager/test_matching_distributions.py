@@ -60,7 +60,8 @@ def test_the_path_ends_at_the_pose():
 def test_what_lies_beyond_the_reach_of_a_scan_changes_nothing():
     scan = scan_of(harbour(), still())
     alone = match(scan, map_of(harbour()), [0.5, 0.5, 0.1])
-    beside = match(scan, map_of(np.vstack([harbour(), harbour() + [500.0, 0.0]])), [0.5, 0.5, 0.1])
+    far = harbour() + np.array([500.0, 0.0])
+    beside = match(scan, map_of(np.vstack([harbour(), far])), [0.5, 0.5, 0.1])
     np.testing.assert_allclose(beside.pose, alone.pose, atol=1e-9)
     np.testing.assert_allclose(beside.covariance, alone.covariance, rtol=1e-6)
 
