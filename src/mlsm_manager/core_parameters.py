@@ -18,6 +18,13 @@ class MatchInput(Enum):
     CLEANED = "CLEANED"
 
 
+class MapInput(Enum):
+    """Which points make the map that is shown and saved."""
+
+    CLEANED = "CLEANED"
+    MATCHED = "MATCHED"
+
+
 @dataclass(frozen=True)
 class MatchingParameters(ParameterSet):
     """What is matched, and what becomes of the answers."""
@@ -25,6 +32,11 @@ class MatchingParameters(ParameterSet):
     match_input: MatchInput = parameter(
         MatchInput.ECHOES, "points that are matched: sonar/scan/echoes or sonar/scan/cleaned", tunable=False
     )
+    map_input: MapInput = parameter(
+        MapInput.CLEANED,
+        "points that make the map that is shown and saved: sonar/scan/cleaned, or those that are matched",
+        tunable=False,
+    )  # fmt: skip
     start_matching: bool = parameter(
         False, "match from the start; afterwards the topic startMatching says it", tunable=False
     )

@@ -6,7 +6,7 @@ from typing import Any, Dict, Mapping, Type
 
 import yaml
 
-from mlsm_manager.core_parameters import MatchInput, MlsmCoreParameters
+from mlsm_manager.core_parameters import MapInput, MatchInput, MlsmCoreParameters
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from node_support.files import write_whole
 from node_support.parameters import ParameterSet
@@ -31,7 +31,11 @@ def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) 
         target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
     )
     values["mlsm_core"].update(
-        odom_frame=odom_frame, base_frame=base_frame, match_input=MatchInput.ECHOES.value, start_matching=True
+        odom_frame=odom_frame,
+        base_frame=base_frame,
+        match_input=MatchInput.ECHOES.value,
+        map_input=MapInput.MATCHED.value,
+        start_matching=True,
     )
     return values
 

@@ -8,7 +8,7 @@ import rospy
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
-from mlsm_manager.core_parameters import MatchInput, MlsmCoreParameters
+from mlsm_manager.core_parameters import MapInput, MatchInput, MlsmCoreParameters
 from mlsm_manager.fix_publisher import FixPublisher
 from mlsm_manager.map_publisher import MapPublisher
 from mlsm_manager.map_transform import MapTransform
@@ -105,13 +105,10 @@ class MlsmCore:
             self.health.problem(kind, detail, cloud.broken)
         if self._live.current.match_input is MatchInput.CLEANED and cloud.frame_id != self._live.current.map_frame:
             guarded(self.health, self._match)(cloud)
-        with self.health.timed(), self._lock:
-            self._notice_jump(cloud.stamp_ns * 1e-9)
-            update = self._insert_here(cloud)
-            self._stamp_ns = cloud.stamp_ns
-            self._changed = True
-            blocks = len(self._mapper.shown)
-        tell_cloud(self.health, update, blocks, self._live.current.map_limit)
+        if self._live.current.map_input is MapInput.CLEANED:
+            with self.health.timed(), self._lock:
+                self._notice_jump(cloud.stamp_ns * 1e-9)
+                self._tell_map(self._insert_here(cloud), cloud.stamp_ns)
 
     def _insert_here(self, cloud: IntensityCloud) -> CloudUpdate:
         if cloud.frame_id == self._live.current.map_frame:
@@ -139,12 +136,17 @@ class MlsmCore:
         with self._lock:
             update = self._mapper.take_echoes(scan)
             self._correcting.believe(update.belief)
-            waited = iter(self._mapper.take_waiting, None)
-            for cloud_update in waited:
-                tell_cloud(self.health, cloud_update, len(self._mapper.shown), self._live.current.map_limit)
-                self._changed = True
+            if self._live.current.map_input is MapInput.MATCHED:
+                self._tell_map(self._mapper.take_cloud(scan), cloud.stamp_ns)
+            for waited in iter(self._mapper.take_waiting, None):
+                self._tell_map(waited, cloud.stamp_ns)
         tell_scan(self.health, update, self._mapper.matching)
         self._publish_fix(update, cloud.stamp_ns)
+
+    def _tell_map(self, update: CloudUpdate, stamp_ns: int) -> None:
+        self._stamp_ns = stamp_ns
+        self._changed = True
+        tell_cloud(self.health, update, len(self._mapper.shown), self._live.current.map_limit)
 
     def _scan(self, cloud: IntensityCloud) -> Optional[Scan]:
         time, times = cloud.stamp_ns * 1e-9, np.unique(np.abs(cloud.time_stamps[cloud.valid]))

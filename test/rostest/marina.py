@@ -11,8 +11,10 @@ import numpy as np
 import rosbag
 import rospy
 import rostest
-from graph import TEST_DATA, Diagnostics, Inbox, play, recording, wait_for_subscribers, wait_until
+from graph import TEST_DATA, Diagnostics, Inbox, play, recording, rows, wait_for_subscribers, wait_until
 from nav_msgs.msg import Odometry
+from scipy.spatial import cKDTree
+from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
 from mlsm_manager.bag_recording import BagNames, read_recording
@@ -37,6 +39,7 @@ class Marina(unittest.TestCase):
         """Wait until every scan of the minutes was matched live."""
         whole = recording("marina_first.bag")
         fixes, transforms, diagnostics = Inbox("/MLSM/odometry", Odometry), Inbox("/tf", TFMessage), Diagnostics()
+        maps = Inbox("/MLSM/cloud", PointCloud2)
         with tempfile.TemporaryDirectory() as folder:
             minutes = Path(folder) / "minutes.bag"
             cut(whole, minutes)
@@ -47,6 +50,9 @@ class Marina(unittest.TestCase):
         wait_until(lambda: len(fixes.messages) >= cls.replayed.matched, timeout=5.0, required=False)
         cls.fixes = [(stamp(fix), planar(fix.pose.pose.position, fix.pose.pose.orientation)) for fix in fixes.messages]
         cls.corrections = corrections(transforms)
+        whole_map = len(cls.replayed.mapper.shown)
+        wait_until(lambda: maps.messages[-1:] and maps.messages[-1].width >= whole_map, timeout=5.0, required=False)
+        cls.map = rows(maps.messages[-1])
 
     def test_most_scans_are_matched(self) -> None:
         """All but the first, which makes the map."""
@@ -58,6 +64,13 @@ class Marina(unittest.TestCase):
         errors = np.array([pose - nearest(expected, time) for time, pose in self.fixes])
         self.assertLess(np.hypot(*errors[:, :2].T).max(), SAME_PLACE)
         self.assertLess(np.abs(wrapped(errors[:, 2])).max(), SAME_HEADING)
+
+    def test_the_map_that_is_shown_is_the_one_of_map_bag(self) -> None:
+        """Made of the echoes that are matched: the cleaned clouds of a head that says 0 or 127 are empty."""
+        expected = self.replayed.mapper.shown.blocks.mean[:, :2]
+        distances, _ = cKDTree(expected).query(self.map[:, :2])
+        self.assertAlmostEqual(len(self.map) / len(expected), 1.0, delta=0.05)
+        self.assertLess(np.quantile(distances, 0.95), 0.1)
 
     def test_map_to_odom_follows_what_map_bag_calls_corrected(self) -> None:
         """At the end of each scan, when nothing is on the way; the odometry alone errs by more than a metre."""

@@ -6,6 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
+from mlsm_manager.core_parameters import MapInput
 from mlsm_manager.live_file import NODES, live_values, replay_values, write_live
 from mlsm_manager.mapping.replay_parameters import ReplayParameters
 from node_support.parameters import ParameterError
@@ -30,6 +31,7 @@ def test_every_node_takes_its_part(written):
     assert (cloud.sonar_delay, cloud.range_scale, echoes.spacing, core.edge_half_width) == (0.9, 0.97, 0.7, 0.06)
     assert (cloud.target_frame, core.odom_frame, core.base_frame) == ("dead_reckoning", "dead_reckoning", "hull")
     assert core.start_matching
+    assert core.map_input is MapInput.MATCHED
 
 
 def test_a_comment_says_what_it_is_for(written):
