@@ -46,7 +46,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     parameters = _calibrated(_scans(recording, parameters, options), parameters, options)
     recording = recording.corrected(parameters.part(BeamCorrection))
     replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
-    run = _run(replayed, _refined(recording, replayed) if options.refine else None)
+    run = _run(replayed, _refined(recording, replayed, parameters) if options.refine else None)
     errors = errors_of(run, recording)
     write_run(options.out, options.bag.name, run, recording)
     write_live(options.out / "live.yaml", parameters, names.odom_frame, names.base_frame)
@@ -103,9 +103,9 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
     return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
 
 
-def _refined(recording: Recording, replayed: Replayed) -> Refined:
+def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
     with _bar(len(replayed.updates), "scan", "refine") as bar:
-        return refine(recording, replayed, bar.update)
+        return refine(recording, replayed, parameters.for_few_scans().build_matcher(), bar.update)
 
 
 def _run(replayed: Replayed, refined: Optional[Refined]) -> Run:

@@ -42,7 +42,7 @@ def calibrated(scans: List[Scan], parameters: ReplayParameters, held: Collection
     if "edge_half_width" not in held and parameters.mode is ExtractionMode.LEADING_EDGE:
         model = model.changed({"edge_half_width": half_width_of(scans)})
     # A fit that takes the scale of its ranges for unknown would not show it.
-    comparing = parameters.changed({**model.to_mapping(), "range_scale_deviation": 0.0}).for_single_scans()
+    comparing = parameters.changed({**model.to_mapping(), "range_scale_deviation": 0.0}).for_few_scans()
     calibrator = Calibrator(comparing.build_matcher(), parameters.part(OdometryErrors), parameters.match_resolution)
     model, scale = calibrator.calibrated(scans, model, held)
     if "scale_deviation" not in held and calibrator.contradicts(scale):

@@ -34,8 +34,8 @@ class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, Be
         """Return these with a beam at least as wide as the edges at which it hears surfaces."""
         return self.changed({"beam_width": max(self.beam_width, 2.0 * self.edge_half_width)})
 
-    def for_single_scans(self: Self) -> Self:
-        """Return these for a map of one scan, which lacks much of what another scan sees and is no other place."""
+    def for_few_scans(self: Self) -> Self:
+        """Return these for a map of one scan or some, which lacks much of what another sees and is no other place."""
         return self.changed({"min_agreement": 0.0, "min_gain_over_second": 0.0})
 
     def build_matcher(self) -> Matcher:

@@ -11,6 +11,7 @@ from mlsm_manager.mapping.loops import ScanMatching, scan_edges
 from mlsm_manager.mapping.pose_graph import Beliefs, RelativePoses, joined, smoothed
 from mlsm_manager.mapping.recording import Recording
 from mlsm_manager.mapping.replay import Replayed
+from mlsm_manager.matching.matcher import Matcher
 from mlsm_manager.matching.planar import composed, inverse, transformed
 from mlsm_manager.matching.prediction import OdometryErrors
 from mlsm_manager.matching.scan import Track
@@ -31,15 +32,15 @@ class Refined:
     edges: int
 
 
-def refine(recording: Recording, replayed: Replayed, on_match: Callable[[int], None]) -> Refined:
-    """Return the run smoothed over all its scans; the causal run is the seed."""
+def refine(recording: Recording, replayed: Replayed, matcher: Matcher, on_match: Callable[[int], None]) -> Refined:
+    """Return the run smoothed over all its scans; the causal run is the seed. `matcher` compares some scans."""
     mapper = replayed.mapper
     keyframes = keyframes_of(replayed.updates)
     if len(keyframes) < 2:
         return Refined(replayed.corrected, mapper.shown.blocks, 0)
     poses = np.array([keyframe.pose for keyframe in keyframes])
     motion = replayed.updates[-1].belief.theta[6:]
-    matching = ScanMatching(mapper.matcher, mapper.errors, mapper.settings.match_resolution, motion)
+    matching = ScanMatching(matcher, mapper.errors, mapper.settings.match_resolution, motion)
     edges = scan_edges(keyframes, poses, matching, on_match)
     times = np.array([keyframe.time for keyframe in keyframes])
     by_odometry = odometry_edges(times, recording.track, mapper.errors)

@@ -74,7 +74,7 @@ def test_keyframes_are_the_scans_in_the_map(replayed):
 
 def test_a_smoothed_run_is_nearer_to_the_truth_than_its_odometry(replayed):
     recording, run = replayed
-    found = refine(recording, run, lambda done: None)
+    found = refine(recording, run, run.mapper.matcher, lambda done: None)
     assert _error(found.poses, run) < 0.6 * _error(run.odometry, run)
     assert found.edges > 30
     assert len(found.blocks) > 100
