@@ -1,21 +1,13 @@
 """Installed by catkin (catkin_python_setup); not meant to be run by hand."""
 
+from pathlib import Path
+
 from catkin_pkg.python_setup import generate_distutils_setup
-from setuptools import setup
+from setuptools import find_packages, setup
 
 setup(
     **generate_distutils_setup(
-        packages=[
-            "node_support",
-            "imagenex_852_driver",
-            "imagenex_852_driver.emulator",
-            "imagenex_852_driver.protocol",
-            "sonar_processing",
-            "mlsm_manager",
-            "mlsm_manager.mapping",
-            "mlsm_manager.matching",
-            "sonar_simulator",
-        ],
+        packages=find_packages(str(Path(__file__).resolve().parent / "src")),
         package_dir={"": "src"},
     )
 )

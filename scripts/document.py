@@ -8,23 +8,23 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, Type
 
-from imagenex_852_driver.driver_parameters import DriverParameters
-from imagenex_852_driver.emulator_parameters import EmulatorParameters
-from mlsm_manager.core_parameters import MlsmCoreParameters
+from imagenex_852_driver.emulator.parameters import EmulatorParameters
+from imagenex_852_driver.line.parameters import DriverParameters
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
-from sonar_processing.circles import CircleDetectorParameters
-from sonar_processing.echo_extraction import EchoExtractorParameters
-from sonar_processing.lines import LineDetectorParameters
-from sonar_processing.outliers import OutlierRemoverParameters
-from sonar_processing.polar_image import SonarImageParameters
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
-from sonar_processing.threshold import ThresholderParameters
-from sonar_processing.tilt_scan import SonarControlParameters
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.filters.outliers import OutlierRemoverParameters
+from sonar_processing.filters.threshold import ThresholderParameters
+from sonar_processing.scans.image import SonarImageParameters
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.servo.tilt_scan import SonarControlParameters
+from sonar_processing.shapes.circles import CircleDetectorParameters
+from sonar_processing.shapes.lines import LineDetectorParameters
 from sonar_simulator.default_yaml import gazebo_sonar_yaml, simulator_yaml
-from sonar_simulator.gazebo_parameters import GazeboSonarParameters
-from sonar_simulator.simulation import SimulatorParameters
-from sonar_simulator.simulation_setup import GROUPS
+from sonar_simulator.gazebo.parameters import GazeboSonarParameters
+from sonar_simulator.simulation.simulation import SimulatorParameters
+from sonar_simulator.simulation.simulation_setup import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
 DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]

@@ -13,13 +13,13 @@ from benchmarks.tank_recording import BEAMS_PER_TURN, Beams, recording, simulate
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 
-from sonar_simulator.echo_model import ECHO_MODELS, make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sonar_head import Sonar, SonarParameters
-from sonar_simulator.world import World
-from sonar_simulator.world_file import load_world
-from sonar_simulator.world_mesh import world_triangles
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world.world import World
+from sonar_simulator.world.world_file import load_world
+from sonar_simulator.world.world_mesh import world_triangles
 
 ROOT = Path(__file__).resolve().parents[1]
 VIEWS = {"basin": ((-20.0, -3.0, -2.0), 50.0), "harbour": ((-5.0, -5.0, -2.0), 50.0), "tank": ((0.0, 0.0, -1.0), 10.0)}

@@ -5,16 +5,16 @@ from pathlib import Path
 
 import numpy as np
 
-from sonar_processing.beam import Beam
+from node_support.geometry.matrices import pose_matrix
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.scan_assembler import ScanAssembler
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sdf import load_sdf
-from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_simulator.world.sdf import load_sdf
 
 ROOT = Path(__file__).resolve().parents[2]
 HALF_LENGTH, HALF_WIDTH = 60.0, 25.0

@@ -7,8 +7,8 @@ import numpy as np
 from std_msgs.msg import Header
 
 from benchmarks.table import Row, median_seconds
-from mlsm_manager.markers import BlockMarkers
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5
 SCAN_RADIUS = 50.0

@@ -9,14 +9,14 @@ from pathlib import Path
 from typing import Any, Dict, List
 
 from benchmarks.table import Row
-from mlsm_manager.bag_recording import BagNames, read_recording
-from mlsm_manager.mapping.calibration import Calibrator
-from mlsm_manager.mapping.echo_form import echo_form_of, suited
-from mlsm_manager.mapping.recording import scans_of
-from mlsm_manager.mapping.replay_parameters import ReplayParameters
-from mlsm_manager.mapping.sensor_model import SensorModel, at_beam_edge
-from mlsm_manager.mapping.straightness import half_width_of, roughness
-from mlsm_manager.matching.prediction import OdometryErrors
+from mlsm_manager.localisation.sensor_model import SensorModel, at_beam_edge
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.offline.beam_width_calibration import half_width_of, roughness
+from mlsm_manager.offline.calibration import Calibrator
+from mlsm_manager.offline.echo_shape import echo_form_of, suited
+from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.ros.bag_recording import BagNames, read_recording
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "marina_first.bag"

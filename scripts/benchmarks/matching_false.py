@@ -7,13 +7,13 @@ import numpy as np
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, noise_scan, still
 from benchmarks.matching_starts import tour_map
 from benchmarks.table import Row
-from mlsm_manager.blocks import Blocks
-from mlsm_manager.matching.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
-from mlsm_manager.matching.planar import composed, inverse
-from mlsm_manager.matching.result import Prior
-from mlsm_manager.matching.scan import Scan
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.problem.result import Prior
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry.planar import composed, inverse
 
 SCANS = 250
 _SIGMAS = 4.0

@@ -8,11 +8,11 @@ from scipy.stats import chi2
 
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind
 from benchmarks.table import Row
-from mlsm_manager.mapping.mapper import Mapper, MapSettings
-from mlsm_manager.matching.matchers import MATCHERS, MatcherName
-from mlsm_manager.matching.prediction import OdometryErrors
-from mlsm_manager.matching.scan import Scan, Track
-from sonar_simulator.vehicle import VehicleScript
+from mlsm_manager.localisation.mapper import Mapper, MapSettings
+from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.matching.problem.scan import Scan, Track
+from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 SEEDS = 30
 TURNS = 7

@@ -7,12 +7,12 @@ import numpy as np
 from benchmarks.matching_moves import SETTINGS
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, still
 from benchmarks.table import Row
-from mlsm_manager.mapping.mapper import Mapper
-from mlsm_manager.matching.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
-from mlsm_manager.matching.planar import wrapped
-from mlsm_manager.matching.prediction import OdometryErrors
-from mlsm_manager.matching.scan import Track
+from mlsm_manager.localisation.mapper import Mapper
+from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.matching.problem.scan import Track
+from node_support.geometry.planar import wrapped
 
 SEEDS = 30
 TURNS = 5

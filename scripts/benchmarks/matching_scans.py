@@ -8,16 +8,16 @@ from typing import Callable, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.planar import rotated
-from mlsm_manager.matching.scan import Scan, Track
-from sonar_processing.echo_extraction import EchoExtractorParameters, extract_echoes
-from sonar_simulator.beam_pattern import BeamPattern
-from sonar_simulator.laser_cone import LaserCone, LaserConeParameters
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sdf import load_sdf
-from sonar_simulator.sonar_head import Sonar, SonarHead
-from sonar_simulator.world import Shape, World
+from mlsm_manager.matching.problem.scan import Scan, Track
+from node_support.geometry.matrices import pose_matrix
+from node_support.geometry.planar import rotated
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
+from sonar_simulator.echoes.laser_cone import LaserCone, LaserConeParameters
+from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
+from sonar_simulator.world.sdf import load_sdf
+from sonar_simulator.world.world import Shape, World
 
 ROOT = Path(__file__).resolve().parents[2]
 RAYS = {45: (15, 3), 500: (50, 10)}

@@ -8,13 +8,13 @@ import yaml
 
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind, still
 from benchmarks.table import Row
-from mlsm_manager.blocks import Blocks
-from mlsm_manager.matching.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
-from mlsm_manager.matching.planar import composed, inverse, wrapped
-from mlsm_manager.matching.result import Prior
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
-from sonar_simulator.vehicle import VehicleScript
+from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.problem.result import Prior
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry.planar import composed, inverse, wrapped
+from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 STARTS = 100
 _NEAR, _NEAR_YAW = 0.5, np.radians(3.0)

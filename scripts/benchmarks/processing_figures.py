@@ -10,23 +10,23 @@ from benchmarks import processing_graph
 from benchmarks.graph import ROOT
 from benchmarks.map_figures import RESOLUTION, scan
 from benchmarks.table import Row, median_seconds
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.ros.conversions import matrix_from_message
+from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.conversions import (
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
+from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
     beam_from_message,
     cloud_from_message,
     cloud_to_message,
 )
-from sonar_processing.echo_extraction import EchoExtractorParameters, extract_echoes
-from sonar_processing.echo_extractor import EchoExtractor
-from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.polar_scan import PolarScan
-from sonar_processing.scan_assembler import ScanAssembler
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
-from sonar_processing.threshold import Thresholder, ThresholderParameters
-from sonar_processing.transforms import matrix_from_message
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.scans.polar_scan import PolarScan
 
 
 def message_rows() -> List[Row]:

@@ -13,7 +13,7 @@ from tf2_msgs.msg import TFMessage
 
 from benchmarks.graph import ROOT, Nodes, launched, roscore, wait_until
 from benchmarks.table import Row
-from sonar_processing.conversions import StampedIntensityCloudArrays, header
+from sonar_processing.ros.conversions import StampedIntensityCloudArrays, header
 from underwater_map_construction.msg import SonarScanLine
 
 BEAMS, BINS = 120, 500

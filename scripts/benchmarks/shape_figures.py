@@ -9,14 +9,14 @@ import numpy as np
 
 from benchmarks.basin_scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
 from benchmarks.table import Row, median_seconds
-from sonar_processing.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.echo_extraction import EchoExtractorParameters
-from sonar_processing.echo_extractor import EchoExtractor
-from sonar_processing.lines import Line, LineDetector, LineDetectorParameters
-from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.stages import Stage
-from sonar_processing.threshold import Thresholder, ThresholderParameters
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.stage_table import Stage
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.shapes.lines import Line, LineDetector, LineDetectorParameters
 
 SEEDS = 100
 SPREADS = (0.15, 1.0)

@@ -8,11 +8,11 @@ from full_scan import ANGLES, RANGES, WORLDS, differences
 
 from benchmarks.table import Row, median_seconds
 from benchmarks.tank_recording import BEAMS_PER_TURN, Beams, distances, recording, simulated
-from sonar_simulator.echo_model import ECHO_MODELS, make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sonar_head import Sonar, SonarParameters
-from sonar_simulator.world_file import load_world
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world.world_file import load_world
 
 PLACE = (0.0, 0.0, -2.0)
 GRIDS = {45: (9, 5), 500: (50, 10)}

@@ -9,22 +9,22 @@ import yaml
 
 from benchmarks.table import Row
 from benchmarks.world_distance import distances, nearest_shape
-from mlsm_manager.blocks import Blocks
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry.matrices import pose_matrix
 from node_support.health import Health
-from sonar_processing.beam import Beam
-from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.scan_assembler import ScanAssembler
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
-from sonar_processing.threshold import Thresholder, ThresholderParameters
-from sonar_processing.tilt_scan import SonarControlParameters, TiltScan
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sdf import load_sdf
-from sonar_simulator.servo import Servo, ServoParameters, tilted
-from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
+from sonar_simulator.world.sdf import load_sdf
 
 ROOT = Path(__file__).resolve().parents[2]
 RESOLUTION = 0.5

@@ -8,11 +8,11 @@ import numpy as np
 import rosbag
 import yaml
 
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sonar_head import Sonar, SonarParameters
-from sonar_simulator.world_file import load_world
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world.world_file import load_world
 
 ROOT = Path(__file__).resolve().parents[2]
 # The range bands whose histograms are compared. Nearer than half a metre stands a part of the vehicle.

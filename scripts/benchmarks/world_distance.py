@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sonar_simulator.world import Shape, World
+from sonar_simulator.world.world import Shape, World
 
 
 def distances(world: World, points: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from node_support.refused_input import RefusedInput
+from node_support.errors import RefusedInput
 
 
 @dataclass(frozen=True)

@@ -4,9 +4,10 @@ from typing import Dict, Type
 
 from node_support.parameter_text import yaml_keys
 from node_support.parameters import ParameterSet
-from sonar_simulator import gazebo_parameters, simulation_setup
-from sonar_simulator.gazebo_parameters import GazeboSonarParameters
-from sonar_simulator.simulation import SimulatorParameters
+from sonar_simulator.gazebo import parameters as gazebo_parameters
+from sonar_simulator.gazebo.parameters import GazeboSonarParameters
+from sonar_simulator.simulation import simulation_setup
+from sonar_simulator.simulation.simulation import SimulatorParameters
 
 
 def simulator_yaml() -> str:

@@ -11,7 +11,7 @@ from graph import Diagnostics, Inbox, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.conversions import cloud_to_message
+from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 
 STAGES = {"thresholder": "/sonar/scan/sonarCloud", "outlier_remover": "/sonar/scan/thresholded",

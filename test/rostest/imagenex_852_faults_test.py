@@ -14,7 +14,7 @@ from driver_listener import PATIENCE, beams, diagnostics, values  # noqa: E402
 from fault_experiment import GOOD, NumberedEchoes, RecordingInjector, fault_rates  # noqa: E402
 
 from imagenex_852_driver.emulator import EmulatedHead, Fault, PtyServer  # noqa: E402
-from imagenex_852_driver.line_timing import LineTiming  # noqa: E402
+from imagenex_852_driver.line.timing import LineTiming  # noqa: E402
 
 _TIMING = LineTiming(baud_rate=1152000, speed_of_sound=15000.0)
 _DRIVERS_MARGIN = 0.25

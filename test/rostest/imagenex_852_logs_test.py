@@ -13,8 +13,8 @@ import rostest
 from driver_listener import PATIENCE, beams, diagnostics, values
 from graph import recording
 
-from imagenex_852_driver import log_file
-from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.logs import log_file
+from imagenex_852_driver.logs.log_record import LoggedPing
 from imagenex_852_driver.protocol import Reply, ReplyKind
 from underwater_map_construction.msg import SonarScanLine
 

@@ -17,12 +17,12 @@ from scipy.spatial import cKDTree
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from mlsm_manager.bag_recording import BagNames, read_recording
-from mlsm_manager.map_bag_arguments import map_bag_arguments
-from mlsm_manager.mapping.recording import scans_of
-from mlsm_manager.mapping.replay import Replayed, replay
-from mlsm_manager.matching.planar import composed, wrapped
-from sonar_processing.beam_correction import BeamCorrection
+from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
+from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.ros.bag_recording import BagNames, read_recording
+from node_support.geometry.planar import composed, wrapped
+from sonar_processing.beams.beam_correction import BeamCorrection
 
 TOPICS = ("/sonar/raw", "/tf", "/tf_static", "/cmd_vel")
 SECONDS = 300.0

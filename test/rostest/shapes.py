@@ -13,7 +13,7 @@ from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.conversions import cloud_to_message
+from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import Circles, StampedIntensityCloud, Walls
 
 DETECTORS = ("line_detector", "circle_detector")

@@ -15,9 +15,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
-from node_support.node import DiagnosticsPublisher
-from sonar_processing.conversions import LaserScanArrays, StampedIntensityCloudArrays
-from sonar_processing.host import ProcessingHost
+from node_support.ros.node import DiagnosticsPublisher
+from sonar_processing.ros.conversions import LaserScanArrays, StampedIntensityCloudArrays
+from sonar_processing.ros.pipeline import ProcessingHost
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 BEAMS = 60

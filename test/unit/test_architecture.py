@@ -1,4 +1,7 @@
-"""Which modules know of ROS, and which packages know of each other."""
+"""Which modules import ROS, which packages import each other, and that no folders import each other in a circle.
+
+Everything is derived from paths: what imports ROS stands in a folder `ros/` of its package.
+"""
 
 import ast
 import os
@@ -16,30 +19,17 @@ ALLOWED = {
     "mlsm_manager": {"node_support", "sonar_processing"},
     "sonar_simulator": {"node_support", "sonar_processing"},
 }
-# Nodes, conversions and markers; every other module is a core and runs without ROS.
-ROS_SIDE = {
-    "imagenex_852_driver": {"driver_node", "emulator_node", "log_tools", "messages", "nodes"},
-    "mlsm_manager": {
-        "bag_recording", "fix_publisher", "map_bag", "map_publisher", "map_transform", "markers", "mlsm_core", "nodes",
-        "odometry_track",
-    },
-    "node_support": {"live_parameters", "node", "reconfigure_description"},
-    "sonar_processing": {
-        "beam_subscriber", "cloud_publisher", "conversions", "figure_publisher", "host", "nodes", "shape_detectors",
-        "shape_messages", "sonar_control", "sonar_image", "sonar_places", "sonar_to_cloud", "stage_runner",
-        "transform_filter", "transforms", "turn_publisher", "velocity_subscriber",
-    },
-    "sonar_simulator": {
-        "bag_tool", "bag_writer", "gazebo_messages", "gazebo_node", "nodes", "simulator_messages", "simulator_node",
-        "simulator_publisher", "world_marker",
-    },
+ROS_NAMES = {
+    "rospy", "roslib", "rosgraph", "rosbag", "genpy", "message_filters", "dynamic_reconfigure", "diagnostic_updater",
+    "underwater_map_construction",
 }  # fmt: skip
+ROS_ENDINGS = ("_msgs", "_srvs", "tf2_ros", "tf2_py")
 IMPORT_WITHOUT_ROS = """
 import importlib, sys
 
 class NoRos:
     NAMES = {"rospy", "roslib", "rosgraph", "rosbag", "genpy", "message_filters", "dynamic_reconfigure",
-             "underwater_map_construction"}
+             "diagnostic_updater", "underwater_map_construction"}
 
     def find_spec(self, name, path=None, target=None):
         top = name.split(".")[0]
@@ -72,9 +62,55 @@ def _imported(path):
     return names
 
 
-def test_every_package_is_in_the_tables():
+def _imported_modules(path):
+    """Return the names of our modules that a file imports, wherever in it."""
+    found = set()
+    for node in ast.walk(ast.parse(path.read_text(), feature_version=(3, 8))):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom) and not node.level:
+            inner = {f"{node.module}.{alias.name}" for alias in node.names}
+            found |= {name if _path_of(name) else node.module for name in inner}
+    return {name for name in found if name.split(".")[0] in ALLOWED}
+
+
+def _imports_ros(path):
+    return any(name in ROS_NAMES or name.endswith(ROS_ENDINGS) for name in _imported(path))
+
+
+def _is_ros_side(name):
+    return "ros" in name.split(".")
+
+
+def _path_of(name):
+    """Return the file of a module or package by its dotted name, None where there is none."""
+    path = SOURCES.joinpath(*name.split("."))
+    candidates = (path.with_suffix(".py"), path / "__init__.py")
+    return next((candidate for candidate in candidates if candidate.exists()), None)
+
+
+def _folder(path):
+    return path.parent.relative_to(SOURCES).as_posix()
+
+
+def _circles(imports):
+    """Return the folders that import themselves through others."""
+
+    def reached(start):
+        found, waiting = set(), list(imports.get(start, ()))
+        while waiting:
+            folder = waiting.pop()
+            if folder not in found:
+                found.add(folder)
+                waiting += imports.get(folder, ())
+        return found
+
+    return sorted(folder for folder in imports if folder in reached(folder))
+
+
+def test_every_package_is_in_the_table():
     packages = {path.parent.name for path in SOURCES.glob("*/__init__.py")}
-    assert packages == set(ALLOWED) == set(ROS_SIDE)
+    assert packages == set(ALLOWED)
 
 
 @pytest.mark.parametrize("package", ALLOWED)
@@ -84,10 +120,41 @@ def test_a_package_imports_only_those_it_may(package):
     assert wrong == {}
 
 
-def test_every_core_module_can_be_imported_without_ros_and_no_other():
+def test_every_core_module_can_be_imported_without_ros():
     names = [name for package in ALLOWED for name in _modules(package)]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(SOURCES), os.environ.get("PYTHONPATH", "")])}
     command = [sys.executable, "-c", IMPORT_WITHOUT_ROS, *names]
     output = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True, text=True).stdout
-    expected = {f"{package}.{module}" for package, modules in ROS_SIDE.items() for module in modules}
-    assert {line.split()[0] for line in output.splitlines()} == expected, output
+    failed = {line.split()[0] for line in output.splitlines()}
+    assert {name for name in failed if not _is_ros_side(name)} == set(), output
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_no_core_imports_a_folder_ros(package):
+    wrong = {
+        name: sorted(target for target in _imported_modules(path) if _is_ros_side(target))
+        for name, path in _modules(package).items()
+        if not _is_ros_side(name)
+    }
+    assert {name: targets for name, targets in wrong.items() if targets} == {}
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_every_module_in_a_folder_ros_needs_ros(package):
+    ros_side = {name: path for name, path in _modules(package).items() if _is_ros_side(name)}
+    needless = [
+        name
+        for name, path in ros_side.items()
+        if path.name != "__init__.py" and not _imports_ros(path) and not any(map(_is_ros_side, _imported_modules(path)))
+    ]
+    assert needless == []
+
+
+def test_folders_do_not_import_each_other_in_a_circle():
+    imports = {}
+    for package in ALLOWED:
+        for path in _modules(package).values():
+            folder = _folder(path)
+            targets = {_folder(_path_of(target)) for target in _imported_modules(path)}
+            imports.setdefault(folder, set()).update(targets - {folder})
+    assert _circles(imports) == []

@@ -10,10 +10,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 from benchmarks.basin_scans import BUOYS, BasinScans, anywhere, near_buoy
 from benchmarks.shape_figures import wall_errors
 
-from sonar_processing.circles import CircleDetector, CircleDetectorParameters
-from sonar_processing.lines import LineDetector, LineDetectorParameters
-from sonar_processing.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.threshold import Thresholder, ThresholderParameters
+from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 
 _THRESHOLDER = Thresholder(ThresholderParameters())
 _REMOVER = OutlierRemover(OutlierRemoverParameters())

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import rosbag
 
-from sonar_processing.conversions import header, point_cloud
+from sonar_processing.ros.conversions import header, point_cloud
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 ROOT = Path(__file__).resolve().parents[2]

@@ -8,7 +8,7 @@ import yaml
 from document import LIVE_NODES, LiveNode, generated
 
 from node_support.parameters import describe
-from sonar_processing.stages import STAGES
+from sonar_processing.filters.stage_table import STAGES
 
 ROOT = Path(__file__).resolve().parents[2]
 

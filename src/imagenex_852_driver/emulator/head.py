@@ -2,12 +2,12 @@
 
 from typing import List, NamedTuple, Optional
 
-from imagenex_852_driver.angles import head_angle
 from imagenex_852_driver.emulator.echo_source import EchoSource, FixedPattern, PingRequest
 from imagenex_852_driver.emulator.faults import Fault, FaultInjector
-from imagenex_852_driver.emulator.scan_motion import ScanMotion
-from imagenex_852_driver.line_timing import LineTiming
+from imagenex_852_driver.emulator.head_rotation import ScanMotion
+from imagenex_852_driver.line.timing import LineTiming
 from imagenex_852_driver.protocol import CommandReader, Reply, SwitchCommand
+from imagenex_852_driver.protocol.angles import head_angle
 from imagenex_852_driver.protocol.errors import SONAR_HEAD_ID
 from imagenex_852_driver.protocol.reply import OVERRUN, SWITCHES_ACCEPTED
 

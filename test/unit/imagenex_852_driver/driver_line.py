@@ -4,11 +4,11 @@ import threading
 from contextlib import contextmanager
 from typing import List
 
-from imagenex_852_driver.connection import ConnectionParameters
-from imagenex_852_driver.device import Ping, SonarDevice
 from imagenex_852_driver.emulator import EmulatedHead, PtyServer
-from imagenex_852_driver.scanner import Scanner
-from imagenex_852_driver.settings import HeadSettings
+from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.line.device import Ping, SonarDevice
+from imagenex_852_driver.line.scanner import Scanner
+from imagenex_852_driver.protocol.settings import HeadSettings
 
 FAST = {
     "baud_rate": 1152000,

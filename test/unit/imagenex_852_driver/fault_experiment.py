@@ -10,12 +10,12 @@ import time
 from dataclasses import dataclass
 from typing import List
 
-from imagenex_852_driver.connection import ConnectionParameters
-from imagenex_852_driver.device import SonarDevice
 from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FaultRates, PtyServer
-from imagenex_852_driver.scanner import Scanner
-from imagenex_852_driver.settings import HeadSettings
-from imagenex_852_driver.stats import DeviceStats
+from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.line.device import SonarDevice
+from imagenex_852_driver.line.scanner import Scanner
+from imagenex_852_driver.line.stats import DeviceStats
+from imagenex_852_driver.protocol.settings import HeadSettings
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
 WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)

@@ -4,10 +4,10 @@ import time
 import pytest
 from driver_line import served
 
-from imagenex_852_driver.connection import ConnectionParameters
-from imagenex_852_driver.device import SonarDevice
 from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates, Transmission
-from imagenex_852_driver.port import PortUnavailableError
+from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.line.device import SonarDevice
+from imagenex_852_driver.line.port import PortUnavailableError
 from imagenex_852_driver.protocol import ReplyKind, SwitchCommand
 
 COMMAND = SwitchCommand(max_range=50)

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from imagenex_852_driver.driver_health import DriverHealth
-from imagenex_852_driver.stats import DeviceStats
+from imagenex_852_driver.line.driver_health import DriverHealth
+from imagenex_852_driver.line.stats import DeviceStats
 from node_support.health import Level
 
 

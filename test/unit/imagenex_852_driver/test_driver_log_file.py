@@ -5,8 +5,8 @@ from driver_strategies import REPEATABLE
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver import log_file
-from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.logs import log_file
+from imagenex_852_driver.logs.log_record import LoggedPing
 from imagenex_852_driver.protocol import Reply, ReplyKind
 
 

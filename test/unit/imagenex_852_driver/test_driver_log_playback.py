@@ -1,7 +1,7 @@
 import pytest
 
-from imagenex_852_driver.log_playback import timed
-from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.logs.log_record import LoggedPing
+from imagenex_852_driver.logs.playback import timed
 from imagenex_852_driver.protocol import Reply, ReplyKind
 
 REPLY = Reply(ReplyKind.IPX, 20, b"")

@@ -1,7 +1,7 @@
 import pytest
 
-from imagenex_852_driver.driver_parameters import DriverParameters
-from imagenex_852_driver.emulator_parameters import EmulatorParameters
+from imagenex_852_driver.emulator.parameters import EmulatorParameters
+from imagenex_852_driver.line.parameters import DriverParameters
 from node_support.parameters import ParameterError
 
 

@@ -6,10 +6,10 @@ import pytest
 import serial
 from driver_line import served
 
-from imagenex_852_driver.connection import ConnectionParameters
-from imagenex_852_driver.device import SonarDevice
 from imagenex_852_driver.emulator import EmulatedHead
-from imagenex_852_driver.port import (
+from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.line.device import SonarDevice
+from imagenex_852_driver.line.port import (
     PortBusyError,
     PortNameError,
     PortPermissionError,

@@ -1,8 +1,8 @@
 import pytest
 
-from imagenex_852_driver.connection import ConnectionParameters
+from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.line.reply_wait import ReplyWait
 from imagenex_852_driver.protocol import ParsedReply, Reply, ReplyKind, SwitchCommand
-from imagenex_852_driver.reply_wait import ReplyWait
 
 COMMAND = SwitchCommand(max_range=30)
 CONNECTION = ConnectionParameters(reply_margin=0.25, byte_gap=0.1)

@@ -1,6 +1,6 @@
 import pytest
 
-from imagenex_852_driver.emulator.scan_motion import ScanMotion
+from imagenex_852_driver.emulator.head_rotation import ScanMotion
 from imagenex_852_driver.protocol import SwitchCommand
 
 

@@ -4,11 +4,11 @@ import pytest
 from driver_line import Run, served
 from fault_experiment import run
 
-from imagenex_852_driver.device import SonarDevice
 from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates
-from imagenex_852_driver.port import PortBusyError
-from imagenex_852_driver.scanner import Scanner
-from imagenex_852_driver.settings import Direction, HeadSettings
+from imagenex_852_driver.line.device import SonarDevice
+from imagenex_852_driver.line.port import PortBusyError
+from imagenex_852_driver.line.scanner import Scanner
+from imagenex_852_driver.protocol.settings import Direction, HeadSettings
 
 
 def positions(pings):

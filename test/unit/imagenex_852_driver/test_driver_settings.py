@@ -3,7 +3,7 @@ from driver_strategies import REPEATABLE
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.settings import Direction, HeadSettings
+from imagenex_852_driver.protocol.settings import Direction, HeadSettings
 from node_support.parameters import ParameterError
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks
 
 
 def blocks_of(intervals, resolution=0.5):

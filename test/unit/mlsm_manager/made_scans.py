@@ -2,10 +2,10 @@
 
 import numpy as np
 
-from mlsm_manager.matching.planar import composed, inverse, transformed
-from mlsm_manager.matching.result import Prior
-from mlsm_manager.matching.scan import Scan, Track
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.matching.problem.result import Prior
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry.planar import composed, inverse, transformed
 
 SECONDS = 16.0
 DEVIATIONS = np.array([1.0, 1.0, 0.1, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])

@@ -3,7 +3,7 @@
 import numpy as np
 from literal_mlsm import LiteralMap
 
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 
 def batch_map(points, resolution, batches=1):

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from mlsm_manager.core_parameters import MapInput
-from mlsm_manager.live_file import NODES, live_values, replay_values, write_live
-from mlsm_manager.mapping.replay_parameters import ReplayParameters
+from mlsm_manager.localisation.parameters import MapInput
+from mlsm_manager.offline.live_file import NODES, live_values, replay_values, write_live
+from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.parameters import ParameterError
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -4,11 +4,11 @@ import numpy as np
 import pytest
 from made_corridor import heard, path
 
-from mlsm_manager.mapping.calibration import Calibrator, Estimate, calibrated
-from mlsm_manager.mapping.replay_parameters import ReplayParameters
-from mlsm_manager.mapping.straightness import half_width_of
-from mlsm_manager.matching.prediction import OdometryErrors
-from sonar_processing.echo_extraction import ExtractionMode
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.offline.beam_width_calibration import half_width_of
+from mlsm_manager.offline.calibration import Calibrator, Estimate, calibrated
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from sonar_processing.filters.echo_extraction import ExtractionMode
 
 PARAMETERS = ReplayParameters(range_scale_deviation=0.0)
 

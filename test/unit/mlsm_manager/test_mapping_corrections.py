@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, still
 
-from mlsm_manager.mapping.correction_history import CorrectionHistory
-from mlsm_manager.mapping.live_correction import LiveCorrection
-from mlsm_manager.matching.prediction import Belief
-from mlsm_manager.matching.scan import Scan, Track
+from mlsm_manager.localisation.correction_history import CorrectionHistory
+from mlsm_manager.localisation.live_correction import LiveCorrection
+from mlsm_manager.matching.problem.prediction import Belief
+from mlsm_manager.matching.problem.scan import Scan, Track
 
 TIMES = np.arange(0.0, 10.0, 0.1)
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.mapping.echo_form import EchoForm, echo_form_of, suited
-from mlsm_manager.mapping.replay_parameters import ReplayParameters
-from sonar_processing.beam import Beam
-from sonar_processing.echo_extraction import ExtractionMode
+from mlsm_manager.offline.echo_shape import EchoForm, echo_form_of, suited
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from sonar_processing.beams.beam import Beam
+from sonar_processing.filters.echo_extraction import ExtractionMode
 
 
 def beams(strengths):

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.mapping.evaluation import position_error
-from mlsm_manager.mapping.recording import RecordingError, Truth
+from mlsm_manager.offline.evaluation import position_error
+from mlsm_manager.offline.recording import RecordingError, Truth
 
 TIMES = np.arange(0.0, 11.0)
 AHEAD = np.column_stack([TIMES, np.zeros(11)])

@@ -3,13 +3,13 @@
 import numpy as np
 from made_scans import at_velocity, harbour, scan_of, still, wall
 
-from mlsm_manager.mapping.mapper import Mapper, MapSettings
-from mlsm_manager.mapping.relocalisation import relocalised, relocaliser
-from mlsm_manager.matching.matcher_parameters import DistributionMatcherParameters
-from mlsm_manager.matching.matchers import MATCHERS, MatcherName
-from mlsm_manager.matching.prediction import OdometryErrors
-from mlsm_manager.matching.result import MatchStatus
-from mlsm_manager.matching.scan import Scan
+from mlsm_manager.localisation.mapper import Mapper, MapSettings
+from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
+from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.matching.problem.result import MatchStatus
+from mlsm_manager.matching.problem.scan import Scan
 
 SETTINGS = MapSettings(0.5, 0.5, 1e4, 100, 15)
 

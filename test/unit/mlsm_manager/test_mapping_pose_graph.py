@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.mapping.pose_graph import Beliefs, RelativePoses, joined, smoothed
-from mlsm_manager.matching.planar import composed, inverse, rotated, wrapped
+from mlsm_manager.offline.pose_graph import Beliefs, RelativePoses, joined, smoothed
+from node_support.geometry.planar import composed, inverse, rotated, wrapped
 
 SIDE = 10
 FREE = np.array([1e-6, 1e-6])

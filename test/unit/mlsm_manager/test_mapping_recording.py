@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.mapping.recording import Recording
-from mlsm_manager.matching.planar import matrices
-from mlsm_manager.matching.scan import Track
-from sonar_processing.beam import Beam
-from sonar_processing.beam_correction import BeamCorrection
-from sonar_processing.placed_beam import PlacedBeam
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.recording import Recording
+from node_support.geometry.planar import matrices
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.placed_beam import PlacedBeam
 
 TIMES = np.arange(0.0, 11.0)
 TURNING = Track(TIMES, np.column_stack([0.5 * TIMES, 0.1 * TIMES, 0.2 * TIMES]))

@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from made_corridor import heard, path
 
-from mlsm_manager.mapping.keyframes import keyframes_of, path_through
-from mlsm_manager.mapping.loops import measured_alone, partners
-from mlsm_manager.mapping.recording import Recording
-from mlsm_manager.mapping.refinement import odometry_edges, refine
-from mlsm_manager.mapping.replay import replay
-from mlsm_manager.mapping.replay_parameters import ReplayParameters
-from mlsm_manager.matching.prediction import OdometryErrors, advanced, advanced_path
-from mlsm_manager.matching.result import MatchResult, MatchStatus
-from mlsm_manager.matching.scan import Track
+from mlsm_manager.matching.problem.prediction import OdometryErrors, advanced, advanced_path
+from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.keyframes import keyframes_of, path_through
+from mlsm_manager.offline.loops import measured_alone, partners
+from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.refinement import odometry_edges, refine
+from mlsm_manager.offline.replay import replay
+from mlsm_manager.offline.replay_parameters import ReplayParameters
 
 TIMES = np.linspace(0.0, 40.0, 401)
 STRAIGHT = Track(TIMES, np.column_stack([0.5 * TIMES, np.zeros((401, 2))]))

@@ -3,8 +3,8 @@
 import numpy as np
 from made_corridor import heard, path
 
-from mlsm_manager.mapping.sensor_model import SensorModel, at_beam_edge, rescaled, restamped, trusted
-from mlsm_manager.matching.scan import Scan, Track
+from mlsm_manager.localisation.sensor_model import SensorModel, at_beam_edge, rescaled, restamped, trusted
+from mlsm_manager.matching.problem.scan import Scan, Track
 
 
 def turning_scan(points, times):

@@ -6,9 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity
 
-from mlsm_manager.matching.planar import composed, inverse, transformed, wrapped
-from mlsm_manager.matching.scan import Scan, Track
-from node_support.refused_input import RefusedInput
+from mlsm_manager.matching.problem.scan import Scan, Track
+from node_support.errors import RefusedInput
+from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 NUMBERS = st.floats(-100.0, 100.0)
 POSES = st.tuples(NUMBERS, NUMBERS, st.floats(-3.0, 3.0)).map(np.array)

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
-from mlsm_manager.matching.closest_blocks import ClosestBlocks
-from mlsm_manager.matching.matcher_parameters import SegmentsMatcherParameters
-from mlsm_manager.matching.result import MatchStatus
-from mlsm_manager.matching.segments import translate_segments
-from mlsm_manager.matching.segments_matcher import SegmentsMatcher
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.matching.matchers.closest_blocks import ClosestBlocks
+from mlsm_manager.matching.matchers.parameters import SegmentsMatcherParameters
+from mlsm_manager.matching.matchers.segments import translate_segments
+from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
+from mlsm_manager.matching.problem.result import MatchStatus
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 POSTS = np.array([[4.0, 0.0], [0.0, 6.0], [-5.0, -1.0], [2.0, -7.0], [8.0, 8.0]])
 OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)

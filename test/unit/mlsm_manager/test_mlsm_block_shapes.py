@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_blocks import blocks_of
 
-from mlsm_manager.block_shapes import THINNEST, box_lists
-from mlsm_manager.blocks import BlockType
+from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists
+from mlsm_manager.surface_map.blocks import BlockType
 
 BOTTOMS = st.floats(-50.0, 50.0)
 DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))

@@ -4,7 +4,7 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlsm_manager.cell_index import NO_BLOCK, CellIndex, cell_keys
+from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex, cell_keys
 
 CLUSTERED = st.integers(-40, 40)
 FAR = st.sampled_from([-(10**8), -(2**31) + 1, -65536, -1, 0, 1, 65536, 10**8, 2**31 - 1])

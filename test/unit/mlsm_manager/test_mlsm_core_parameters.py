@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlsm_manager.core_parameters import MlsmCoreParameters
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.parameters import ParameterError
 
 

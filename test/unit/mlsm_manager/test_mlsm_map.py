@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from map_comparison import partition
 
-from mlsm_manager.blocks import BlockType, cells_of
-from mlsm_manager.mlsm import InsertReport, MultiLevelSurfaceMap
+from mlsm_manager.surface_map.blocks import BlockType, cells_of
+from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 
 
 def _map_of(points, resolution=0.5, **options):

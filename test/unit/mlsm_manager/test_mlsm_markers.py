@@ -10,9 +10,9 @@ from made_blocks import blocks_of
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from mlsm_manager.block_shapes import box_lists
-from mlsm_manager.blocks import BlockType
-from mlsm_manager.markers import COLORS, BlockMarkers
+from mlsm_manager.ros.markers import COLORS, BlockMarkers
+from mlsm_manager.surface_map.block_shapes import box_lists
+from mlsm_manager.surface_map.blocks import BlockType
 
 HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
 MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.9), (5.0, 5.01)]

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlsm_manager.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.storage import map_path, write_ply
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.storage import map_path, write_ply
 
 _NUMPY_TYPES = {"double": "<f8", "uint": "<u4", "uchar": "u1"}
 

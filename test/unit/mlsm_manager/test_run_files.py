@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from made_blocks import blocks_of
 
-from mlsm_manager.mapping.recording import Recording, Truth
-from mlsm_manager.matching.scan import Track
-from mlsm_manager.run_files import CORRECTED, ODOMETRY, Run, errors_of, trajectory_csv, write_run, write_summary
-from mlsm_manager.storage import read_ply
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, Run, errors_of, trajectory_csv, write_run, write_summary
+from mlsm_manager.surface_map.storage import read_ply
 
 TIMES = np.arange(4.0)
 ODOMETRY_POSES = np.column_stack([TIMES, np.zeros(4), np.full(4, 4.0)])

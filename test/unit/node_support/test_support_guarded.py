@@ -3,9 +3,9 @@
 import pytest
 import rospy
 
+from node_support.errors import RefusedInput
 from node_support.health import Health
-from node_support.node import guarded
-from node_support.refused_input import RefusedInput
+from node_support.ros.node import guarded
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import sys
 import pytest
 from example_parameters import ExampleParameters
 
-from node_support.reconfigure_description import generator
+from node_support.ros.reconfigure_description import generator
 
 
 @pytest.fixture

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from sonar_processing.beam import Beam
+from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import IntensityCloud
 
 SECOND = 10**9

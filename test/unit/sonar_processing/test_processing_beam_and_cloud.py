@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from clouds import cloud_of
 
-from node_support.refused_input import RefusedInput
-from sonar_processing.beam import Beam
+from node_support.errors import RefusedInput
+from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import IntensityCloud
 
 

@@ -16,9 +16,10 @@ from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
-from node_support.refused_input import RefusedInput
+from node_support.errors import RefusedInput
+from node_support.ros.conversions import matrix_from_message
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.conversions import (
+from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
     beam_from_message,
     cloud_from_message,
@@ -28,8 +29,7 @@ from sonar_processing.conversions import (
     point_cloud,
     points_from_message,
 )
-from sonar_processing.laser_turn import LaserTurn
-from sonar_processing.transforms import matrix_from_message
+from sonar_processing.scans.laser_scan import LaserTurn
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 # The generated message code of Noetic writes arrays with the old name of tobytes.

@@ -7,13 +7,18 @@ from hypothesis import given
 from hypothesis import strategies as st
 from polar_scans import binary_image, wall_image, with_ring, with_speckle
 
-from node_support.refused_input import RefusedInput
+from node_support.errors import RefusedInput
+from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.echo_extraction import EchoExtractorParameters, ExtractionMode, extract_echoes, height_threshold
-from sonar_processing.echo_extractor import EchoExtractor
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.polar_scan import PolarScan
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
+from sonar_processing.filters.echo_extraction import (
+    EchoExtractorParameters,
+    ExtractionMode,
+    extract_echoes,
+    height_threshold,
+)
+from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.scans.polar_scan import PolarScan
 
 BEAMS, RESOLUTION = 60, 0.1
 # A wall that is nearest in the middle of the scan.

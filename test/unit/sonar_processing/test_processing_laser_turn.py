@@ -8,10 +8,10 @@ from clouds import SECOND, beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.laser_turn import laser_turn, usual_rays
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.polar_scan import PolarScan
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.scans.laser_scan import laser_turn, usual_rays
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.scans.polar_scan import PolarScan
 
 RAYS, BINS, RESOLUTION = 120, 100, 0.1
 STEP = 2 * math.pi / RAYS

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from node_support.refused_input import RefusedInput
-from sonar_processing.motion import Motion
-from sonar_processing.sonar_to_cloud_parameters import SonarToCloudParameters
+from node_support.errors import RefusedInput
+from sonar_processing.scans.moving_state import Motion
+from sonar_processing.scans.parameters import SonarToCloudParameters
 
 PARAMETERS = SonarToCloudParameters(still_speed=0.05, still_turn_rate=0.01)
 SECOND = 10**9

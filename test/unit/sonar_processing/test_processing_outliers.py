@@ -10,7 +10,7 @@ from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.outliers import (
+from sonar_processing.filters.outliers import (
     OutlierMode,
     OutlierRemover,
     OutlierRemoverParameters,

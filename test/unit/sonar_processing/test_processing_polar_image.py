@@ -8,8 +8,8 @@ from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node_support.refused_input import RefusedInput
-from sonar_processing.polar_image import PolarImage, SonarImageParameters
+from node_support.errors import RefusedInput
+from sonar_processing.scans.image import PolarImage, SonarImageParameters
 
 BINS = 50
 

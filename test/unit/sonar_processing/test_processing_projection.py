@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sonar_processing.projection import project_beam, wrapped
+from sonar_processing.beams.projection import project_beam, wrapped
 
 ANGLES = st.floats(-7.0, 7.0)
 SHIFTS = st.tuples(*[st.floats(-100.0, 100.0)] * 3)

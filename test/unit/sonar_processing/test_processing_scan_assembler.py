@@ -8,9 +8,9 @@ from clouds import SECOND, beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.scan_assembler import ScanAssembler
-from sonar_processing.sonar_to_cloud_parameters import ScanMode, SonarToCloudParameters
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import ScanMode, SonarToCloudParameters
 
 STEP = math.radians(3.0)
 

@@ -6,12 +6,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.parameters import ParameterError
-from sonar_processing.beam_echoes import beam_echoes
-from sonar_processing.circle_fit import CircleSight, range_differences
-from sonar_processing.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.lines import LineDetector, LineDetectorParameters
-from sonar_processing.ransac import iterations_wanted
+from sonar_processing.shapes.beam_echoes import beam_echoes
+from sonar_processing.shapes.circle_fit import CircleSight, range_differences
+from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
+from sonar_processing.shapes.ransac import iterations_wanted
 
 
 def _cloud(xy, stamps=None, strengths=100.0):

@@ -6,8 +6,8 @@ from clouds import cloud_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.otsu import otsu_threshold
-from sonar_processing.threshold import Thresholder, ThresholderParameters, ThresholdMode
+from sonar_processing.filters.otsu import otsu_threshold
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
 
 STRENGTHS = st.lists(st.integers(0, 255), max_size=40)
 

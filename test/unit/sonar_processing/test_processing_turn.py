@@ -8,9 +8,9 @@ from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.head_turn import HeadTurn
-from sonar_processing.placed_beam import PlacedBeam
-from sonar_processing.turn_collector import MOST_BEAMS, TurnCollector
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.scans.head_turn import HeadTurn
+from sonar_processing.scans.revolution_collector import MOST_BEAMS, TurnCollector
 
 STEP = math.radians(3.0)
 

@@ -6,13 +6,13 @@ from pathlib import Path
 import numpy as np
 from least_distance import nearest_range
 
-from sonar_simulator.beam_pattern import head_turns
-from sonar_simulator.beam_tracer import BeamTracer
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sonar_head import SonarHead, SonarParameters
-from sonar_simulator.world_file import load_world
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.beam_pattern import head_turns
+from sonar_simulator.rays.beam_tracer import BeamTracer
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import SonarHead, SonarParameters
+from sonar_simulator.world.world_file import load_world
 
 WORLDS = Path(__file__).resolve().parents[3] / "worlds"
 NOISE_FREE = {

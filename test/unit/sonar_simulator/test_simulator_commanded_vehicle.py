@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node_support.refused_input import RefusedInput
-from sonar_simulator.commanded_vehicle import CommandedVehicle, VehicleParameters
-from sonar_simulator.poses import yaw_of
+from node_support.errors import RefusedInput
+from node_support.geometry.matrices import yaw_of
+from sonar_simulator.vehicle.commanded_vehicle import CommandedVehicle, VehicleParameters
 
 PARAMETERS = VehicleParameters()
 SURGE = np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0])

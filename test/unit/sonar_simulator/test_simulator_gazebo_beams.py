@@ -3,13 +3,13 @@ import math
 import numpy as np
 import pytest
 
+from node_support.geometry.matrices import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_simulator.echo_model import ECHO_MODELS, make_echo_model
-from sonar_simulator.gazebo_beams import GazeboBeams, RayScan
-from sonar_simulator.gazebo_parameters import GazeboSonarParameters
-from sonar_simulator.gazebo_rays import Rays
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.sonar_head import SonarHead
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.gazebo.beams import GazeboBeams, RayScan
+from sonar_simulator.gazebo.parameters import GazeboSonarParameters
+from sonar_simulator.gazebo.rays import Rays
+from sonar_simulator.simulation.sonar_head import SonarHead
 
 ELEVATIONS = np.radians(np.linspace(-11.0, 11.0, 15))
 QUIET = {"spread": 0.0, "noise_echoes": 0}

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from node_support.refused_input import RefusedInput
-from sonar_simulator.gazebo_rays import Rays, ScanLayout, rays_of_points, rays_of_scan
+from node_support.errors import RefusedInput
+from sonar_simulator.gazebo.rays import Rays, ScanLayout, rays_of_points, rays_of_scan
 
 MAX_RANGE = 50.0
 

@@ -4,8 +4,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from node_support.parameters import ParameterError
-from sonar_simulator.contacts import Contacts
-from sonar_simulator.echo_model import make_echo_model
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.contacts import Contacts
 
 NOISE_FREE = {"spread": 0.0, "noise_echoes": 0}
 

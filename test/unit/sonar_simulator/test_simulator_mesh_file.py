@@ -1,9 +1,9 @@
 import numpy as np
 import pytest
 
-from sonar_simulator.mesh_file import load_mesh
-from sonar_simulator.world_error import WorldError
-from sonar_simulator.world_file import load_world
+from sonar_simulator.world.errors import WorldError
+from sonar_simulator.world.mesh_file import load_mesh
+from sonar_simulator.world.world_file import load_world
 
 trimesh = pytest.importorskip("trimesh")
 DAE = """<?xml version="1.0"?>

@@ -3,14 +3,14 @@ import math
 import numpy as np
 import pytest
 
-from sonar_simulator.beam_pattern import BeamPattern
-from sonar_simulator.beam_tracer import BeamTracer
-from sonar_simulator.materials import MATERIALS
-from sonar_simulator.mirrors import Mirrors, legs
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.side_lobes import FanWithSideLobes
-from sonar_simulator.world import Shape, World
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.echoes.side_lobes import FanWithSideLobes
+from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.beam_tracer import BeamTracer
+from sonar_simulator.rays.mirrors import Mirrors, legs
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.world.materials import MATERIALS
+from sonar_simulator.world.world import Shape, World
 
 pytest.importorskip("embreex")
 STEEL, ROCK = MATERIALS["steel"], MATERIALS["rock"]

@@ -7,10 +7,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from least_distance import nearest_range
 
-from sonar_simulator.beam_pattern import BeamPattern
-from sonar_simulator.nearest_surface import NearestSurface
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.world import Shape, World
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.nearest_surface import NearestSurface
+from sonar_simulator.world.world import Shape, World
 
 pytest.importorskip("embreex")
 FAN = BeamPattern(math.radians(22.0), math.radians(2.5), 9, 5).planes()

@@ -4,10 +4,10 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from sonar_simulator.motion import VehicleState
-from sonar_simulator.odometry import Odometry, OdometryParameters
-from sonar_simulator.poses import pose_matrix, yaw_of
-from sonar_simulator.vehicle import VehicleScript
+from node_support.geometry.matrices import pose_matrix, yaw_of
+from sonar_simulator.vehicle.movement import VehicleState
+from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
+from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 START = {"x": 10.0, "y": 5.0, "z": -2.0, "yaw_deg": 20.0}
 WAY = VehicleScript.from_yaml_data(

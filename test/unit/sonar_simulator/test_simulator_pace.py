@@ -1,6 +1,6 @@
 import pytest
 
-from sonar_simulator.pace import Pace
+from sonar_simulator.simulation.pace import Pace
 
 
 class Clock:

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.world import Shape, World
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.world.world import Shape, World
 
 HALF = np.array([60.0, 25.0, 5.0])
 ROOM = RayCaster(World.from_shapes("room", [Shape("room", "box", np.eye(4), tuple(2.0 * HALF))]))

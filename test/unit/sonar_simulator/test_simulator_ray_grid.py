@@ -3,8 +3,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.ray_grid import contacts_of_grid
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.ray_grid import contacts_of_grid
 
 ELEVATIONS = np.linspace(-0.19, 0.19, 9)
 BEARINGS = np.linspace(-0.02, 0.02, 5)

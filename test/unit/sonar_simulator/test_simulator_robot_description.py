@@ -3,8 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.robot_description import DescriptionError, RobotDescription
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
 CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())
 CHAIN = """<robot name="r">

@@ -3,11 +3,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonar_simulator.odometry import Odometry, OdometryParameters
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.script_file import load_script
-from sonar_simulator.vehicle import ScriptError
-from sonar_simulator.world_file import load_world
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
+from sonar_simulator.vehicle.script_file import load_script
+from sonar_simulator.vehicle.scripted_vehicle import ScriptError
+from sonar_simulator.world.world_file import load_world
 
 ROOT = Path(__file__).resolve().parents[3]
 TOURS = {name: load_script(ROOT / "yaml" / f"{name}_tour.yaml") for name in ("basin", "harbour", "tank")}

@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.sdf import load_sdf
-from sonar_simulator.sdf_frames import Scope, own_pose
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.world.sdf import load_sdf
+from sonar_simulator.world.sdf_frames import Scope, own_pose
 
 NUMBERS = st.floats(-100.0, 100.0).map(lambda number: round(number, 6))
 ANGLES = st.floats(-3.2, 3.2).map(lambda number: round(number, 6))

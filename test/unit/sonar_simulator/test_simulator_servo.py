@@ -5,9 +5,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from node_support.errors import RefusedInput
 from node_support.parameters import ParameterError
-from node_support.refused_input import RefusedInput
-from sonar_simulator.servo import Servo, ServoParameters, tilted
+from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
 
 
 def _servo(**values):

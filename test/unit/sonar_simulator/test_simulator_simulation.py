@@ -4,11 +4,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from node_support.geometry.matrices import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.robot_description import RobotDescription
-from sonar_simulator.simulation import Drive
-from sonar_simulator.simulation_setup import Settings, make_setup
+from sonar_simulator.simulation.simulation import Drive
+from sonar_simulator.simulation.simulation_setup import Settings, make_setup
+from sonar_simulator.vehicle.robot_description import RobotDescription
 
 ROOT = Path(__file__).resolve().parents[3]
 CHARLE = RobotDescription.from_file(ROOT / "urdf/charle.urdf")

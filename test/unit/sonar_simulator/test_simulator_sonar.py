@@ -4,13 +4,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonar_simulator.beam_pattern import BeamPattern
-from sonar_simulator.echo_model import make_echo_model
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.ray_caster import RayCaster
-from sonar_simulator.sdf import load_sdf
-from sonar_simulator.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.world import Shape, World
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_simulator.world.sdf import load_sdf
+from sonar_simulator.world.world import Shape, World
 
 PATTERN = BeamPattern(math.radians(22.0), math.radians(2.5), 50, 10)
 HEAD = SonarHead(120, 16.0)

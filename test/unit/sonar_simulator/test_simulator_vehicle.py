@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sonar_simulator.poses import pose_matrix, yaw_of
-from sonar_simulator.vehicle import ScriptError, VehicleScript
+from node_support.geometry.matrices import pose_matrix, yaw_of
+from sonar_simulator.vehicle.scripted_vehicle import ScriptError, VehicleScript
 
 MOVES = [
     {"wait": 2.0},

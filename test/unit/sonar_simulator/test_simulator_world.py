@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.world import Shape, World
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.world.world import Shape, World
 
 FLOOR = Shape("floor", "box", pose_matrix((0, 0, -6)), (122.0, 52.0, 1.0))
 WALL = Shape("wall", "box", pose_matrix((60.5, 0, -2.5)), (1.0, 52.0, 6.0))

@@ -2,10 +2,10 @@ import math
 
 import numpy as np
 
-from sonar_simulator.materials import MATERIALS
-from sonar_simulator.poses import pose_matrix
-from sonar_simulator.world import Shape, World
-from sonar_simulator.world_mesh import world_triangles
+from node_support.geometry.matrices import pose_matrix
+from sonar_simulator.world.materials import MATERIALS
+from sonar_simulator.world.world import Shape, World
+from sonar_simulator.world.world_mesh import world_triangles
 
 BOX = Shape("box", "box", pose_matrix((10, 0, -2)), (2.0, 4.0, 1.0), material=MATERIALS["steel"])
 FLOOR = Shape("floor", "plane", pose_matrix((0, 0, -3)), (math.inf, math.inf))

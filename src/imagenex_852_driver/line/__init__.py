@@ -1,0 +1,1 @@
+"""The serial line: port, device, waiting for replies, the loop of pings."""

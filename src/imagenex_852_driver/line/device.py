@@ -1,0 +1,179 @@
+"""The head on its serial line: one command, one reply, and an account of everything else."""
+
+import threading
+import time
+from dataclasses import dataclass
+from typing import Callable, Iterator, Optional
+
+import serial
+
+from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.line.port import PortError, PortUnavailableError, open_port, port_losses
+from imagenex_852_driver.line.reply_wait import ReplyWait
+from imagenex_852_driver.line.stats import DeviceStats, StatsRecorder
+from imagenex_852_driver.protocol import Reply, ReplyKind, ReplyParser, SwitchCommand
+
+# Pause that tells whether a line that was busy has become quiet, and the longest wait for that.
+_QUIET = 0.005
+_LONGEST_DRAIN = 0.2
+_UNEXPECTED = "a reply came late or twice"
+
+
+@dataclass(frozen=True)
+class Ping:
+    """A good reply, the command it answers and the time the ping left, in seconds of the device's clock."""
+
+    stamp: float
+    command: SwitchCommand
+    reply: Reply
+
+
+class SonarDevice:
+    """Sends one command at a time; `stop` interrupts every wait within a twentieth of a second.
+
+    One thread uses it; `stats` may be read from any.
+    """
+
+    def __init__(
+        self,
+        connection: ConnectionParameters,
+        stop: Optional[threading.Event] = None,
+        clock: Callable[[], float] = time.time,
+    ) -> None:
+        """`clock` gives the stamps of the pings, in seconds."""
+        self.connection = connection
+        self.stop = stop or threading.Event()
+        self._clock = clock
+        self._timing = connection.timing()
+        self._parser = ReplyParser()
+        self._recorder = StatsRecorder()
+        self._port: Optional[serial.SerialBase] = None
+
+    @property
+    def stats(self) -> DeviceStats:
+        """The counts up to the last ping."""
+        return self._recorder.current
+
+    def open(self) -> None:
+        """Open the port; raises a PortError and remembers its text."""
+        self.close()
+        try:
+            self._port = open_port(self.connection.port, self.connection.baud_rate)
+        except PortError as error:
+            self._recorder.note(last_error=str(error))
+            raise
+        self._recorder.count("connections")
+        self._recorder.note(connected=True)
+
+    def close(self) -> None:
+        """Close the port, if it is open."""
+        port, self._port = self._port, None
+        self._recorder.note(connected=False)
+        if port is not None:
+            try:
+                with port_losses(self.connection.port):
+                    port.close()
+            except PortUnavailableError as error:
+                self._recorder.note(last_error=str(error))
+
+    def ping(self, command: SwitchCommand) -> Optional[Ping]:
+        """Command one ping and wait for its reply.
+
+        Returns None when there was no good one: counted in `stats`. Raises PortUnavailableError when the port
+        is lost or not open; it is closed then.
+        """
+        if self._port is None:
+            raise PortUnavailableError(f"port {self.connection.port} is not open")
+        try:
+            with port_losses(self.connection.port):
+                return self._ping(command)
+        except PortUnavailableError as error:
+            self._recorder.note(last_error=str(error))
+            self.close()
+            raise
+
+    def _ping(self, command: SwitchCommand) -> Optional[Ping]:
+        self._drain()
+        stamp = self._clock() + self._timing.ping_leaves()
+        wait = ReplyWait(command, self.connection, time.monotonic())
+        self._recorder.count("pings")
+        try:
+            self._port.write(command.encode())
+            self._collect(wait)
+        except BaseException:
+            self._recorder.count("interrupted")
+            raise
+        finally:
+            self._recorder.note(parser=self._parser.counts)
+        if wait.unexpected_replies:
+            self._recorder.count("unexpected_replies", _UNEXPECTED, wait.unexpected_replies)
+        return self._judge(wait, stamp)
+
+    def _collect(self, wait: ReplyWait) -> None:
+        while wait.reply is None and not self.stop.is_set():
+            # Taken before the read: what came during a stall of this process is read before it is given up.
+            now = time.monotonic()
+            data = self._port.read(self._bytes_to_read(wait, now))
+            wait.take(data, self._parser.feed(data), time.monotonic())
+            if wait.over(now, self._parser.pending):
+                break
+
+    def _bytes_to_read(self, wait: ReplyWait, now: float) -> int:
+        """Return how many bytes to wait for: the first alone, so that it is known in time when it came early."""
+        if wait.answered:
+            return max(1, wait.missing_bytes)
+        return self._port.in_waiting if wait.expired(now) else max(1, self._port.in_waiting)
+
+    def _judge(self, wait: ReplyWait, stamp: float) -> Optional[Ping]:
+        if wait.reply is not None:
+            return self._accept(wait, stamp)
+        if self.stop.is_set():
+            self._recorder.count("interrupted")
+        elif wait.answered:
+            self._recorder.count("bad_frames", f"bad reply: {wait.answer_bytes} bytes, no whole reply")
+        else:
+            self._recorder.count("timeouts", f"no reply within {wait.patience:.2f} s")
+            self._await_late_reply()
+        return None
+
+    def _accept(self, wait: ReplyWait, stamp: float) -> Optional[Ping]:
+        reply = wait.reply
+        mismatch = wait.mismatch()
+        if mismatch:
+            self._recorder.count("bad_frames", mismatch)
+            return None
+        self._recorder.count("replies")
+        if reply.overrun:
+            self._recorder.count("overruns", "the head lost characters of a command")
+        if not reply.switches_accepted:
+            self._recorder.count("rejected_switches", "the head did not accept the switches of a command")
+        return Ping(stamp, wait.command, reply)
+
+    def _await_late_reply(self) -> None:
+        deadline = time.monotonic() + self.connection.late_window
+        limit = deadline + self._timing.transmission(ReplyKind.IGX.length)
+        while not self.stop.is_set():
+            now = time.monotonic()
+            if now >= limit or (now >= deadline and not self._parser.pending):
+                return
+            if self._unexpected(self._port.read(max(1, self._port.in_waiting))):
+                return
+
+    def _drain(self) -> None:
+        """Empty the line before a command; wait until a head that still talks has finished."""
+        deadline = time.monotonic() + _LONGEST_DRAIN
+        for data in self._waiting():
+            self._unexpected(data)
+            if time.monotonic() < deadline:
+                self.stop.wait(_QUIET)
+        self._parser.reset()
+
+    def _unexpected(self, data: bytes) -> int:
+        found = len(self._parser.feed(data))
+        if found:
+            self._recorder.count("unexpected_replies", _UNEXPECTED, found)
+        return found
+
+    def _waiting(self) -> Iterator[bytes]:
+        while self._port.in_waiting and not self.stop.is_set():
+            yield self._port.read(self._port.in_waiting)

@@ -1,0 +1,68 @@
+"""The loop of the driver: ping after ping, through every loss of the port, until it is stopped."""
+
+import contextlib
+import time
+from typing import Callable
+
+from imagenex_852_driver.line.device import Ping, SonarDevice
+from imagenex_852_driver.line.port import PortError, PortUnavailableError
+from imagenex_852_driver.protocol.settings import HeadSettings
+
+
+class Scanner:
+    """Pings with the current settings. Assign `settings` from any thread: the next ping obeys.
+
+    Every command carries all settings, so after a reconnection, or a reboot of the head, the scan goes on
+    where it was configured.
+    """
+
+    def __init__(self, device: SonarDevice, settings: HeadSettings, on_ping: Callable[[Ping], None]) -> None:
+        """`on_ping` is called in the thread of `run`, once per good reply, in order; it must not raise."""
+        self.settings = settings
+        self._device = device
+        self._on_ping = on_ping
+        self._back_off = device.connection.back_off_first
+        self._last_reply = time.monotonic()
+
+    def connect(self) -> None:
+        """Open the port for the first time; a port that is not there yet is left to `run`.
+
+        Raises PortBusyError, PortPermissionError or PortNameError, which the user must cure.
+        """
+        with contextlib.suppress(PortUnavailableError):
+            self._device.open()
+
+    def run(self) -> None:
+        """Ping until the device's stop event is set, then close the port."""
+        try:
+            while not self._device.stop.is_set():
+                if self._device.stats.connected or self._reconnected():
+                    self._ping()
+        finally:
+            self._device.close()
+
+    def _ping(self) -> None:
+        try:
+            ping = self._device.ping(self.settings.command())
+        except PortUnavailableError:
+            return
+        now = time.monotonic()
+        if ping is not None:
+            self._last_reply = now
+            self._back_off = self._device.connection.back_off_first
+            self._on_ping(ping)
+        elif now - self._last_reply > self._device.connection.reopen_after:
+            # An adapter can hang, and a network connection die, without the port ever reporting it.
+            self._last_reply = now
+            self._device.close()
+
+    def _reconnected(self) -> bool:
+        if self._device.stop.wait(self._back_off):
+            return False
+        self._back_off = min(2 * self._back_off, self._device.connection.back_off_longest)
+        try:
+            self._device.open()
+        except PortError:
+            return False
+        self._last_reply = time.monotonic()
+        return True

@@ -1,0 +1,1 @@
+"""The maker's `.852` logs."""

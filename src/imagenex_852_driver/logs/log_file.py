@@ -1,0 +1,161 @@
+"""Reads and writes the maker's `.852` logs."""
+
+import mmap
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Iterator, List, Optional, Tuple, Union
+
+from imagenex_852_driver.logs.log_record import (
+    HEADER_LENGTH,
+    MAGIC,
+    LoggedPing,
+    check_record_header,
+    decode_record,
+    record_length,
+)
+from imagenex_852_driver.protocol import FrameError
+
+__all__ = ["DamagedPart", "LogReader", "LogWriteError", "LogWriter", "LoggedPing", "read"]
+
+# Damage beyond this many places is counted only.
+_REMEMBERED_DAMAGES = 100
+
+
+class LogWriteError(OSError):
+    """A ping could not be written; the file still ends with a whole ping."""
+
+
+@dataclass(frozen=True)
+class DamagedPart:
+    """A part of a log that is no ping: where it begins, how many bytes, and what is wrong."""
+
+    offset: int
+    length: int
+    reason: str
+
+    def __str__(self) -> str:
+        return f"{self.length} damaged bytes at byte {self.offset}: {self.reason}"
+
+
+def read(path: Union[str, Path]) -> "LogReader":
+    """Return an iterator over the pings of a log; raises OSError when the file cannot be opened."""
+    return LogReader(path)
+
+
+class LogReader:
+    """Iterates over the pings of a log, skipping to the next whole one over every damage.
+
+    `ping_count`, `damage_count` and `damages` (the first 100 `DamagedPart`s) are complete after the last one.
+    """
+
+    def __init__(self, path: Union[str, Path]) -> None:
+        self.ping_count = 0
+        self.damage_count = 0
+        self.damages: List[DamagedPart] = []
+        with open(path, "rb") as file:
+            empty = os.fstat(file.fileno()).st_size == 0
+            self._data = b"" if empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
+        self._pings = self._read()
+
+    def __iter__(self) -> Iterator[LoggedPing]:
+        return self
+
+    def __next__(self) -> LoggedPing:
+        return next(self._pings)
+
+    def _read(self) -> Iterator[LoggedPing]:
+        position, damage_start, reason = 0, None, ""
+        while position < len(self._data):
+            ping, end, problem = self._record_at(position)
+            if ping is not None:
+                self._note_damage(damage_start, position, reason)
+                damage_start = None
+                self.ping_count += 1
+                yield ping
+            if problem and damage_start is None:
+                damage_start, reason = (position if ping is None else end), problem
+            position = end
+        self._note_damage(damage_start, len(self._data), reason)
+
+    def _record_at(self, position: int) -> Tuple[Optional[LoggedPing], int, str]:
+        """Return the ping at `position`, where to go on, and what is wrong there."""
+        header = self._data[position : position + HEADER_LENGTH]
+        try:
+            kind = check_record_header(header)
+            reply_end = position + HEADER_LENGTH + kind.length
+            inner = self._next_header(position + 1, reply_end)
+            if inner < reply_end:
+                return None, inner, "a ping is cut short"
+            ping = decode_record(self._data[position:reply_end])
+        except FrameError as error:
+            return None, self._next_header(position + 1, len(self._data)), str(error)
+        return self._after_fill(ping, reply_end, position + record_length(kind))
+
+    def _after_fill(self, ping: LoggedPing, start: int, end: int) -> Tuple[LoggedPing, int, str]:
+        """Skip the zero fill behind a ping; where the file was cut it ends early."""
+        fill = self._data[start:end]
+        zeros = len(fill) - len(fill.lstrip(b"\0"))
+        if start + zeros < end:
+            return ping, start + zeros, "the zero fill of a ping is cut short"
+        return ping, end, ""
+
+    def _next_header(self, start: int, end: int) -> int:
+        """Return where the next whole record header begins before `end`, or `end`."""
+        while True:
+            found = self._data.find(MAGIC, start, min(end + len(MAGIC), len(self._data)))
+            if found < 0 or found >= end:
+                return end
+            try:
+                check_record_header(self._data[found : found + HEADER_LENGTH])
+                return found
+            except FrameError:
+                start = found + 1
+
+    def _note_damage(self, start: Optional[int], end: int, reason: str) -> None:
+        if start is None:
+            return
+        self.damage_count += 1
+        if len(self.damages) < _REMEMBERED_DAMAGES:
+            self.damages.append(DamagedPart(start, end - start, reason))
+
+
+class LogWriter:
+    """Appends pings to a log, each with one write, so that the file holds whole pings whatever happens."""
+
+    def __init__(self, path: Union[str, Path]) -> None:
+        """Raises OSError when the file cannot be opened; what it holds already is kept."""
+        self._file = os.open(str(path), os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
+        self._path = path
+
+    def __enter__(self) -> "LogWriter":
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.close()
+
+    def write(self, ping: LoggedPing) -> None:
+        """Append one ping.
+
+        Raises FrameError for a ping that a record cannot hold and LogWriteError when the disk takes no more.
+        """
+        record = ping.encode()
+        length = os.fstat(self._file).st_size
+        try:
+            written = os.write(self._file, record)
+        except OSError as error:
+            os.ftruncate(self._file, length)
+            raise LogWriteError(error.errno, f"{self._path}: {error.strerror}") from error
+        if written != len(record):
+            os.ftruncate(self._file, length)
+            raise LogWriteError(f"{self._path}: only {written} of {len(record)} bytes could be written")
+
+    def close(self) -> None:
+        """Bring everything to the disk and close the file; closing twice is fine."""
+        if self._file < 0:
+            return
+        file, self._file = self._file, -1
+        try:
+            os.fsync(file)
+        finally:
+            os.close(file)

@@ -1,0 +1,1 @@
+"""Nodes and messages of the driver, the emulator and the log tools."""

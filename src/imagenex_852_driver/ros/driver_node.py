@@ -1,0 +1,96 @@
+"""The ROS side of the driver: settings in; beams and diagnostics out (thesis 4.5.1)."""
+
+import threading
+from typing import Optional
+
+import rospy
+from sensor_msgs.msg import JointState
+
+from imagenex_852_driver.line.device import Ping, SonarDevice
+from imagenex_852_driver.line.driver_health import DriverHealth
+from imagenex_852_driver.line.parameters import DriverParameters
+from imagenex_852_driver.line.port import PortError
+from imagenex_852_driver.line.scanner import Scanner
+from imagenex_852_driver.line.stats import DeviceStats
+from imagenex_852_driver.ros.messages import scan_line
+from node_support.ros.node import StartError, guarded
+from node_support.ros.reconfigurable_parameters import LiveParameters
+from underwater_map_construction.msg import SonarScanLine
+
+_LONGEST_STOP = 1.0
+_PAUSE_AFTER_FAILURE = 1.0
+
+
+class DriverNode:
+    """Keeps the head pinging and publishes every good reply once, in order."""
+
+    def __init__(self, namespace: str = "~") -> None:
+        """Raises ParameterError for a bad parameter in `namespace` and StartError for a port to be cured first."""
+        self._device: Optional[SonarDevice] = None
+        self._scanner: Optional[Scanner] = None
+        self._stop = threading.Event()
+        self._last_stats = DeviceStats()
+        self._sensor_angle: Optional[float] = None
+        self.health = DriverHealth(lambda line: rospy.logwarn("%s", line), self._stats)
+        self._live = LiveParameters(DriverParameters, namespace, "Imagenex852", self.health, self._use_parameters)
+        self._beams = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=200, tcp_nodelay=True)
+        if self._live.current.sensor_joint:
+            rospy.Subscriber("joint_states", JointState, guarded(self.health, self._take_joints), queue_size=10)
+        self._connect()
+        self._thread = threading.Thread(target=self._scan, daemon=True)
+        self._thread.start()
+        rospy.on_shutdown(self._end)
+
+    def _stats(self) -> DeviceStats:
+        # A port that is closed because the node ends is no loss.
+        if self._device is not None and not self._stop.is_set():
+            self._last_stats = self._device.stats
+        return self._last_stats
+
+    def _use_parameters(self, parameters: DriverParameters) -> None:
+        if self._scanner is None:
+            self._device = SonarDevice(parameters, self._stop, clock=rospy.get_time)
+            self._scanner = Scanner(self._device, parameters, guarded(self.health, self._publish))
+        self._scanner.settings = parameters
+
+    def _connect(self) -> None:
+        try:
+            self._scanner.connect()
+        except PortError as error:
+            raise StartError(str(error)) from error
+        stats = self._stats()
+        if not stats.connected:
+            rospy.logwarn("%s: %s; waiting for it", self.health.name, stats.last_error)
+
+    def _scan(self) -> None:
+        run = guarded(self.health, self._scanner.run)
+        while not self._stop.is_set():
+            run()
+            self._stop.wait(_PAUSE_AFTER_FAILURE)
+
+    def _publish(self, ping: Ping) -> None:
+        parameters = self._live.current
+        message = scan_line(
+            ping.stamp,
+            ping.reply,
+            ping.command.start_gain_db,
+            parameters.frame_id,
+            parameters.inverted,
+            self._tilt(parameters.sensor_joint),
+        )
+        if message is not None:
+            self._beams.publish(message)
+            self.health.count("beams out")
+
+    def _tilt(self, joint: str) -> float:
+        if joint and self._sensor_angle is None:
+            self.health.problem("beams of unknown tilt", f"joint {joint!r} is not in /joint_states; sensorAngle is 0")
+        return self._sensor_angle or 0.0
+
+    def _take_joints(self, joints: JointState) -> None:
+        angles = dict(zip(joints.name, joints.position))
+        self._sensor_angle = angles.get(self._live.current.sensor_joint, self._sensor_angle)
+
+    def _end(self) -> None:
+        self._stop.set()
+        self._thread.join(_LONGEST_STOP)

@@ -1,0 +1,147 @@
+"""The ROS side of .852 logs: play them, record them, convert them to bags."""
+
+import os
+import time
+from argparse import Namespace
+from typing import Optional
+
+import rosbag
+import rospy
+from dynamic_reconfigure.encoding import decode_config
+from dynamic_reconfigure.msg import Config
+
+from imagenex_852_driver.logs import log_file
+from imagenex_852_driver.logs.log_record import LoggedPing
+from imagenex_852_driver.logs.playback import timed
+from imagenex_852_driver.protocol.angles import head_position
+from imagenex_852_driver.protocol.settings import HeadSettings
+from imagenex_852_driver.ros.messages import logged_ping, scan_line
+from node_support.health import Health
+from node_support.parameters import ParameterError
+from node_support.ros.node import StartError, guarded
+from underwater_map_construction.msg import SonarScanLine
+
+_LONGEST_SLEEP = 0.1
+# rospy sends from a queue, which dies with the process.
+_LAST_MESSAGES_LEAVE = 0.5
+
+
+class LogPlayer:
+    """Publishes a log on sonar/raw, stamped with the present time."""
+
+    def __init__(self, options: Namespace) -> None:
+        """Raises StartError when the log cannot be read."""
+        self._options = options
+        self.reader = opened(options.file)
+        self.published = 0
+        self._beams = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=1000)
+
+    def run(self) -> None:
+        """Play to the end, or for ever with `loop`; ends early at shutdown."""
+        while self._options.wait_for_subscribers and not self._beams.get_num_connections():
+            if rospy.is_shutdown():
+                return
+            time.sleep(_LONGEST_SLEEP / 2)
+        self._play()
+        while self._options.loop and self.published and not rospy.is_shutdown():
+            self.reader = opened(self._options.file)
+            self._play()
+        time.sleep(_LAST_MESSAGES_LEAVE)
+
+    def _play(self) -> None:
+        start = time.monotonic()
+        for moment, ping in timed(self.reader, self._options.rate):
+            if not _slept_until(start + moment):
+                return
+            message = _message(ping, rospy.get_time(), self._options)
+            if message is not None:
+                self._beams.publish(message)
+                self.published += 1
+
+
+def convert(options: Namespace) -> str:
+    """Write the bag of a log; return in words what was written. Raises StartError when that cannot be done."""
+    reader = opened(options.file)
+    count, start = 0, options.start
+    try:
+        with rosbag.Bag(options.out, "w") as bag:
+            for moment, ping in timed(reader, options.rate):
+                if start is None:
+                    start = ping.stamp or os.path.getmtime(options.file)
+                message = _message(ping, start + moment, options)
+                if message is not None:
+                    bag.write(options.topic, message, message.header.stamp)
+                    count += 1
+    except OSError as error:
+        raise StartError(f"{options.out}: {error.strerror}") from error
+    return f"{options.out}: {count} beams; {summary(reader)}"
+
+
+class LogRecorder:
+    """Appends the beams of sonar/raw to a log, with the settings of the driver as they change."""
+
+    def __init__(self, options: Namespace, health: Health) -> None:
+        """Raises StartError when the log cannot be written."""
+        self._health = health
+        self._driver = rospy.resolve_name(options.driver)
+        self._settings = HeadSettings(head_id=rospy.get_param(f"{self._driver}/head_id", HeadSettings.head_id))
+        self._inverted = False
+        self._last_position: Optional[int] = None
+        self._clockwise = True
+        try:
+            self._writer = log_file.LogWriter(options.file)
+        except OSError as error:
+            raise StartError(f"{options.file}: {error.strerror}") from error
+        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(health, self._take_settings))
+        self._beams = rospy.Subscriber("sonar/raw", SonarScanLine, guarded(health, self._record), queue_size=1000)
+        rospy.on_shutdown(self._end)
+
+    def _take_settings(self, config: Config) -> None:
+        values = decode_config(config)
+        names = [field.name for field in HeadSettings.tunable_fields()]
+        try:
+            self._settings = self._settings.changed({name: values[name] for name in names if name in values})
+        except ParameterError as error:
+            self._health.problem("settings not understood", str(error))
+        self._inverted = bool(values.get("inverted", False))
+
+    def _record(self, message: SonarScanLine) -> None:
+        position = head_position(message.angle, self._inverted)
+        if self._last_position not in (None, position):
+            # The head may have passed the seam behind it, where positions start again.
+            self._clockwise = 0 < (position - self._last_position) % 2400 < 1200
+        self._last_position = position
+        self._writer.write(logged_ping(message, self._settings, self._inverted, self._clockwise))
+        self._health.count("pings written")
+
+    def _end(self) -> None:
+        self._beams.unregister()
+        self._writer.close()
+
+
+def opened(path: str) -> log_file.LogReader:
+    """Return the reader of a log; raises StartError when there is none."""
+    try:
+        return log_file.read(path)
+    except OSError as error:
+        raise StartError(f"{path}: {error.strerror}") from error
+
+
+def summary(reader: log_file.LogReader) -> str:
+    """Return in words what a log held, as far as it was read."""
+    damages = "; ".join(str(damage) for damage in reader.damages[:3])
+    skipped = f", skipped {reader.damage_count} damaged parts: {damages}" if reader.damage_count else ""
+    return f"{reader.ping_count} pings in the log{skipped}"
+
+
+def _message(ping: LoggedPing, stamp: float, options: Namespace) -> Optional[SonarScanLine]:
+    return scan_line(stamp, ping.reply, ping.start_gain_db, options.frame_id, options.inverted)
+
+
+def _slept_until(moment: float) -> bool:
+    while not rospy.is_shutdown():
+        left = moment - time.monotonic()
+        if left <= 0:
+            return True
+        time.sleep(min(left, _LONGEST_SLEEP))
+    return False

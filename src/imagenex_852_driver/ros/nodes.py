@@ -1,0 +1,62 @@
+"""The executables of this package."""
+
+import sys
+
+import rospy
+
+from imagenex_852_driver.logs.arguments import convert_arguments, play_arguments, record_arguments
+from imagenex_852_driver.ros.driver_node import DriverNode
+from imagenex_852_driver.ros.emulator_node import EmulatorNode, WorldEchoes
+from imagenex_852_driver.ros.log_tools import LogPlayer, LogRecorder, convert, summary
+from node_support.ros.node import DiagnosticsPublisher, StartError, make_health, run
+
+
+def run_driver() -> None:
+    """Run the driver."""
+
+    def construct() -> tuple:
+        node = DriverNode()
+        return node, DiagnosticsPublisher([node.health])
+
+    run("imagenex_852_driver", construct)
+
+
+def run_emulator(world_echoes: WorldEchoes) -> None:
+    """Run the emulated head; `world_echoes` builds the echoes of the simulator."""
+
+    def construct() -> tuple:
+        node = EmulatorNode(world_echoes)
+        return node, DiagnosticsPublisher([node.health])
+
+    run("imagenex_852_emulator", construct)
+
+
+def run_player() -> None:
+    """Publish a log and end."""
+    options = play_arguments(rospy.myargv()[1:])
+    rospy.init_node("play_852", anonymous=True)
+    try:
+        player = LogPlayer(options)
+    except StartError as error:
+        sys.exit(f"play_852: {error}")
+    player.run()
+    print(f"play_852: {player.published} beams published; {summary(player.reader)}")
+
+
+def run_recorder() -> None:
+    """Record a log until Ctrl-C."""
+    options = record_arguments(rospy.myargv()[1:])
+
+    def construct() -> tuple:
+        health = make_health("record_852")
+        return LogRecorder(options, health), DiagnosticsPublisher([health])
+
+    run("record_852", construct)
+
+
+def run_converter() -> None:
+    """Convert a log to a bag; needs no ROS master."""
+    try:
+        print(f"convert_852: {convert(convert_arguments(sys.argv[1:]))}")
+    except StartError as error:
+        sys.exit(f"convert_852: {error}")

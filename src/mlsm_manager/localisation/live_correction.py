@@ -1,0 +1,96 @@
+"""The correction map -> odom between scans, without jumps: the odometry's errors that were found go on."""
+
+import threading
+from collections import deque
+from typing import Deque, Optional, Tuple
+
+import numpy as np
+
+from mlsm_manager.matching.problem.prediction import Belief, advanced, advanced_path
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.matching.problem.scan_path import POSE
+from node_support.geometry.planar import composed, inverse, wrapped
+
+_MOST_SAMPLES = 4000
+_IDENTITY = np.zeros(3)
+
+
+class LiveCorrection:
+    """Follows the odometry from the last belief to now. A new belief is approached within `blend_time` seconds.
+
+    Safe to use from several threads: beliefs come from that of the scans, samples from a timer.
+    """
+
+    def __init__(self, blend_time: float) -> None:
+        self.blend_time = blend_time
+        self._lock = threading.Lock()
+        self._forget()
+
+    def clear(self) -> None:
+        """Forget everything, because time jumped or the map is gone."""
+        with self._lock:
+            self._forget()
+
+    def _forget(self) -> None:
+        self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
+        self._state: Optional[np.ndarray] = None
+        self._jump = _IDENTITY
+        self._jump_time: Optional[float] = None
+        self._shown: Optional[np.ndarray] = None
+
+    def believe(self, belief: Belief) -> None:
+        """Take what a match found at a time in the past; the samples since then bring it to now."""
+        with self._lock:
+            self._believe(belief)
+
+    def _believe(self, belief: Belief) -> None:
+        self._state = np.array(belief.theta)
+        start = belief.time
+        later = [sample for sample in self._samples if sample[0] > belief.time]
+        earlier = [sample for sample in self._samples if sample[0] <= belief.time]
+        if later:
+            known = earlier[-1:] + later
+            times = np.array([time for time, _ in known])
+            track = Track(times, np.array([pose for _, pose in known]))
+            since = times[times > start]
+            self._state[POSE] = advanced_path(self._state, start, track, since)[-1]
+        if self._shown is not None and self._samples:
+            self._jump = composed(inverse(self._state[POSE]), self._shown)
+            self._jump[2] = wrapped(self._jump[2])
+            self._jump_time = None
+
+    def sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        """Take T_odom_base (3,) at `time` [s] and return T_map_odom (3,) to be shown now.
+
+        Times that do not increase change nothing.
+        """
+        with self._lock:
+            return self._sample(time, odometry)
+
+    def _sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        odometry = np.asarray(odometry, dtype=np.float64)
+        if self._samples and time <= self._samples[-1][0]:
+            time, odometry = self._samples[-1]
+        else:
+            self._follow(time, odometry)
+            self._samples.append((time, odometry))
+        if self._state is None:
+            return _IDENTITY
+        if self._jump_time is None:
+            self._jump_time = time
+        left = self._share_left(time - self._jump_time)
+        self._shown = composed(self._state[POSE], left * self._jump)
+        correction = composed(self._shown, inverse(odometry))
+        correction[2] = wrapped(correction[2])
+        return correction
+
+    def _follow(self, time: float, odometry: np.ndarray) -> None:
+        if self._state is None or not self._samples:
+            return
+        before, pose = self._samples[-1]
+        self._state[POSE] = advanced(self._state, time - before, pose, odometry)
+
+    def _share_left(self, seconds: float) -> float:
+        if self.blend_time <= 0.0:
+            return 0.0
+        return float(np.clip(1.0 - seconds / self.blend_time, 0.0, 1.0))

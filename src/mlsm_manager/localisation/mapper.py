@@ -1,0 +1,152 @@
+"""Scans in, a map and the vehicle's place in it out: the orchestration without ROS (thesis 6.5.6)."""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Deque, Optional
+
+import numpy as np
+
+from mlsm_manager.localisation.correction_history import CorrectionHistory
+from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
+from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.matching.problem.scan_path import ERRORS
+from mlsm_manager.matching.problem.undistort import corrected_points
+from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
+from node_support.geometry.planar import composed, transformed
+
+_MOST_WAITING = 8
+_NOTHING = InsertReport(0, 0, 0)
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """The grids: side of a cell [m] of the map that is shown and of the one that is matched with, limit and reserve."""
+
+    resolution: float
+    match_resolution: float
+    limit: float
+    expected_blocks: int
+    fewest_blocks: int
+
+
+@dataclass(frozen=True)
+class ScanUpdate:
+    """What became of a scan. result: None when it was not matched. accepted: whether it is in the map now."""
+
+    scan: Scan
+    result: Optional[MatchResult]
+    accepted: bool
+    belief: Belief
+
+
+@dataclass(frozen=True)
+class CloudUpdate:
+    """What became of a cloud. waiting: until the scan of its time is matched. unplaced: points without a place."""
+
+    report: InsertReport
+    waiting: bool
+    unplaced: int
+
+
+class Mapper:
+    """Keeps the map, what is known of the pose, and the errors of the odometry.
+
+    Scans of echoes are matched and make the map that is matched with; clouds make the map that is shown. Where both are
+    the same points, give them to both. A scan that is not matched because `matching` is off, or because there is no
+    map yet, is placed by the odometry as corrected so far, and makes the map: its pose is then certain in it.
+    """
+
+    def __init__(self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher) -> None:
+        self.settings = settings
+        self.errors = errors
+        self.matcher = matcher
+        self.matching = False
+        self.newest: Optional[Scan] = None
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget the map and the place in it."""
+        settings = self.settings
+        self.shown = MultiLevelSurfaceMap(settings.resolution, settings.limit, settings.expected_blocks)
+        self.matched = MultiLevelSurfaceMap(settings.match_resolution, settings.limit)
+        self.forget_place()
+
+    def forget_place(self) -> None:
+        """Keep the map but forget where the vehicle is, because time jumped."""
+        self.belief: Optional[Belief] = None
+        self.correction = np.zeros(3)
+        self.newest = None
+        self._history = CorrectionHistory()
+        self._waiting: Deque[Scan] = deque(maxlen=_MOST_WAITING)
+
+    def take_echoes(self, scan: Scan) -> ScanUpdate:
+        """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
+        self.newest = scan
+        belief = self._belief_at(scan)
+        if not self.matching or len(self.matched) < self.settings.fewest_blocks:
+            return self._place(scan, belief)
+        result = self.matcher.match(scan, self.matched.blocks, prior_of(belief, scan.reference_pose))
+        return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
+
+    def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
+        """Take a match as the truth: the scan goes into the map, its pose into the belief."""
+        theta = np.concatenate([result.pose, result.rate, result.motion])
+        self.belief = Belief(scan.reference_time, theta, result.state_covariance)
+        self.correction = result.correction(scan)
+        self.matched.insert(corrected_points(scan, result))
+        self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
+        return ScanUpdate(scan, result, True, self.belief)
+
+    def take_cloud(self, cloud: Scan) -> CloudUpdate:
+        """Insert a cloud into the map that is shown, or let it wait for the match of its time."""
+        if not self.matching:
+            return CloudUpdate(self.shown.insert(transformed(self.correction, cloud.points)), False, 0)
+        if cloud.reference_time > self._history.end:
+            self._waiting.append(cloud)
+            return CloudUpdate(_NOTHING, True, 0)
+        points, unplaced = self._history.placed(cloud)
+        return CloudUpdate(self.shown.insert(points), False, unplaced)
+
+    def take_waiting(self) -> Optional[CloudUpdate]:
+        """Insert the next cloud that waited, if its time is known now; None when there is none."""
+        if not self._waiting or (self.matching and self._waiting[0].reference_time > self._history.end):
+            return None
+        return self.take_cloud(self._waiting.popleft())
+
+    def follow(self, track: Track, time: float) -> None:
+        """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
+        if self.belief is not None and time > self.belief.time:
+            self.belief = predicted(self.belief, track, time, self.errors)
+
+    def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
+        times, poses = self._path(scan, belief)
+        self._history.add(times, poses, scan.track, holds=True)
+        self.matched.insert(self._history.placed(scan)[0])
+        self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
+        # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
+        if belief.theta[ERRORS].any():
+            self.correction = prior_of(belief, scan.reference_pose).correction
+        return ScanUpdate(scan, None, True, self.belief)
+
+    def _reject(self, scan: Scan, result: MatchResult, belief: Belief) -> ScanUpdate:
+        self.belief = belief
+        self._history.add(*self._path(scan, belief), scan.track, holds=False)
+        return ScanUpdate(scan, result, False, belief)
+
+    def _belief_at(self, scan: Scan) -> Belief:
+        """Return what is known at the scan's reference time before it is matched."""
+        if self.belief is None:
+            theta = np.concatenate([scan.reference_pose, np.zeros(5)])
+            self.belief = Belief(scan.reference_time, theta, self.errors.covariance())
+        if scan.reference_time <= self.belief.time:
+            return self.belief
+        belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
+        return held_to_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
+
+    def _path(self, scan: Scan, belief: Belief) -> tuple:
+        """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""
+        times = np.unique(np.append(np.linspace(scan.start, scan.reference_time, 17), scan.reference_time))
+        correction = prior_of(belief, scan.reference_pose).correction
+        return times, composed(correction, scan.track.at(times))

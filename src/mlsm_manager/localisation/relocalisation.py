@@ -1,0 +1,33 @@
+"""Finds a vehicle that lost its place: one scan against the whole map."""
+
+import numpy as np
+
+from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.matching.problem.result import MatchResult, Prior
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.blocks import Blocks
+from node_support.geometry.planar import composed, inverse
+
+_EVERYWHERE = {
+    "search_distance": 500.0, "search_angle": np.pi, "search_cell": 1.0, "candidates": 80, "min_gain_over_second": 6.0
+}  # fmt: skip
+
+
+def relocaliser(parameters: DistributionMatcherParameters) -> Matcher:
+    """Return the default matcher, made to look everywhere."""
+    return DistributionMatcher(parameters.changed(_EVERYWHERE))
+
+
+def relocalised(scan: Scan, target: Blocks, matcher: Matcher, errors: OdometryErrors) -> MatchResult:
+    """Return where in the whole map `scan` was taken, whatever was believed before."""
+    centers = target.mean[:, :2] if len(target) else np.zeros((1, 2))
+    low, high = centers.min(axis=0), centers.max(axis=0)
+    middle = np.append((low + high) / 2.0, scan.reference_pose[2])
+    covariance = errors.covariance()
+    covariance[0, 0] = covariance[1, 1] = (float((high - low).max()) / 4.0 + 1.0) ** 2
+    covariance[2, 2] = np.pi**2
+    correction = composed(middle, inverse(scan.reference_pose))
+    return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))

@@ -1,0 +1,38 @@
+"""Tells the diagnostics what became of scans and clouds."""
+
+from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from node_support.health import Health
+
+
+def tell_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
+    """Count a scan and show what its match found."""
+    health.show("matching", "on" if matching else "off")
+    result = update.result
+    if result is None:
+        health.count("scans placed by odometry")
+        return
+    health.count("scans matched" if update.accepted else "scans not matched")
+    health.show("match status", result.status.name)
+    health.show("match error [m]", f"{result.error:.3f}")
+    health.show("match points", f"{result.points_used} of {len(update.scan)}")
+    health.show("match time [ms]", f"{1e3 * result.seconds:.1f}")
+    deviations = result.covariance.diagonal() ** 0.5
+    health.show("fix standard deviations x y [m] yaw [rad]", " ".join(f"{value:.3f}" for value in deviations[:3]))
+    health.show("odometry scale error", f"{result.motion[0]:.3f}")
+    health.show("odometry direction error [rad]", f"{result.motion[1]:.4f}")
+    if not update.accepted:
+        health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction stay")
+
+
+def tell_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:
+    """Count a cloud and warn of points that did not get into the map."""
+    if update.waiting:
+        health.count("clouds waiting for their match")
+        return
+    health.count("points inserted", update.report.inserted)
+    health.show("blocks", str(blocks))
+    if update.unplaced:
+        health.count("points left out, their scan was not matched", update.unplaced)
+    if update.report.outside:
+        detail = f"{update.report.outside} beyond map_limit of {limit:g} m; check tf"
+        health.problem("points outside the map", detail, update.report.outside)

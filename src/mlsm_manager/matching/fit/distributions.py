@@ -1,0 +1,115 @@
+"""The map as local distributions: what a point near a block should look like (Segal et al. 2009; Stoyanov et al. 2012).
+
+A block is too small to tell the direction of the wall it belongs to, so each is joined with its neighbours, weighted by
+a Gaussian window. A window shows a long wall as if it were as long as the window, and the end of what a scan saw of a
+wall as if the wall ended there: both would pull the next scan back to where the last one was taken. So the extent along
+the structure comes from a window twice as wide, and what the window itself accounts for, up to a margin, is taken away.
+Along a wall a point may slide, while a buoy holds it on all sides. Three points of a far wall often lie across it: the
+direction comes from that of the two windows which is surer of it.
+"""
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.surface_map.blocks import Blocks
+
+_NEIGHBOURS = 16
+_WINDOW_NEIGHBOUR = 2
+_LEAST_WINDOW = 0.7
+_GREATEST_WINDOW = 2.5
+_ALONG_MARGIN = 3.0
+_PRIOR_POINTS = 2.0
+_LEAST_DEVIATION = 0.1
+_LONE_DEVIATION = 0.5
+_SURFACE_DEVIATION = 0.4
+_UNBOUNDED = 100.0
+
+
+class LocalDistributions:
+    """One planar distribution per block.
+
+    mean: (n, 2) m in map. covariance: (n, 2, 2) m^2 of echoes about it.
+    deviation: m, how far echoes typically lie from the line that their neighbours make.
+    """
+
+    def __init__(self, blocks: Blocks) -> None:
+        """`blocks` must hold at least one."""
+        centers = blocks.mean[:, :2]
+        self._tree = cKDTree(centers)
+        count = min(_NEIGHBOURS, len(centers))
+        distances, neighbours = self._tree.query(centers, k=np.arange(1, count + 1))
+        window = np.clip(distances[:, min(_WINDOW_NEIGHBOUR, count - 1)], _LEAST_WINDOW, _GREATEST_WINDOW)
+        self.window = window
+        near = np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
+        self.support = (near * blocks.count[neighbours]).sum(axis=1)
+        close, broad = (_Window.around(blocks, distances, neighbours, width) for width in (window, 2.0 * window))
+        self.mean = close.mean
+        self.deviation, self.covariance, thickness = _structure(close, broad)
+        self.weight = (1.0 + thickness / _SURFACE_DEVIATION**2) ** -2
+
+    def nearest(self, points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return for points (n, 2) the distance (n,) to the nearest block and its index (n,)."""
+        return self._tree.query(points)
+
+
+@dataclass(frozen=True)
+class _Window:
+    """What lies in one window around each block.
+
+    mean: (n, 2) m. covariance: (n, 2, 2) m^2. vectors: (n, 2, 2) its axes as columns, the longer one last. turn: (n,)
+    rad^2, about the variance of their direction. members: (n,) to how many points it comes. width: (n,) m.
+    """
+
+    mean: np.ndarray
+    covariance: np.ndarray
+    vectors: np.ndarray
+    turn: np.ndarray
+    members: np.ndarray
+    width: np.ndarray
+
+    @staticmethod
+    def around(blocks: Blocks, distances: np.ndarray, neighbours: np.ndarray, width: np.ndarray) -> "_Window":
+        """Return windows of `width` (n,) over the `neighbours` (n, k) of each block, at `distances` (n, k) m."""
+        counts = blocks.count[neighbours]
+        weights = np.sqrt(counts) * np.exp(-0.5 * (distances / width[:, np.newaxis]) ** 2)
+        weights = weights / weights.sum(axis=1, keepdims=True)
+        mean, covariance = _moments(weights, neighbours, blocks)
+        values, vectors = np.linalg.eigh(covariance)
+        members = 1.0 / (weights**2 / counts).sum(axis=1)
+        turn = (values[:, 0] + _LEAST_DEVIATION**2) / (values[:, 1] + _LEAST_DEVIATION**2) / members
+        return _Window(mean, covariance, vectors, turn, members, width)
+
+    def along(self, axes: np.ndarray) -> np.ndarray:
+        """Return the variance (n,) along `axes` (n, 2)."""
+        return np.einsum("na,nab,nb->n", axes, self.covariance, axes)
+
+
+def _moments(weights: np.ndarray, neighbours: np.ndarray, blocks: Blocks) -> Tuple[np.ndarray, np.ndarray]:
+    centers = blocks.mean[neighbours, :2]
+    mean = np.einsum("ij,ijk->ik", weights, centers)
+    spread = centers - mean[:, np.newaxis, :]
+    covariance = np.einsum("ij,ija,ijb->iab", weights, spread, spread)
+    own = np.einsum("ij,ijk->ik", weights, blocks.variance[neighbours, :2])
+    covariance[:, 0, 0] += own[:, 0]
+    covariance[:, 1, 1] += own[:, 1]
+    return mean, covariance
+
+
+def _structure(close: _Window, broad: _Window) -> Tuple[float, np.ndarray, np.ndarray]:
+    """Return how far echoes typically lie from a line [m]; of each block covariance (n, 2, 2) and thickness (n,)."""
+    vectors = np.where((broad.turn < close.turn)[:, np.newaxis, np.newaxis], broad.vectors, close.vectors)
+    across, members = close.along(vectors[:, :, 0]), close.members
+    sure = (members >= 3.0) & (across < _SURFACE_DEVIATION**2)
+    typical = max(float(np.median(across[sure])) if sure.any() else 0.0, _LEAST_DEVIATION**2)
+    # With few members a line through them fits too well; the deviation found elsewhere counts as two more.
+    across = (members * across + _PRIOR_POINTS * typical) / (members + _PRIOR_POINTS)
+    # Two points always lie on a line: whether they are a structure or clutter, only a third can tell.
+    known = np.clip((members - 1.0) / 2.0, 0.0, 1.0)
+    across = known * across + (1.0 - known) * np.maximum(_LONE_DEVIATION**2, across)
+    along = np.maximum(broad.along(vectors[:, :, 1]), across)
+    information = np.maximum(1.0 / along - _ALONG_MARGIN / broad.width**2, _UNBOUNDED**-2)
+    values = np.column_stack([across, 1.0 / information])
+    return float(np.sqrt(typical)), np.einsum("iak,ik,ibk->iab", vectors, values, vectors), across

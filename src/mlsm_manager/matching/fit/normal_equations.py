@@ -1,0 +1,205 @@
+"""What the points of a scan say of the state: residuals, gradients and information, linearised at one state."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.matching.fit.distributions import LocalDistributions
+from mlsm_manager.matching.fit.robust import geman_mcclure, geman_mcclure_cost
+from mlsm_manager.matching.problem.scan_path import STATES, PlanarMotion
+from node_support.geometry.planar import rotated
+
+INLIER = 3.0
+_GATE = 0.75
+_NEIGHBOURS = 12
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """How points meet the map.
+
+    world: (n, 2) places in map. arms: (n, 2) m from the vehicle to them. nearest: (n,) their blocks, at `distances`
+    (n,) m. metric: (n, 2, 2) inverse covariance. residual: (n, 2) m. squared: (n,) the residuals' squared Mahalanobis
+    length.
+    """
+
+    world: np.ndarray
+    arms: np.ndarray
+    nearest: np.ndarray
+    distances: np.ndarray
+    metric: np.ndarray
+    residual: np.ndarray
+    squared: np.ndarray
+
+
+@dataclass(frozen=True)
+class Normal:
+    """Normal equations of the points at a state, where nothing is known of the ranges' scale but that it is 1.
+
+    gradient: (n, 8) of each point. jacobian: (n, 2, 8) derivative of each place. lever: (n, 2, 8) the same times the
+    weighted metric. pull: (n, 2) the arms, which are the derivative by the scale, times the weighted metric.
+    importance: (n,) what each point is worth before the robust kernel.
+    """
+
+    meeting: Meeting
+    gradient: np.ndarray
+    jacobian: np.ndarray
+    lever: np.ndarray
+    pull: np.ndarray
+    importance: np.ndarray
+
+    @cached_property
+    def information(self) -> np.ndarray:
+        """The points' information (8, 8) of the state."""
+        return np.tensordot(self.jacobian, self.lever, axes=([0, 1], [0, 1]))
+
+    @property
+    def on_surface(self) -> np.ndarray:
+        """(n,) bool: points that lie on a surface of the map."""
+        return (self.meeting.squared < INLIER**2) & (self.importance > 0.0)
+
+
+class PointEquations:
+    """Compares the points of one scan with the local distributions of a map.
+
+    An error of all ranges in proportion is one more unknown and is integrated out: between walls that converge it
+    looks like a motion.
+    """
+
+    def __init__(
+        self,
+        motion: PlanarMotion,
+        point_weights: np.ndarray,
+        target: LocalDistributions,
+        expected: np.ndarray,
+        range_scale_deviation: float,
+    ) -> None:
+        """`point_weights` is (n,), n > 0; `expected` (8,) a state; `range_scale_deviation` relative, 0: certain."""
+        self._motion = motion
+        self._point_weights = point_weights
+        self._target = target
+        self._range_scale_deviation = range_scale_deviation
+        spots = motion.points(motion.path(expected))
+        self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
+
+    def meeting(self, theta: np.ndarray) -> Meeting:
+        """Return how the points meet the map when the state is `theta` (8,)."""
+        path = self._motion.path(theta)
+        world = self._motion.points(path)
+        return self._meeting(world, self._motion.arms(world, path))
+
+    def normal(self, theta: np.ndarray, scale: float) -> Normal:
+        """Return the normal equations at `theta` with a robust kernel of `scale` standard deviations."""
+        meeting = self.meeting(theta)
+        importance = self._importance(meeting, scale)
+        weighted = meeting.metric * (importance * geman_mcclure(meeting.squared, scale))[:, np.newaxis, np.newaxis]
+        jacobian = self._motion.point_jacobian(meeting.arms, theta)
+        lever = weighted @ jacobian
+        gradient = np.einsum("nas,na->ns", lever, meeting.residual)
+        pull = np.einsum("nab,nb->na", weighted, meeting.arms)
+        return Normal(meeting, gradient, jacobian, lever, pull, importance)
+
+    def matched_shares(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+        """Return (k,) which share of the points lies on a surface when `theta` is moved by `moves` (k, 3)."""
+        meeting = self._moved(theta, moves)
+        matched = (meeting.squared < INLIER**2) & (meeting.distances < _GATE * scale)
+        return matched.reshape(len(moves), -1).mean(axis=1)
+
+    def supports(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+        """Return (k,) by how many nats the points prefer `theta`, moved by `moves` (k, 3), to meeting nothing."""
+        meeting = self._moved(theta, moves)
+        each = self._importance(meeting, scale) * _saved(meeting.squared, scale)
+        return each.reshape(len(moves), -1).sum(axis=1)
+
+    def weighed(self, normal: Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
+        """Return information (8, 8) and gradient (8,) of all points, each worth 1 / `inflation` of one."""
+        information, gradient = normal.information / inflation, normal.gradient.sum(axis=0) / inflation
+        gain, mixed = self.scale_gain(normal, inflation)
+        return information - np.outer(gain, mixed), gradient - gain * _scale_gradient(normal).sum() / inflation
+
+    def scale_gain(self, normal: Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
+        """Return (8,) how far the scale's error moves the state's gradient, and (8,) what they have in common."""
+        mixed = np.einsum("nas,na->s", normal.lever, normal.meeting.arms) / inflation
+        if self._range_scale_deviation == 0.0:
+            return np.zeros_like(mixed), mixed
+        known = float((normal.pull * normal.meeting.arms).sum()) / inflation + self._range_scale_deviation**-2
+        return mixed / known, mixed
+
+    def evidence(self, normal: Normal, gain: np.ndarray, inflation: float) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return gradient (n, 8) and information (n, 8, 8) of each point, and (8, 8) of what is known of the scale.
+
+        gain: (8,) as of scale_gain. All are 1 / `inflation` of what independent points would say; their sums are those
+        of `weighed`.
+        """
+        gradient, jacobian, lever, of_scale = normal.gradient, normal.jacobian, normal.lever, np.zeros((STATES, STATES))
+        if self._range_scale_deviation > 0.0:
+            gradient = gradient - _scale_gradient(normal)[:, np.newaxis] * gain
+            jacobian = jacobian - normal.meeting.arms[:, :, np.newaxis] * gain
+            lever = lever - normal.pull[:, :, np.newaxis] * gain
+            of_scale = np.outer(gain, gain) / self._range_scale_deviation**2
+        return gradient / inflation, jacobian.transpose(0, 2, 1) @ lever / inflation, of_scale
+
+    def gradient(self, theta: np.ndarray, scale: float, gain: np.ndarray) -> np.ndarray:
+        """Return the gradient (8,) of all points at `theta`, less `gain` (8,) times that by the ranges' scale."""
+        meeting = self.meeting(theta)
+        weights = self._importance(meeting, scale) * geman_mcclure(meeting.squared, scale)
+        force = np.einsum("nab,nb->na", meeting.metric, meeting.residual) * weights[:, np.newaxis]
+        return self._motion.gradient_of(force, meeting.arms, theta) - gain * float((force * meeting.arms).sum())
+
+    def map_share(self, nearest: np.ndarray) -> np.ndarray:
+        """Return the share of the points' information that is left after the map's own noise.
+
+        nearest: (k n,), the blocks of the points at k places, one place after the other.
+        k points of a scan that are compared with the same m points of the map err by s^2/k + s^2/m together, and the
+        fit cannot see the second part.
+        """
+        window = self._target.window[nearest][:, np.newaxis]
+        apart = np.tile(self._apart, (len(nearest) // len(self._apart), 1))
+        scan_support = np.exp(-0.5 * (apart / window) ** 2).sum(axis=1)
+        map_support = self._target.support[nearest]
+        return map_support / (map_support + scan_support)
+
+    def _moved(self, theta: np.ndarray, moves: np.ndarray) -> Meeting:
+        """Return how the points meet the map when the pose is moved by `moves` (k, 3): k times n points in a row."""
+        path = self._motion.path(theta)
+        world = self._motion.points(path)
+        turn = moves[:, np.newaxis, 2]
+        turned = rotated(world - theta[:2], turn) + theta[:2] + moves[:, np.newaxis, :2]
+        return self._meeting(turned.reshape(-1, 2), rotated(self._motion.arms(world, path), turn).reshape(-1, 2))
+
+    def _meeting(self, world: np.ndarray, arms: np.ndarray) -> Meeting:
+        distances, nearest = self._target.nearest(world)
+        residual = world - self._target.mean[nearest]
+        metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(arms))
+        squared = np.einsum("na,nab,nb->n", residual, metric, residual)
+        return Meeting(world, arms, nearest, distances, metric, residual, squared)
+
+    def _importance(self, meeting: Meeting, scale: float) -> np.ndarray:
+        places = len(meeting.nearest) // len(self._point_weights)
+        share = self._target.weight[meeting.nearest] * self.map_share(meeting.nearest)
+        return np.tile(self._point_weights, places) * share * (meeting.distances < _GATE * scale)
+
+
+def support(normal: Normal, scale: float) -> float:
+    """Return by how many nats the points prefer this place to one where they meet nothing."""
+    return float((normal.importance * _saved(normal.meeting.squared, scale)).sum())
+
+
+def _saved(squared: np.ndarray, scale: float) -> np.ndarray:
+    return scale**2 / 2.0 - geman_mcclure_cost(squared, scale)
+
+
+def _scale_gradient(normal: Normal) -> np.ndarray:
+    return (normal.pull * normal.meeting.residual).sum(axis=1)
+
+
+def _inverse(matrices: np.ndarray) -> np.ndarray:
+    """Return the inverses of symmetric matrices (n, 2, 2)."""
+    a, b, d = matrices[:, 0, 0], matrices[:, 0, 1], matrices[:, 1, 1]
+    result = np.empty_like(matrices)
+    result[:, 0, 0], result[:, 1, 1] = d, a
+    result[:, 0, 1] = result[:, 1, 0] = -b
+    return result / (a * d - b * b)[:, np.newaxis, np.newaxis]

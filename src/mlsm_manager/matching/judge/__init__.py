@@ -1,0 +1,1 @@
+"""Checks of whether a fit can be trusted."""

@@ -1,0 +1,1 @@
+"""The matchers, their table and their parameters."""

@@ -1,0 +1,176 @@
+"""The default matcher: a correlative search, then one path for the whole scan among local distributions."""
+
+import time
+from dataclasses import replace
+from typing import List, Tuple
+
+import numpy as np
+
+from mlsm_manager.matching.fit.distributions import LocalDistributions
+from mlsm_manager.matching.fit.gauss_newton import Fit, PriorState, Refiner
+from mlsm_manager.matching.judge.agreement import agreement
+from mlsm_manager.matching.judge.significance import lead_along, significance
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.scan_path import MOTION, POSE, RATE, STATES, PlanarMotion
+from mlsm_manager.matching.search.correlative_search import YAW_STEP, SearchWindow, search, separation
+from mlsm_manager.matching.search.score_field import ScoreField
+from mlsm_manager.surface_map.blocks import Blocks
+from node_support.geometry.planar import wrapped
+
+_WINDOW_DEVIATIONS = 3.0
+_OBJECTION_SHARE = 0.01
+_MOST_RATES = 9
+_LEAST_VARIANCE = 1e-12
+_FIELD_CELLS = 2.0
+_MARGIN = 15.0
+_APART = 0.5
+_EXCLUDED = 4.0
+
+
+class DistributionMatcher:
+    """Searches around the prior, refines the best candidates and judges what comes out."""
+
+    def __init__(self, parameters: DistributionMatcherParameters) -> None:
+        self.parameters = parameters
+
+    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+        """Return where the scan was taken; see Matcher."""
+        start = time.perf_counter()
+        state = prior_state(prior, scan)
+        motion = PlanarMotion(scan, self.parameters.beam_width / np.sqrt(12.0))
+        fewest = self.parameters.min_points
+        window = self._window(motion, state)
+        target = _in_reach(target, motion, state, window)
+        if len(scan) < fewest or len(target) < fewest:
+            reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
+            return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
+        fits, refiner = self._fits(motion, target, state, window)
+        best = fits[0]
+        status, reason = self._judge(best, refiner, state, target)
+        if status is MatchStatus.CONVERGED:
+            best = replace(best, covariance=refiner.residual_covariance(best))
+            status, reason = self._judge_second_places(best, fits[1:], refiner)
+        return _result(status, reason, motion, best, start)
+
+    def _fits(
+        self, motion: PlanarMotion, target: Blocks, state: PriorState, window: SearchWindow
+    ) -> Tuple[List[Fit], Refiner]:
+        parameters = self.parameters
+        weights = np.ones(len(motion.local))
+        margin = window.distance + 2.0 * parameters.search_cell
+        field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
+        pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
+        found = search(
+            motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, parameters.candidates
+        )
+        refiner = Refiner(motion, weights, LocalDistributions(target), state, parameters.range_scale_deviation)
+        fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
+        inflation = max(fits, key=lambda fit: fit.support).inflation
+        return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
+
+    def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
+        deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))
+        seconds = max(motion.beam_times[-1] - motion.beam_times[0], 1e-3)
+        step = 2.0 * YAW_STEP / seconds
+        rates = min(int(np.ceil(deviations[5] / step - 0.5)), _MOST_RATES // 2)
+        return SearchWindow(
+            distance=min(float(deviations[:2].max()), self.parameters.search_distance),
+            angle=min(float(deviations[2]), self.parameters.search_angle),
+            yaw_rates=np.arange(-rates, rates + 1) * step,
+        )
+
+    def _judge(self, best: Fit, refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
+        parameters = self.parameters
+        if not best.converged:
+            return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
+        used = int(np.count_nonzero(best.inliers))
+        if used < parameters.min_points:
+            return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {parameters.min_points} or more"
+        certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
+        if certainty < parameters.min_significance:
+            return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
+        jump = float(np.sqrt(2.0 * state.objection(best.theta)))
+        if jump > parameters.max_jump:
+            return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
+        agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[:2], target.mean[:, :2])
+        if agreed < parameters.min_agreement:
+            return MatchStatus.DIVERGED, f"scan and map agree by {agreed:.2f} only, another place perhaps"
+        return self._judge_certainty(best)
+
+    def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
+        parameters = self.parameters
+        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
+        if position > parameters.max_position_deviation:
+            return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
+        yaw = float(np.sqrt(best.covariance[2, 2]))
+        if yaw > parameters.max_yaw_deviation:
+            return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
+        return MatchStatus.CONVERGED, ""
+
+    def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
+        """Refuse a fix whose covariance excludes a place that fits nearly as well."""
+        least = self.parameters.min_gain_over_second
+        if least == 0.0:
+            return MatchStatus.CONVERGED, ""
+        for other in others:
+            lead = best.gain(best.inflation) - other.gain(best.inflation)
+            if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
+                return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
+        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
+        excluded = _EXCLUDED * float(np.sqrt(values[-1]))
+        lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
+        if lead < least:
+            return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
+        return MatchStatus.CONVERGED, ""
+
+
+def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
+    """Return the blocks that points of the scan can meet: a match takes no longer in the map of a whole survey."""
+    offsets = motion.points(motion.path(state.mean)) - state.mean[:2]
+    reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
+    distances = np.linalg.norm(target.mean[:, :2] - state.mean[:2], axis=1)
+    return Blocks(target.rows[distances < reach], target.resolution)
+
+
+def _excluded(fit: Fit, theta: np.ndarray) -> bool:
+    difference = (theta - fit.theta)[POSE]
+    difference[2] = wrapped(difference[2])
+    return bool(difference @ np.linalg.solve(fit.covariance[POSE, POSE], difference) > _EXCLUDED**2)
+
+
+def prior_state(prior: Prior, scan: Scan) -> PriorState:
+    """Return the prior over the eight states of planar_motion; states without variance are held."""
+    covariance = prior.covariance + _LEAST_VARIANCE * np.eye(STATES)
+    mean = np.concatenate([prior.pose(scan), prior.rate, prior.motion])
+    return PriorState(mean, np.linalg.inv(covariance))
+
+
+def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, start: float) -> MatchResult:
+    used = fit.distances[fit.inliers]
+    to_output = np.zeros((6, STATES))
+    to_output[POSE, POSE] = np.eye(3)
+    to_output[3:] = motion.velocity_jacobian(fit.theta)
+    return MatchResult(
+        status=status,
+        pose=fit.theta[POSE],
+        velocity=motion.velocity(fit.theta),
+        covariance=to_output @ fit.covariance @ to_output.T,
+        rate=fit.theta[RATE],
+        motion=fit.theta[MOTION],
+        state_covariance=fit.covariance,
+        error=float(used.mean()) if used.size else float("inf"),
+        points_used=int(used.size),
+        iterations=fit.iterations,
+        seconds=time.perf_counter() - start,
+        beam_times=motion.beam_times,
+        beam_poses=motion.path(fit.theta),
+        reason=reason,
+    )
+
+
+def _unmatched(status: MatchStatus, reason: str, motion: PlanarMotion, state: PriorState, start: float) -> MatchResult:
+    nothing = np.empty(0)
+    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, 1.0, 0.0, nothing.astype(bool), nothing, 0, False)
+    return _result(status, reason, motion, fit, start)

@@ -1,0 +1,1 @@
+"""What is matched: a scan, its path, what is known beforehand, and the result."""

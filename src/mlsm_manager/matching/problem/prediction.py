@@ -1,0 +1,136 @@
+"""Carries what is known of pose and odometry errors from scan to scan (an extended Kalman filter's prediction)."""
+
+import math
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from mlsm_manager.matching.problem.result import Prior
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.matching.problem.scan_path import MOTION, POSE, RATE, STATES
+from node_support.geometry.planar import composed, inverse, rotated, wrapped
+from node_support.parameters import ParameterSet, parameter
+
+_NODES = 17
+_DIFFERENCE = 1e-6
+
+
+@dataclass(frozen=True)
+class OdometryErrors(ParameterSet):
+    """How wrong the odometry may be: standard deviations, and how long an error lasts."""
+
+    scale_deviation: float = parameter(
+        0.2, "relative error of the distances it reports", low=0.0, high=2.0, tunable=False
+    )
+    direction_deviation: float = parameter(
+        0.05, "error of their direction, a sensor's mounting angle", unit="rad", low=0.0, high=1.0, tunable=False
+    )
+    speed_deviation: float = parameter(
+        0.02, "error of the speed that does not grow with it, as of a current", unit="m/s", low=0.0, high=5.0,
+        tunable=False,
+    )  # fmt: skip
+    turn_rate_deviation: float = parameter(
+        0.001, "error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
+    )
+    rate_time: float = parameter(
+        60.0, "how long an error of speed or turn rate lasts", unit="s", low=0.1, high=1e6, tunable=False
+    )
+    motion_time: float = parameter(
+        3600.0, "how long an error of scale or direction lasts", unit="s", low=0.1, high=1e9, tunable=False
+    )
+    heading_deviation: float = parameter(
+        0.0, "how far its heading may be off at any time, where a compass holds it; 0: it may drift away",
+        unit="rad", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
+
+    def wandering(self, seconds: float) -> float:
+        """Return the variance [m^2], in each direction, of what errors of the speed add up to within `seconds`."""
+        ratio = seconds / self.rate_time
+        return 2.0 * (self.speed_deviation * self.rate_time) ** 2 * (ratio - 1.0 + float(np.exp(-ratio)))
+
+    def covariance(self) -> np.ndarray:
+        """Return (8, 8) of [pose, rate, motion] where the pose is known and nothing of the odometry's errors."""
+        deviations = np.zeros(STATES)
+        deviations[RATE] = self.speed_deviation, self.speed_deviation, self.turn_rate_deviation
+        deviations[MOTION] = self.scale_deviation, self.direction_deviation
+        return np.diag(deviations**2)
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known at a time. theta: (8,) [pose, rate, motion] as in planar_motion. covariance: (8, 8)."""
+
+    time: float
+    theta: np.ndarray
+    covariance: np.ndarray
+
+
+def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors) -> Belief:
+    """Return the belief at a later `time`: the pose follows the odometry and its errors, the errors fade."""
+    theta = _advanced(belief.theta, belief.time, track, time)
+    jacobian = np.eye(STATES)
+    for state in range(STATES):
+        change = np.zeros(STATES)
+        change[state] = _DIFFERENCE
+        moved = _advanced(belief.theta + change, belief.time, track, time)
+        jacobian[POSE, state] = (moved - theta)[POSE] / _DIFFERENCE
+    lasting = np.ones(STATES)
+    lasting[RATE] = np.exp(-(time - belief.time) / errors.rate_time)
+    lasting[MOTION] = np.exp(-(time - belief.time) / errors.motion_time)
+    transition = lasting[:, np.newaxis] * jacobian
+    fresh = errors.covariance() * (1.0 - lasting**2)
+    return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
+
+
+def held_to_heading(belief: Belief, heading: float, deviation: float) -> Belief:
+    """Return the belief after a compass said `heading` [rad] with standard `deviation`; 0 stands for no compass."""
+    if deviation == 0.0:
+        return belief
+    gain = belief.covariance[:, 2] / (belief.covariance[2, 2] + deviation**2)
+    theta = belief.theta + gain * float(wrapped(heading - belief.theta[2]))
+    return Belief(belief.time, theta, belief.covariance - np.outer(gain, belief.covariance[2]))
+
+
+def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
+    """Return the belief as a matcher's prior; `odometry_pose` is T_odom_base (3,) at its time."""
+    correction = composed(belief.theta[POSE], inverse(odometry_pose))
+    return Prior(correction, belief.theta[RATE], belief.theta[MOTION], belief.covariance)
+
+
+def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarray) -> np.ndarray:
+    """Return T_map_base (m, 3) at increasing `times` (m,), none before `start`, where the state is `theta` (8,)."""
+    nodes = np.append(start, times)
+    poses = track.at(nodes)
+    relative = composed(inverse(poses[0]), poses)
+    middle = (nodes[1:] + nodes[:-1]) / 2.0 - start
+    heading = (relative[1:, 2] + relative[:-1, 2]) / 2.0
+    steps = (1.0 + theta[6]) * rotated(np.diff(relative[:, :2], axis=0), theta[7])
+    steps = steps + np.diff(nodes)[:, np.newaxis] * rotated(np.broadcast_to(theta[3:5], (len(times), 2)), heading)
+    shifts = np.cumsum(rotated(steps, theta[5] * middle), axis=0)
+    position = theta[:2] + rotated(shifts, theta[2])
+    return np.column_stack([position, theta[2] + relative[1:, 2] + theta[5] * (times - start)])
+
+
+def advanced(theta: np.ndarray, seconds: float, before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return T_map_base (3,) after one short step of the odometry from `before` to `after` (3,); see advanced_path.
+
+    The same in plain numbers, for whoever follows every message of the odometry.
+    """
+    turned = math.remainder(after[2] - before[2], math.tau)
+    step_x, step_y = _turned(after[0] - before[0], after[1] - before[1], theta[7] - before[2])
+    rate_x, rate_y = _turned(theta[3], theta[4], turned / 2.0)
+    along = (1.0 + theta[6]) * step_x + seconds * rate_x
+    aside = (1.0 + theta[6]) * step_y + seconds * rate_y
+    x, y = _turned(along, aside, theta[2] + theta[5] * seconds / 2.0)
+    return np.array([theta[0] + x, theta[1] + y, theta[2] + turned + theta[5] * seconds])
+
+
+def _turned(x: float, y: float, angle: float) -> Tuple[float, float]:
+    cos, sin = math.cos(angle), math.sin(angle)
+    return cos * x - sin * y, sin * x + cos * y
+
+
+def _advanced(theta: np.ndarray, start: float, track: Track, end: float) -> np.ndarray:
+    times = np.linspace(start, end, _NODES)[1:]
+    return np.concatenate([advanced_path(theta, start, track, times)[-1], theta[3:]])

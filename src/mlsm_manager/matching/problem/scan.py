@@ -1,0 +1,91 @@
+"""A scan as a matcher takes it: points, the time of each, and how the odometry went meanwhile."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from node_support.errors import RefusedInput
+from node_support.geometry.planar import composed, inverse
+
+
+@dataclass(frozen=True)
+class Track:
+    """The vehicle's way by odometry. Raises RefusedInput when times are not finite or do not increase.
+
+    times: (m,) s, increasing, m > 0. poses: (m, 3) T_odom_base, x y [m] and yaw [rad].
+    """
+
+    times: np.ndarray
+    poses: np.ndarray
+
+    def __post_init__(self) -> None:
+        times = np.asarray(self.times, dtype=np.float64)
+        poses = np.array(self.poses, dtype=np.float64)
+        if len(times) != len(poses) or not len(times):
+            raise RefusedInput("tracks refused", f"{len(times)} times for {len(poses)} poses")
+        if not (np.isfinite(times).all() and np.isfinite(poses).all() and (np.diff(times) > 0.0).all()):
+            raise RefusedInput("tracks refused", "times must be finite and increase, poses must be finite")
+        poses[:, 2] = np.unwrap(poses[:, 2])
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "poses", poses)
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return T_odom_base (..., 3) at `times` (...), between the known poses linearly, beyond them the nearest."""
+        columns = [np.interp(times, self.times, self.poses[:, axis]) for axis in range(3)]
+        return np.stack(columns, axis=-1)
+
+    def velocity_at(self, time: float, window: float = 1.0) -> np.ndarray:
+        """Return the (3,) velocity in the body frame, m/s, m/s, rad/s, over up to `window` s that end at `time`."""
+        first = max(time - window, self.times[0])
+        last = min(time, self.times[-1])
+        if last <= first:
+            return np.zeros(3)
+        before, after = self.at(np.array([first, last]))
+        return composed(inverse(before), after) / (last - first)
+
+
+@dataclass(frozen=True)
+class Scan:
+    """Points of one scan. Raises RefusedInput when the arrays do not belong together.
+
+    points: (n, 4) float64, x y z [m] and echo strength in `odom`, each placed by the odometry at its own beam's time.
+    times: (n,) s, when each point's beam was taken. moving: (n,) bool, whether the vehicle moved then.
+    track: the odometry, which must cover the times. reference_time: s, of the newest beam.
+    """
+
+    points: np.ndarray
+    times: np.ndarray
+    moving: np.ndarray
+    track: Track
+    reference_time: float
+
+    def __post_init__(self) -> None:
+        count = len(self.points)
+        if self.points.shape != (count, 4) or self.times.shape != (count,) or self.moving.shape != (count,):
+            raise RefusedInput(
+                "scans refused", f"points {self.points.shape}, times {self.times.shape}, moving {self.moving.shape}"
+            )
+
+    @classmethod
+    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, reference_time: float, track: Track) -> "Scan":
+        """Build from a cloud's points (n, 4) and signed time stamps (n,): negative while still (thesis 4.5.1).
+
+        Points that are not finite are left out.
+        """
+        points = np.asarray(points, dtype=np.float64)
+        stamps = np.asarray(time_stamps, dtype=np.float64)
+        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
+        return cls(points[valid], np.abs(stamps[valid]), stamps[valid] > 0.0, track, reference_time)
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    @property
+    def start(self) -> float:
+        """Time of the oldest point, s; the reference time when there is none."""
+        return float(self.times.min()) if len(self) else self.reference_time
+
+    @property
+    def reference_pose(self) -> np.ndarray:
+        """(3,) T_odom_base at the reference time."""
+        return self.track.at(self.reference_time)

@@ -1,0 +1,1 @@
+"""Search for the poses at which a fit may start."""

@@ -1,0 +1,1 @@
+"""Mapping of recordings: replay, calibration, refinement and the files that are left."""

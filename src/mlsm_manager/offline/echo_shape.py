@@ -1,0 +1,43 @@
+"""What the strengths of a recording tell of its echoes, and so how they are best extracted and matched."""
+
+from enum import Enum
+from typing import Collection, Sequence
+
+import numpy as np
+
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from sonar_processing.beams.beam import Beam
+from sonar_processing.filters.echo_extraction import ExtractionMode
+
+_BINARY = 0.9
+
+
+class EchoForm(Enum):
+    """What an echo looks like along a beam.
+
+    PEAK: strengths differ; an echo has a peak, and noise has no sharp edge. PLATEAU: strengths only say "something" or
+    "nothing"; an echo is metres long, its middle means nothing, and the surface is where it begins.
+    """
+
+    PEAK = "PEAK"
+    PLATEAU = "PLATEAU"
+
+
+_SUITED = {
+    EchoForm.PEAK: {"mode": ExtractionMode.MATCHED_FILTER, "match_resolution": 0.5},
+    EchoForm.PLATEAU: {"mode": ExtractionMode.LEADING_EDGE, "match_resolution": 1.0},
+}
+
+
+def echo_form_of(beams: Sequence[Beam]) -> EchoForm:
+    """Return PLATEAU where nearly all echoes are as strong as any, else PEAK."""
+    counts = np.sum([np.bincount(beam.intensities, minlength=256) for beam in beams], axis=0)[1:]
+    if not counts.any():
+        return EchoForm.PEAK
+    strongest = counts[np.flatnonzero(counts)[-1]]
+    return EchoForm.PLATEAU if strongest >= _BINARY * counts.sum() else EchoForm.PEAK
+
+
+def suited(parameters: ReplayParameters, form: EchoForm, held: Collection[str]) -> ReplayParameters:
+    """Return `parameters` with those that suit the form of the echoes, but for those that are `held`."""
+    return parameters.changed({name: value for name, value in _SUITED[form].items() if name not in held})

@@ -1,0 +1,66 @@
+"""live.yaml: the parameters under which the live nodes do what map_bag did."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any, Dict, Mapping, Type
+
+import yaml
+
+from mlsm_manager.localisation.parameters import MapInput, MatchInput, MlsmCoreParameters
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.files import write_whole
+from node_support.parameters import ParameterSet
+from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.scans.parameters import SonarToCloudParameters
+
+NODES: Dict[str, Type[ParameterSet]] = {
+    "sonar_to_cloud": SonarToCloudParameters,
+    "echo_extractor": EchoExtractorParameters,
+    "mlsm_core": MlsmCoreParameters,
+}
+_SHARED: Dict[str, Type[ParameterSet]] = {**NODES, "sonar_to_cloud": BeamCorrection}
+_COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take it as parameters:=FILE.\n"
+
+
+def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> Dict[str, Dict[str, Any]]:
+    """Return by node what it must be set to, so that it does what a replay with `parameters` did."""
+    values = {name: _common(parameters.to_mapping(), name) for name in NODES}
+    cloud = SonarToCloudParameters(target_frame=odom_frame)
+    values["sonar_to_cloud"].update(
+        target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
+    )
+    values["mlsm_core"].update(
+        odom_frame=odom_frame,
+        base_frame=base_frame,
+        match_input=MatchInput.ECHOES.value,
+        map_input=MapInput.MATCHED.value,
+        start_matching=True,
+    )
+    return values
+
+
+def replay_values(values: Mapping[str, Any]) -> Dict[str, Any]:
+    """Return plain keys of ReplayParameters of a mapping that may hold some of them by node, as live.yaml does.
+
+    Keys of the live nodes that a replay does not know are left out. Raises ParameterError for what a node would refuse.
+    """
+    plain = {key: value for key, value in values.items() if key not in NODES}
+    for name in NODES:
+        if name in values:
+            NODES[name].from_group(name, values[name])
+            plain.update(_common(values[name], name))
+    return plain
+
+
+def write_live(path: Path, parameters: ReplayParameters, odom_frame: str, base_frame: str) -> None:
+    """Write live.yaml whole or not at all; raises OSError."""
+    text = yaml.safe_dump(live_values(parameters, odom_frame, base_frame), sort_keys=False, allow_unicode=True)
+    write_whole(path, (_COMMENT + text).encode())
+
+
+def _common(values: Mapping[str, Any], node: str) -> Dict[str, Any]:
+    """Return those of `values` that both the node and a replay know by the same name and meaning."""
+    replayed = {field.name for field in fields(ReplayParameters)}
+    names = [field.name for field in fields(_SHARED[node]) if field.name in replayed]
+    return {name: values[name] for name in names if name in values}

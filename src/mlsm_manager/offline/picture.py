@@ -1,0 +1,62 @@
+"""A map as a picture: top view, to scale."""
+
+from dataclasses import dataclass
+from io import BytesIO
+from itertools import cycle
+from pathlib import Path
+from typing import Sequence
+
+import matplotlib as mpl
+
+mpl.use("Agg")
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.collections import PatchCollection
+from matplotlib.patches import Rectangle
+
+from mlsm_manager.surface_map.blocks import Blocks, BlockType
+from node_support.files import write_whole
+
+_COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
+_LINE_STYLES = ("-", "--", ":", "-.")
+
+
+@dataclass(frozen=True)
+class Path2d:
+    """A line in the top view: (n, 2) x y [m], its label and color."""
+
+    points: np.ndarray
+    label: str
+    color: str
+
+
+def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarray], paths: Sequence[Path2d]) -> None:
+    """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m] and paths."""
+    figure, axes = plt.subplots(figsize=(14, 8), dpi=110)
+    for index, outline in enumerate(outlines):
+        label = "walls as they are" if index == 0 else None
+        axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
+    _draw_blocks(axes, blocks)
+    for path, style in zip(paths, cycle(_LINE_STYLES)):
+        axes.plot(*path.points.T, style, color=path.color, linewidth=1.6, label=path.label, zorder=5)
+    axes.set_aspect("equal")
+    axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
+    axes.grid(True, color="#dddddd", linewidth=0.5, zorder=0)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncol=5, frameon=False)
+    axes.autoscale_view()
+    figure.tight_layout()
+    picture = BytesIO()
+    figure.savefig(picture, format="png", bbox_inches="tight")
+    plt.close(figure)
+    write_whole(file, picture.getvalue())
+
+
+def _draw_blocks(axes: plt.Axes, blocks: Blocks) -> None:
+    for kind, color in _COLORS.items():
+        if not np.any(blocks.type == kind):
+            continue
+        corners = blocks.centers[blocks.type == kind] - blocks.resolution / 2.0
+        cells = [Rectangle(tuple(corner), blocks.resolution, blocks.resolution) for corner in corners]
+        axes.add_collection(PatchCollection(cells, facecolor=color, edgecolor="none", zorder=2 + int(kind)))
+        label = f"{len(corners)} {kind.name.lower()} blocks"
+        axes.plot([], [], "s", color=color, label=label)

@@ -1,0 +1,94 @@
+"""What a bag holds, as the cores take it."""
+
+from dataclasses import dataclass, replace
+from typing import Iterator, List, Optional, Tuple
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan, Track
+from node_support.errors import RefusedInput
+from node_support.geometry.planar import composed, inverse, matrices
+from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.scans.polar_scan import PolarScan
+from sonar_processing.scans.revolution_collector import TurnCollector
+
+_BEFORE = 60.0
+_AFTER = 10.0
+
+
+class RecordingError(ValueError):
+    """A recording cannot be used; the text is one line that says which, why and what to do."""
+
+
+@dataclass(frozen=True)
+class Truth:
+    """Where the vehicle was by another instrument. times: (t,) s, increasing. positions: (t, 2) x y [m]."""
+
+    times: np.ndarray
+    positions: np.ndarray
+
+
+@dataclass(frozen=True)
+class Recording:
+    """beams: in the order of their stamps, placed in odom. unplaced: number of beams that tf could not place.
+
+    track: T_odom_base over the whole recording. seconds: its length.
+    """
+
+    beams: List[PlacedBeam]
+    unplaced: int
+    track: Track
+    truth: Optional[Truth]
+
+    def corrected(self, correction: BeamCorrection) -> "Recording":
+        """Return the recording with all beams corrected, each placed by the odometry at its new stamp.
+
+        Beams that the track does not reach then count as unplaced; depth and tilt of the others stay.
+        """
+        if correction == BeamCorrection():
+            return self
+        times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
+        later = times + correction.sonar_delay
+        reached = (later >= self.track.times[0]) & (later <= self.track.times[-1])
+        moves = matrices(composed(self.track.at(later), inverse(self.track.at(times))))
+        beams = [
+            PlacedBeam(correction.corrected(placed.beam), move @ placed.T_target_sonar, placed.is_moving)
+            for placed, move, kept in zip(self.beams, moves, reached)
+            if kept
+        ]
+        return replace(self, beams=beams, unplaced=self.unplaced + len(self.beams) - len(beams))
+
+    @property
+    def seconds(self) -> float:
+        """From the first to the last of what was recorded, s."""
+        return float(self.track.times[-1] - self.track.times[0])
+
+
+def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[Tuple[Scan, int]]:
+    """Yield one scan of echoes per turn of the head, with its number of beams.
+
+    Its track begins a minute before its end and reaches 10 s beyond, for stamps that are to be moved.
+    """
+    collector, extractor, cloud = TurnCollector(), EchoExtractor(echoes), SonarToCloudParameters()
+    for placed in recording.beams:
+        turn = collector.add(placed)
+        if turn is None:
+            continue
+        try:
+            found = extractor(PolarScan.of(turn).cloud(cloud))
+        except RefusedInput:
+            continue
+        end = found.stamp_ns * 1e-9
+        track = track_between(recording.track, end - _BEFORE, end + _AFTER)
+        yield Scan.from_stamps(found.points, found.time_stamps, end, track), len(turn)
+
+
+def track_between(track: Track, start: float, end: float) -> Track:
+    """Return the part of a track that covers `start` to `end`, as far as it reaches."""
+    first = max(int(np.searchsorted(track.times, start, side="right")) - 1, 0)
+    last = min(int(np.searchsorted(track.times, end)) + 1, len(track.times))
+    return Track(track.times[first:last], track.poses[first:last])

@@ -1,0 +1,77 @@
+"""What map_bag leaves in its folder."""
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Dict, List, Optional
+
+import numpy as np
+
+from mlsm_manager.offline.evaluation import aligned_truth, position_error
+from mlsm_manager.offline.picture import Path2d, draw_map
+from mlsm_manager.offline.recording import Recording
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.storage import write_ply
+from node_support.files import write_whole
+from node_support.geometry.planar import wrapped
+
+ODOMETRY = "dead_reckoning"
+CORRECTED = "corrected"
+REFINED = "refined"
+_LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
+_COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
+_COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
+_TRUTH_COLOR = "#111111"
+
+
+@dataclass(frozen=True)
+class Run:
+    """times: (m,) s. poses: name -> (m, 3) x y yaw. blocks: of the final map. counts: what goes into the summary."""
+
+    times: np.ndarray
+    poses: Dict[str, np.ndarray]
+    blocks: Blocks
+    counts: Dict[str, Any]
+
+
+def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
+    """Write map.ply, map.png and trajectory.csv, each whole or not at all; raises OSError."""
+    write_ply(folder / "map.ply", run.blocks)
+    write_whole(folder / "trajectory.csv", trajectory_csv(run).encode("ascii"))
+    draw_map(folder / "map.png", name, run.blocks, [], _paths(run, recording))
+
+
+def write_summary(folder: Path, summary: Dict[str, Any]) -> None:
+    """Write summary.json whole or not at all; raises OSError."""
+    write_whole(folder / "summary.json", (json.dumps(summary, indent=2) + "\n").encode("ascii"))
+
+
+def errors_of(run: Run, recording: Recording) -> Dict[str, Dict[str, float]]:
+    """Return the error of every trajectory of the run; nothing without a truth. Raises RecordingError."""
+    if recording.truth is None:
+        return {}
+    return {name: position_error(run.times, poses, recording.truth).to_mapping() for name, poses in run.poses.items()}
+
+
+def trajectory_csv(run: Run) -> str:
+    """Return the table of all trajectories: time [s], then x y [m] and yaw [rad] of each."""
+    header = ["time"] + [f"{_COLUMNS[name]}_{axis}" for name in run.poses for axis in ("x", "y", "yaw")]
+    columns: List[np.ndarray] = [run.times[:, np.newaxis]]
+    for poses in run.poses.values():
+        columns += [poses[:, :2], wrapped(poses[:, 2:])]
+    rows = np.concatenate(columns, axis=1)
+    lines = [",".join([f"{row[0]:.6f}", *(f"{value:.4f}" for value in row[1:])]) for row in rows]
+    return "\n".join([",".join(header), *lines]) + "\n"
+
+
+def _paths(run: Run, recording: Recording) -> List[Path2d]:
+    paths = [Path2d(poses[:, :2], _LABELS[name], _COLORS[name]) for name, poses in run.poses.items()]
+    truth = _truth_path(run, recording)
+    return paths if truth is None else [*paths, truth]
+
+
+def _truth_path(run: Run, recording: Recording) -> Optional[Path2d]:
+    if recording.truth is None:
+        return None
+    positions = aligned_truth(run.times, run.poses[ODOMETRY], recording.truth)
+    return Path2d(positions, "truth", _TRUTH_COLOR)

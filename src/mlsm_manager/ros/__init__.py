@@ -1,0 +1,1 @@
+"""Nodes, topics, bags and services of the map."""

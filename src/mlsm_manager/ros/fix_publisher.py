@@ -1,0 +1,56 @@
+"""Publishes the position fix of a matched scan, which a filter such as robot_localization can fuse, and the path."""
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from nav_msgs.msg import Odometry, Path
+
+from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.problem.scan_path import POSE
+from node_support.ros.conversions import pose_from_matrix
+from sonar_processing.ros.conversions import header
+
+_UNKNOWN_VARIANCE = 1e6
+_ROS_AXES = np.array([0, 1, 5])
+_LONGEST_PATH = 20000
+
+
+class FixPublisher:
+    """Publishes /MLSM/pose, /MLSM/odometry and /MLSM/path; z, roll and pitch are those of tf and have no certainty."""
+
+    def __init__(self, map_frame: str, base_frame: str) -> None:
+        self._map_frame = map_frame
+        self._base_frame = base_frame
+        self._pose = rospy.Publisher("MLSM/pose", PoseWithCovarianceStamped, queue_size=10)
+        self._odometry = rospy.Publisher("MLSM/odometry", Odometry, queue_size=10)
+        self._path = rospy.Publisher("MLSM/path", Path, queue_size=2, latch=True)
+        self._way = Path()
+
+    def clear(self) -> None:
+        """Begin a new path."""
+        self._way = Path()
+
+    def publish(self, result: MatchResult, T_map_base: np.ndarray, stamp_ns: int) -> None:
+        """Send the fix of a match; `T_map_base` is the matched pose with z, roll and pitch, (4, 4)."""
+        fix = PoseWithCovarianceStamped(header=header(stamp_ns, self._map_frame))
+        fix.pose.pose = pose_from_matrix(T_map_base)
+        fix.pose.covariance = _covariance(result.covariance[POSE, POSE])
+        self._pose.publish(fix)
+        odometry = Odometry(header=fix.header, child_frame_id=self._base_frame, pose=fix.pose)
+        twist = odometry.twist.twist
+        twist.linear.x, twist.linear.y, twist.angular.z = result.velocity
+        odometry.twist.covariance = _covariance(result.covariance[3:, 3:])
+        self._odometry.publish(odometry)
+        self._extend(PoseStamped(header=fix.header, pose=fix.pose.pose))
+
+    def _extend(self, pose: PoseStamped) -> None:
+        self._way.header = pose.header
+        self._way.poses = [*self._way.poses[-_LONGEST_PATH:], pose]
+        self._path.publish(self._way)
+
+
+def _covariance(planar: np.ndarray) -> list:
+    """Return the 36 entries of a message whose x, y and yaw have the covariance `planar` (3, 3)."""
+    full = np.diag(np.full(6, _UNKNOWN_VARIANCE))
+    full[np.ix_(_ROS_AXES, _ROS_AXES)] = planar
+    return full.ravel().tolist()

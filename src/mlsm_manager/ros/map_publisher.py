@@ -1,0 +1,28 @@
+"""Shows the map: block markers and block means, latched, so that a late subscriber sees all of it."""
+
+import numpy as np
+import rospy
+from sensor_msgs.msg import PointCloud2
+from visualization_msgs.msg import MarkerArray
+
+from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.surface_map.blocks import Blocks
+from sonar_processing.ros.conversions import header, point_cloud
+
+CLOUD_FIELDS = ("x", "y", "z", "intensity", "height", "depth", "count")
+
+
+class MapPublisher:
+    """Publishes /MLSM/Markers and /MLSM/cloud."""
+
+    def __init__(self, map_frame: str) -> None:
+        self._map_frame = map_frame
+        self._block_markers = BlockMarkers()
+        self._markers = rospy.Publisher("MLSM/Markers", MarkerArray, queue_size=2, latch=True)
+        self._cloud = rospy.Publisher("MLSM/cloud", PointCloud2, queue_size=2, latch=True)
+
+    def publish(self, blocks: Blocks, stamp_ns: int) -> None:
+        """Send the whole map."""
+        self._markers.publish(self._block_markers.array(blocks, header(0, self._map_frame)))
+        rows = np.column_stack([blocks.mean, blocks.height, blocks.depth, blocks.count])
+        self._cloud.publish(point_cloud(rows, stamp_ns, self._map_frame, fields=CLOUD_FIELDS))

@@ -1,0 +1,69 @@
+"""Maps as PLY files: every block one vertex with all it holds, readable by any point cloud tool."""
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks
+from node_support.files import write_whole
+
+_FIELDS = (
+    ("x", "f8"), ("y", "f8"), ("z", "f8"), ("intensity", "f8"),
+    ("variance_x", "f8"), ("variance_y", "f8"), ("variance_z", "f8"), ("variance_intensity", "f8"),
+    ("bottom", "f8"), ("height", "f8"), ("count", "u4"), ("type", "u1"),
+)  # fmt: skip
+_PLY_TYPES = {"f8": "double", "u4": "uint", "u1": "uchar"}
+_ROW = np.dtype([(name, f"<{kind}") for name, kind in _FIELDS])
+_HEADER = re.compile(
+    rb"ply\nformat binary_little_endian 1\.0\ncomment multi level surface map, resolution (?P<resolution>\S+) m\n"
+    rb"element vertex (?P<count>\d+)\n(?P<properties>(?:property .*\n)*)end_header\n"
+)
+
+
+def map_path(folder: str, name: str) -> Path:
+    """Return where the map `name` is kept in `folder`; raises ValueError for a name that would leave the folder."""
+    if not name or name.startswith(".") or Path(name).name != name or "\0" in name:
+        raise ValueError(f"name {name!r}: must be a plain file name without a path and not start with a dot")
+    return Path(folder).expanduser() / (name if name.endswith(".ply") else f"{name}.ply")
+
+
+def write_ply(path: Path, blocks: Blocks) -> None:
+    """Write the blocks whole or not at all; raises OSError when the folder cannot be written."""
+    write_whole(path, _header(blocks).encode("ascii") + _vertices(blocks).tobytes())
+
+
+def read_ply(path: Path) -> Blocks:
+    """Return the blocks of a file that `write_ply` wrote; raises ValueError, naming the path, for any other."""
+    data = path.read_bytes()
+    match = _HEADER.match(data)
+    if match is None:
+        raise ValueError(f"{path}: not a map of this package")
+    resolution, count = float(match.group("resolution")), int(match.group("count"))
+    body = data[match.end() :]
+    if match.group("properties") != _properties().encode("ascii") or len(body) != count * _ROW.itemsize:
+        raise ValueError(f"{path}: a map of another version, or cut short")
+    vertices = np.frombuffer(body, dtype=_ROW)
+    rows = np.empty((count, ROW_WIDTH))
+    for index, axis in enumerate(("x", "y", "z", "intensity")):
+        rows[:, MEAN.start + index] = vertices[axis]
+        rows[:, SQUARES.start + index] = vertices[f"variance_{axis}"] * vertices["count"]
+    rows[:, COUNT], rows[:, BOTTOM], rows[:, TOP] = vertices["count"], vertices["bottom"], vertices["height"]
+    return Blocks(rows, resolution)
+
+
+def _header(blocks: Blocks) -> str:
+    comment = f"comment multi level surface map, resolution {blocks.resolution!r} m\n"
+    return f"ply\nformat binary_little_endian 1.0\n{comment}element vertex {len(blocks)}\n{_properties()}end_header\n"
+
+
+def _properties() -> str:
+    return "".join(f"property {_PLY_TYPES[kind]} {name}\n" for name, kind in _FIELDS)
+
+
+def _vertices(blocks: Blocks) -> np.ndarray:
+    columns = [*blocks.mean.T, *blocks.variance.T, blocks.bottom, blocks.height, blocks.count, blocks.type]
+    vertices = np.empty(len(blocks), dtype=_ROW)
+    for (name, _), column in zip(_FIELDS, columns):
+        vertices[name] = column
+    return vertices

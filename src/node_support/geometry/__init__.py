@@ -1,0 +1,1 @@
+"""Planar and spatial poses as arrays."""

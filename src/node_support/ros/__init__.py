@@ -1,0 +1,1 @@
+"""What every node shares: start, guarded callbacks, diagnostics, reconfiguration, conversions."""

@@ -1,0 +1,35 @@
+"""Transforms as 4 x 4 matrices."""
+
+import numpy as np
+from geometry_msgs.msg import Pose, Transform
+from scipy.spatial.transform import Rotation
+
+from node_support.errors import RefusedInput
+
+
+def matrix_from_message(transform: Transform) -> np.ndarray:
+    """Return the (4, 4) matrix of a transform; raises RefusedInput when it is not finite or no rotation."""
+    rotation, shift = transform.rotation, transform.translation
+    quaternion = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
+    translation = np.array([shift.x, shift.y, shift.z])
+    norm = np.linalg.norm(quaternion)
+    if not (np.isfinite(translation).all() and 0.5 < norm < 2.0):
+        raise RefusedInput("transforms refused", f"translation {translation}, quaternion {quaternion}")
+    x, y, z, w = quaternion / norm
+    matrix = np.eye(4)
+    matrix[:3, :3] = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def pose_from_matrix(matrix: np.ndarray) -> Pose:
+    """Return the pose message of a (4, 4) matrix."""
+    pose = Pose()
+    pose.position.x, pose.position.y, pose.position.z = matrix[:3, 3]
+    quaternion = Rotation.from_matrix(matrix[:3, :3]).as_quat()
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = quaternion
+    return pose

@@ -1,0 +1,115 @@
+"""The start, the guarded callbacks and the diagnostics that all nodes share."""
+
+import sys
+import threading
+import time
+import traceback
+from typing import Any, Callable, List
+
+import rospy
+from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+
+from node_support.errors import RefusedInput
+from node_support.health import Health
+from node_support.parameters import ParameterError
+
+DIAGNOSTICS_PERIOD = 1.0
+_SPIN_STEP = 0.05
+
+
+class StartError(Exception):
+    """The node cannot start for a reason that the user must cure; the text is one line for the user."""
+
+
+def run(name: str, construct: Callable[[], Any]) -> None:
+    """Initialise the node, construct it and spin until Ctrl-C.
+
+    ParameterError and StartError end it with one line and status 1.
+    """
+    rospy.init_node(name)
+    try:
+        node = construct()
+    except (ParameterError, StartError) as error:
+        rospy.logfatal("%s: %s", rospy.get_name(), error)
+        sys.exit(1)
+    except rospy.ROSInterruptException:
+        return
+    _spin()
+    del node
+
+
+def _spin() -> None:
+    """Wait for the end; rospy.spin notices it up to half a second late, and roslaunch ends nodes one by one.
+
+    No threading.Event: the handler of Ctrl-C runs in this thread too, and would wait for ever for the Event's lock when
+    it comes while this thread holds it.
+    """
+    while not rospy.is_shutdown():
+        time.sleep(_SPIN_STEP)
+
+
+def make_health(name: str) -> Health:
+    """Return a Health whose warnings go to the node's log."""
+    return Health(name, lambda line: rospy.logwarn("%s", line))
+
+
+def guarded(health: Health, callback: Callable[..., None]) -> Callable[..., None]:
+    """Wrap a callback so that no message can end or silence the node: what is refused or fails is counted and said."""
+
+    def call(*arguments: Any) -> None:
+        try:
+            callback(*arguments)
+        except RefusedInput as refused:
+            health.problem(refused.kind, str(refused))
+        except rospy.ROSInterruptException:
+            pass
+        except Exception as error:
+            if rospy.core.is_shutdown_requested():
+                return
+            health.problem("internal errors", f"{type(error).__name__}: {error}; please report this")
+            rospy.logerr_throttle(10.0, traceback.format_exc())
+
+    return call
+
+
+def every(period: float, callback: Callable[[], None], health: Health) -> threading.Thread:
+    """Call back every `period` seconds of wall time until shutdown.
+
+    Wall time, because diagnostics and displays must go on while a simulated clock stands still or jumps.
+    """
+    call = guarded(health, callback)
+
+    def loop() -> None:
+        next_call = time.monotonic()
+        while not rospy.core.is_shutdown_requested():
+            next_call = max(next_call + period, time.monotonic())
+            while not rospy.core.is_shutdown_requested() and time.monotonic() < next_call:
+                time.sleep(min(0.1, max(next_call - time.monotonic(), 0.0)))
+            call()
+
+    thread = threading.Thread(target=loop, daemon=True)
+    thread.start()
+    return thread
+
+
+class DiagnosticsPublisher:
+    """Publishes the reports of a process's stages on /diagnostics once a second."""
+
+    def __init__(self, healths: List[Health]) -> None:
+        self._healths = healths
+        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
+        every(DIAGNOSTICS_PERIOD, self._publish, healths[0])
+
+    def _publish(self) -> None:
+        array = DiagnosticArray()
+        array.header.stamp = rospy.Time.now()
+        array.status = [_status(health) for health in self._healths]
+        self._publisher.publish(array)
+
+
+def _status(health: Health) -> DiagnosticStatus:
+    report = health.report()
+    values = [KeyValue(key=key, value=value) for key, value in report.values.items()]
+    return DiagnosticStatus(
+        level=int(report.level), name=health.name, message=report.text, hardware_id="none", values=values
+    )

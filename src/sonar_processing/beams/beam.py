@@ -1,0 +1,46 @@
+"""One beam of a mechanically scanned sonar."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from node_support.errors import RefusedInput
+
+MAX_BINS = 4096
+
+
+@dataclass(frozen=True)
+class Beam:
+    """Echo strengths along one direction of the head. Raises RefusedInput when they cannot be placed in space.
+
+    stamp_ns: when the ping left, nanoseconds; the only time that is not in seconds, because tf compares it exactly.
+    angle: of the head, rad, counter-clockwise about +z of `frame_id` from +x.
+    intensities: (bins,) uint8; bin i holds the echoes from i to i + 1 times `range_resolution` metres.
+    sensor_angle: tilt of the sonar's servo, rad.
+    """
+
+    stamp_ns: int
+    frame_id: str
+    angle: float
+    intensities: np.ndarray
+    range_resolution: float
+    sensor_angle: float = 0.0
+
+    def __post_init__(self) -> None:
+        if self.stamp_ns < 0:
+            raise RefusedInput("beams refused", f"stamp {self.stamp_ns * 1e-9:.3f} s, below 0; check sonar_delay")
+        bins = self.intensities.size
+        if not 1 <= bins <= MAX_BINS:
+            raise RefusedInput("beams refused", f"{bins} bins, must be 1 to {MAX_BINS}; check the driver")
+        if not (math.isfinite(self.range_resolution) and self.range_resolution > 0.0):
+            raise RefusedInput("beams refused", f"range_resolution {self.range_resolution}, must be above 0 m")
+        if not (math.isfinite(self.angle) and math.isfinite(self.sensor_angle)):
+            raise RefusedInput("beams refused", f"head at {self.angle} rad, servo at {self.sensor_angle} rad")
+        if not self.frame_id:
+            raise RefusedInput("beams refused", "frame_id is empty; set the driver's frame")
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """(bins,) distance of each bin's centre, m."""
+        return (np.arange(self.intensities.size) + 0.5) * self.range_resolution

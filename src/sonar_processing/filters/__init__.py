@@ -1,0 +1,1 @@
+"""Stages that take a cloud and return a cloud."""

@@ -1,0 +1,63 @@
+"""The table of stages: a stage takes a cloud and returns a cloud. A new filter is one line here."""
+
+from dataclasses import dataclass, field
+from typing import Any, Callable, Dict, Mapping, Optional, Type
+
+from node_support.parameters import ParameterSet
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+
+Stage = Callable[[IntensityCloud], IntensityCloud]
+SCAN_TOPIC = "sonar/scan/sonarCloud"
+POLAR_TOPIC = "sonar/scan/polar"
+
+
+@dataclass(frozen=True)
+class StageType:
+    """What is known of a stage before it runs. Topics are relative to the node's namespace.
+
+    figures: what else the stage tells of its newest cloud; each is published as Float32 on ~name and shown in
+    /diagnostics, unless it is None.
+    """
+
+    parameters: Type[ParameterSet]
+    build: Callable[[ParameterSet], Stage]
+    config_name: str
+    input_topic: str
+    output_topic: str
+    figures: Mapping[str, Callable[[Any], Optional[float]]] = field(default_factory=dict)
+
+    @property
+    def takes_polar_scans(self) -> bool:
+        """Whether the stage works on whole polar scans, beside the chain of clouds."""
+        return self.input_topic == POLAR_TOPIC
+
+
+STAGES: Dict[str, StageType] = {
+    "thresholder": StageType(
+        ThresholderParameters,
+        Thresholder,
+        "Thresholder",
+        SCAN_TOPIC,
+        "sonar/scan/thresholded",
+        {"threshold": lambda stage: stage.newest_threshold},
+    ),
+    "outlier_remover": StageType(
+        OutlierRemoverParameters,
+        OutlierRemover,
+        "OutlierRemover",
+        "sonar/scan/thresholded",
+        "sonar/scan/cleaned",
+    ),
+    "echo_extractor": StageType(
+        EchoExtractorParameters,
+        EchoExtractor,
+        "EchoExtractor",
+        POLAR_TOPIC,
+        "sonar/scan/echoes",
+        {"threshold": lambda stage: stage.newest_threshold},
+    ),
+}

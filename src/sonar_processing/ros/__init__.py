@@ -1,0 +1,1 @@
+"""Nodes, topics and messages of the processing."""

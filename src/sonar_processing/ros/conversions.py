@@ -1,0 +1,147 @@
+"""Messages to arrays and back, by the buffer and never point by point."""
+
+import math
+from functools import lru_cache
+from typing import List, Optional, Sequence, Tuple
+
+import genpy
+import numpy as np
+from rospy.numpy_msg import numpy_msg
+from sensor_msgs.msg import LaserScan, PointCloud2, PointField
+from std_msgs.msg import Header
+
+from node_support.errors import RefusedInput
+from sonar_processing.beams.beam import Beam
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.scans.laser_scan import LaserTurn
+from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
+
+StampedIntensityCloudArrays = numpy_msg(StampedIntensityCloud)
+"""StampedIntensityCloud whose time stamps are a numpy array, as subscribers and publishers here use it."""
+
+LaserScanArrays = numpy_msg(LaserScan)
+"""LaserScan whose ranges and intensities are numpy arrays."""
+
+POINT_FIELDS = ("x", "y", "z", "intensity")
+_FLOAT_BYTES = 4
+
+
+def header(stamp_ns: int, frame_id: str) -> Header:
+    """Return a header with an exact stamp."""
+    return Header(stamp=genpy.Time(*divmod(int(stamp_ns), 10**9)), frame_id=frame_id)
+
+
+def beam_from_message(message: SonarScanLine) -> Beam:
+    """Return the beam of a SonarScanLine; raises RefusedInput for one that cannot be used."""
+    if not message.maxrange_meters > 0.0:
+        raise RefusedInput("beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m")
+    return Beam(
+        stamp_ns=message.header.stamp.to_nsec(),
+        frame_id=message.header.frame_id,
+        angle=message.angle,
+        intensities=np.frombuffer(bytes(message.intensities), dtype=np.uint8),
+        range_resolution=message.range_resolution,
+        sensor_angle=message.sensorAngle,
+    )
+
+
+def cloud_from_message(message: StampedIntensityCloud) -> IntensityCloud:
+    """Return the cloud of a StampedIntensityCloud; raises RefusedInput for one that cannot be used.
+
+    A cloud of one row that says it may hold points that are not finite is organised: a single beam.
+    """
+    return IntensityCloud(
+        points=points_from_message(message.cloud),
+        time_stamps=np.asarray(message.timeStamps, dtype=np.float64),
+        stamp_ns=message.header.stamp.to_nsec(),
+        frame_id=message.header.frame_id,
+        height=max(message.cloud.height, 1),
+        organized=not message.cloud.is_dense,
+    )
+
+
+def points_from_message(message: PointCloud2) -> np.ndarray:
+    """Return (n, 4) float32 x y z intensity; raises RefusedInput when fields are missing or the data is too short."""
+    offsets = {f.name: f.offset for f in message.fields if f.datatype == PointField.FLOAT32 and f.count <= 1}
+    missing = [name for name in POINT_FIELDS if name not in offsets]
+    if missing:
+        raise RefusedInput("clouds refused", f"no float32 field {', '.join(missing)}")
+    count, step = message.width * message.height, message.point_step
+    if (
+        message.is_bigendian
+        or step < max(offsets[name] for name in POINT_FIELDS) + 4
+        or len(message.data) != count * step
+    ):
+        raise RefusedInput("clouds refused", f"{len(message.data)} bytes for {count} points of {step} bytes")
+    if [offsets[name] for name in POINT_FIELDS] == [0, 4, 8, 12] and step == 16:
+        return np.frombuffer(message.data, dtype=np.float32).reshape(-1, 4)
+    row = np.dtype(
+        {
+            "names": POINT_FIELDS,
+            "formats": ["<f4"] * 4,
+            "offsets": [offsets[n] for n in POINT_FIELDS],
+            "itemsize": step,
+        }
+    )
+    rows = np.frombuffer(message.data, dtype=row)
+    return np.column_stack([rows[name] for name in POINT_FIELDS])
+
+
+def point_cloud(
+    points: np.ndarray, stamp_ns: int, frame_id: str, height: int = 1, fields: Sequence[str] = POINT_FIELDS
+) -> PointCloud2:
+    """Return a PointCloud2 of (n, len(fields)) points, every field a float32."""
+    width = len(points) // height
+    step = _FLOAT_BYTES * len(fields)
+    return PointCloud2(
+        header=header(stamp_ns, frame_id),
+        height=height,
+        width=width,
+        fields=_point_fields(tuple(fields)),
+        is_bigendian=False,
+        point_step=step,
+        row_step=step * width,
+        data=np.ascontiguousarray(points, dtype="<f4").tobytes(),
+        is_dense=bool(np.isfinite(points).all()),
+    )
+
+
+def cloud_to_message(cloud: IntensityCloud, points: Optional[PointCloud2] = None) -> StampedIntensityCloud:
+    """Return the StampedIntensityCloud of a cloud; `points` is its PointCloud2 where that exists already."""
+    return StampedIntensityCloudArrays(
+        header=header(cloud.stamp_ns, cloud.frame_id),
+        cloud=points or points_to_message(cloud),
+        timeStamps=np.ascontiguousarray(cloud.time_stamps, dtype="<f8"),
+    )
+
+
+def points_to_message(cloud: IntensityCloud) -> PointCloud2:
+    """Return the PointCloud2 of a cloud; an organised one says that it may hold points that are not finite."""
+    message = point_cloud(cloud.points, cloud.stamp_ns, cloud.frame_id, cloud.height)
+    message.is_dense = message.is_dense and not cloud.is_organized
+    return message
+
+
+def laser_scan_message(turn: LaserTurn, stamp_ns: int, frame_id: str) -> LaserScan:
+    """Return a turn as LaserScan: all rays hold at `stamp_ns`, so there is no time between them."""
+    increment = turn.angle_increment
+    return LaserScanArrays(
+        header=header(stamp_ns, frame_id),
+        angle_min=-math.pi,
+        angle_max=-math.pi + (turn.ranges.size - 1) * increment,
+        angle_increment=increment,
+        time_increment=0.0,
+        scan_time=turn.duration,
+        range_min=turn.range_min,
+        range_max=turn.range_max,
+        ranges=turn.ranges,
+        intensities=turn.intensities,
+    )
+
+
+@lru_cache(maxsize=None)
+def _point_fields(names: Tuple[str, ...]) -> List[PointField]:
+    return [
+        PointField(name=name, offset=_FLOAT_BYTES * index, datatype=PointField.FLOAT32, count=1)
+        for index, name in enumerate(names)
+    ]

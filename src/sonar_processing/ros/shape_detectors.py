@@ -1,0 +1,114 @@
+"""The ROS side of line_detector and circle_detector: clouds in, shapes and markers out (thesis 6.5.5)."""
+
+from abc import ABC, abstractmethod
+from typing import Any, Sequence, Tuple
+
+import numpy as np
+import rospy
+from visualization_msgs.msg import MarkerArray
+
+from node_support.errors import RefusedInput
+from node_support.ros.node import guarded, make_health
+from node_support.ros.reconfigurable_parameters import LiveParameters
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.ros.cloud_publisher import PointsPublisher
+from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
+from sonar_processing.ros.sonar_places import SonarPlaces
+from sonar_processing.ros.stage_runner import subscribe_to_clouds
+from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
+from sonar_processing.shapes.ransac import RansacParameters
+from underwater_map_construction.msg import Circles, Walls
+
+INPUT_TOPIC = "sonar/scan/cleaned"
+QUEUE_SIZE = 10
+
+
+class ShapeDetectorNode(ABC):
+    """What both detectors share; `_detect` finds the shapes of a scan and says how they are shown."""
+
+    name: str
+    topic: str
+    what: str
+    config_name: str
+    parameters: type
+    message: type
+
+    def __init__(self) -> None:
+        """Raises ParameterError for a bad parameter."""
+        self.health = make_health(self.name)
+        self._live = LiveParameters(self.parameters, "~", self.config_name, self.health, self._use_parameters)
+        self._places = SonarPlaces(self._live.current.sonar_frame)
+        self._inliers = PointsPublisher(self.topic)
+        self._coefficients = rospy.Publisher(f"{self.topic}/coefficients", self.message, queue_size=QUEUE_SIZE)
+        self._markers = rospy.Publisher(f"{self.topic}/markers", MarkerArray, queue_size=QUEUE_SIZE)
+        subscribe_to_clouds(INPUT_TOPIC, guarded(self.health, self._take))
+
+    @abstractmethod
+    def _use_parameters(self, parameters: RansacParameters) -> None:
+        """Make the detector anew."""
+
+    @abstractmethod
+    def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Any, MarkerArray]:
+        """Return the shapes of a scan, the message that holds them, and how rviz shows them."""
+
+    def _take(self, message: StampedIntensityCloudArrays) -> None:
+        cloud = cloud_from_message(message)
+        self.health.count("clouds in")
+        self.health.count("points in", len(cloud))
+        if cloud.broken:
+            self.health.problem(
+                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
+            )
+        self._places.use_time(cloud.stamp_ns * 1e-9)
+        with self.health.timed():
+            shapes, coefficients, markers = self._detect(cloud)
+        self.health.count(f"{self.what} out", len(shapes))
+        self._coefficients.publish(coefficients)
+        self._markers.publish(markers)
+        self._inliers.publish(_part(cloud, shapes))
+
+
+class LineDetectorNode(ShapeDetectorNode):
+    """line_detector."""
+
+    name, topic, what, config_name = "line_detector", "sonar/scan/line", "walls", "LineDetector"
+    parameters, message = LineDetectorParameters, Walls
+
+    def _use_parameters(self, parameters: LineDetectorParameters) -> None:
+        self._detector = LineDetector(parameters)
+
+    def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Walls, MarkerArray]:
+        lines = self._detector(cloud)
+        walls = walls_message(cloud, lines, self._sonar(cloud))
+        return lines, walls, wall_markers(walls)
+
+    def _sonar(self, cloud: IntensityCloud) -> np.ndarray:
+        try:
+            return self._places.at(cloud.frame_id, np.array([cloud.stamp_ns * 1e-9]))[0]
+        except RefusedInput as refused:
+            self.health.problem(refused.kind, str(refused))
+            return np.full(2, np.nan)
+
+
+class CircleDetectorNode(ShapeDetectorNode):
+    """circle_detector."""
+
+    name, topic, what, config_name = "circle_detector", "sonar/scan/circle", "circles", "CircleDetector"
+    parameters, message = CircleDetectorParameters, Circles
+
+    def _use_parameters(self, parameters: CircleDetectorParameters) -> None:
+        self._detector = CircleDetector(parameters)
+
+    def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Circles, MarkerArray]:
+        circles = self._detector(cloud, lambda times: self._places.at(cloud.frame_id, times))
+        message = circles_message(cloud, circles)
+        return circles, message, circle_markers(message)
+
+
+def _part(cloud: IntensityCloud, shapes: Sequence[Any]) -> IntensityCloud:
+    members = np.concatenate([np.zeros(0, dtype=np.int64), *(shape.members for shape in shapes)])
+    keep = np.zeros(len(cloud), dtype=bool)
+    keep[members] = True
+    return cloud.select(keep)

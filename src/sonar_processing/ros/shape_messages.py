@@ -1,0 +1,110 @@
+"""Walls and circles as messages and as markers for rviz."""
+
+import math
+from typing import Sequence
+
+import numpy as np
+from geometry_msgs.msg import Point, Quaternion, Vector3
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.ros.conversions import header
+from sonar_processing.shapes.circles import Circle
+from sonar_processing.shapes.lines import Line
+from underwater_map_construction import msg
+
+WALL_COLOR = ColorRGBA(r=1.0, g=0.25, b=0.75, a=1.0)
+CIRCLE_COLOR = ColorRGBA(r=0.2, g=1.0, b=0.45, a=0.8)
+_LINE_WIDTH = 0.25
+_TEXT_HEIGHT = 2.5
+_LEAST_HEIGHT = 0.5
+
+
+def walls_message(cloud: IntensityCloud, lines: Sequence[Line], sonar: np.ndarray) -> msg.Walls:
+    """Return the walls of a scan; `sonar` (2,) x y [m] in the cloud's frame, NaN when unknown."""
+    message = msg.Walls(header=header(cloud.stamp_ns, cloud.frame_id))
+    message.walls = [_wall(cloud, line, sonar) for line in lines]
+    return message
+
+
+def circles_message(cloud: IntensityCloud, circles: Sequence[Circle]) -> msg.Circles:
+    """Return the circles of a scan."""
+    message = msg.Circles(header=header(cloud.stamp_ns, cloud.frame_id))
+    message.circles = [_circle(cloud, circle) for circle in circles]
+    return message
+
+
+def wall_markers(message: msg.Walls) -> MarkerArray:
+    """Return a line on each wall, from end to end, and its distance from the sonar; older markers go."""
+    markers = [_cleared(message.header)]
+    for number, wall in enumerate(message.walls):
+        line = _marker(message.header, "walls", number, Marker.LINE_STRIP, WALL_COLOR)
+        line.points = [wall.start, wall.end]
+        line.scale = Vector3(_LINE_WIDTH, 0.0, 0.0)
+        markers.append(line)
+        if math.isfinite(wall.sonar_distance):
+            middle = Point(*((_array(wall.start) + _array(wall.end)) / 2.0))
+            markers.append(_text(message.header, "wall distances", number, middle, f"{wall.sonar_distance:.1f} m"))
+    return MarkerArray(markers=markers)
+
+
+def circle_markers(message: msg.Circles) -> MarkerArray:
+    """Return a cylinder for each circle; older markers go."""
+    markers = [_cleared(message.header)]
+    for number, circle in enumerate(message.circles):
+        cylinder = _marker(message.header, "circles", number, Marker.CYLINDER, CIRCLE_COLOR)
+        cylinder.pose.position = circle.center
+        cylinder.scale = Vector3(2.0 * circle.radius, 2.0 * circle.radius, _LEAST_HEIGHT)
+        markers.append(cylinder)
+    return MarkerArray(markers=markers)
+
+
+def _wall(cloud: IntensityCloud, line: Line, sonar: np.ndarray) -> msg.Wall:
+    z = _middle_height(cloud, line.members)
+    return msg.Wall(
+        orientation=line.orientation,
+        distance=line.offset,
+        sonar_distance=line.distance_from(sonar),
+        start=Point(*line.ends[0], z),
+        end=Point(*line.ends[1], z),
+        inliers=len(line.members),
+        echoes=line.echoes,
+        residual=line.residual,
+    )
+
+
+def _circle(cloud: IntensityCloud, circle: Circle) -> msg.Circle:
+    return msg.Circle(
+        center=Point(*circle.center, _middle_height(cloud, circle.members)),
+        radius=circle.radius,
+        inliers=len(circle.members),
+        echoes=circle.echoes,
+        residual=circle.residual,
+    )
+
+
+def _middle_height(cloud: IntensityCloud, members: np.ndarray) -> float:
+    return float(np.mean(cloud.points[members, 2], dtype=np.float64))
+
+
+def _array(point: Point) -> np.ndarray:
+    return np.array([point.x, point.y, point.z])
+
+
+def _cleared(head: Header) -> Marker:
+    return Marker(header=head, action=Marker.DELETEALL)
+
+
+def _marker(head: Header, namespace: str, number: int, kind: int, color: ColorRGBA) -> Marker:
+    marker = Marker(header=head, ns=namespace, id=number, type=kind, action=Marker.ADD, color=color)
+    marker.pose.orientation = Quaternion(w=1.0)
+    return marker
+
+
+def _text(head: Header, namespace: str, number: int, place: Point, text: str) -> Marker:
+    marker = _marker(head, namespace, number, Marker.TEXT_VIEW_FACING, WALL_COLOR)
+    marker.pose.position = Point(place.x, place.y, place.z + _TEXT_HEIGHT)
+    marker.scale = Vector3(0.0, 0.0, _TEXT_HEIGHT)
+    marker.text = text
+    return marker

@@ -1,0 +1,89 @@
+"""The ROS side of sonar_image: the newest beam drawn into an image, while somebody looks at it."""
+
+import threading
+import time
+from typing import Optional
+
+import numpy as np
+import rospy
+from sensor_msgs.msg import CameraInfo, Image
+
+from node_support.ros.node import guarded, make_health
+from node_support.ros.reconfigurable_parameters import LiveParameters
+from sonar_processing.beams.beam import Beam
+from sonar_processing.ros.beam_subscriber import subscribe_to_beams
+from sonar_processing.ros.conversions import beam_from_message, header
+from sonar_processing.scans.image import PolarImage, SonarImageParameters
+from underwater_map_construction.msg import SonarScanLine
+
+IMAGE_TOPIC = "sonar/image"
+CAMERA_INFO_TOPIC = "sonar/camera_info"
+QUEUE_SIZE = 2
+
+
+class SonarImage(rospy.SubscribeListener):
+    """Listens to the beams only while the image is subscribed to."""
+
+    def __init__(self, namespace: str = "~") -> None:
+        """Raises ParameterError for a bad parameter in `namespace`."""
+        super().__init__()
+        self.health = make_health("sonar_image")
+        self._lock = threading.Lock()
+        self._beams: Optional[rospy.Subscriber] = None
+        self._next_image = 0.0
+        self._live = LiveParameters(SonarImageParameters, namespace, "SonarImage", self.health, self._use_parameters)
+        self._infos = rospy.Publisher(CAMERA_INFO_TOPIC, CameraInfo, queue_size=QUEUE_SIZE)
+        self._images = rospy.Publisher(IMAGE_TOPIC, Image, queue_size=QUEUE_SIZE, subscriber_listener=self)
+
+    def _use_parameters(self, parameters: SonarImageParameters) -> None:
+        self._picture = PolarImage(parameters)
+
+    def peer_subscribe(self, *_: object) -> None:
+        """Begin to draw for the first who looks."""
+        with self._lock:
+            if self._beams is None:
+                self._picture.clear()
+                self._beams = subscribe_to_beams(guarded(self.health, self._take))
+
+    def peer_unsubscribe(self, _topic: str, others: int) -> None:
+        """Rest when nobody looks any more."""
+        with self._lock:
+            if others == 0 and self._beams is not None:
+                self._beams.unregister()
+                self._beams = None
+
+    def _take(self, message: SonarScanLine) -> None:
+        self.health.count("beams in")
+        beam = beam_from_message(message)
+        picture = self._picture
+        with self.health.timed():
+            image = picture.draw(beam)
+        now = time.monotonic()
+        if now >= self._next_image:
+            self._next_image = now + 1.0 / self._live.current.max_rate
+            self._publish(image, picture.metres_per_pixel, beam)
+
+    def _publish(self, image: np.ndarray, metres_per_pixel: float, beam: Beam) -> None:
+        self.health.count("images")
+        stamped = header(beam.stamp_ns, beam.frame_id)
+        side = len(image)
+        self._images.publish(
+            Image(header=stamped, height=side, width=side, encoding="mono8", step=side, data=image.tobytes())
+        )
+        if self._infos.get_num_connections():
+            self._infos.publish(_camera_info(stamped, side, 1.0 / metres_per_pixel))
+
+
+def _camera_info(stamped: object, side: int, pixels_per_metre: float) -> CameraInfo:
+    """Return where the head is in the image (cx, cy) and how many pixels make a metre (fx, fy)."""
+    middle = (side - 1) / 2.0
+    return CameraInfo(
+        header=stamped,
+        height=side,
+        width=side,
+        distortion_model="plumb_bob",
+        D=[0.0] * 5,
+        K=[pixels_per_metre, 0.0, middle, 0.0, pixels_per_metre, middle, 0.0, 0.0, 1.0],
+        R=[1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+        P=[pixels_per_metre, 0.0, middle, 0.0, 0.0, pixels_per_metre, middle, 0.0, 0.0, 0.0, 1.0, 0.0],
+    )

@@ -1,0 +1,87 @@
+"""The ROS side of a filter stage: parameters, topics and health around a callable from cloud to cloud."""
+
+from typing import Optional
+
+import numpy as np
+import rospy
+
+from node_support.errors import RefusedInput
+from node_support.parameters import ParameterSet
+from node_support.ros.node import guarded, make_health
+from node_support.ros.reconfigurable_parameters import LiveParameters
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.filters.stage_table import STAGES
+from sonar_processing.ros.cloud_publisher import CloudPublisher
+from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.ros.figure_publisher import FigurePublisher
+
+CLOUD_BUFFER_BYTES = 2**24
+
+
+class StageRunner:
+    """Runs one stage of the table, as a node of its own (`subscribe`) or called by the process that hosts it."""
+
+    def __init__(self, name: str, namespace: str) -> None:
+        """Raises ParameterError for a bad parameter in `namespace`."""
+        self.health = make_health(name)
+        self._type = STAGES[name]
+        self._live = LiveParameters(
+            self._type.parameters, namespace, self._type.config_name, self.health, self._use_parameters
+        )
+        self._publisher = CloudPublisher(self._type.output_topic)
+        self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self._type.figures]
+
+    def _use_parameters(self, parameters: ParameterSet) -> None:
+        self._stage = self._type.build(parameters)
+
+    @property
+    def takes_polar_scans(self) -> bool:
+        """Whether the stage works beside the chain of clouds."""
+        return self._type.takes_polar_scans
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody listens to any of the stage's topics."""
+        return self._publisher.is_read or any(figure.is_read for figure in self._figures)
+
+    def subscribe(self) -> None:
+        """Take clouds from the stage's input topic."""
+
+        def take(message: StampedIntensityCloudArrays) -> None:
+            self.process(cloud_from_message(message))
+
+        subscribe_to_clouds(self._type.input_topic, guarded(self.health, take))
+
+    def process(self, cloud: IntensityCloud) -> Optional[IntensityCloud]:
+        """Run the stage, publish its result and return it; None when it could not be used (counted)."""
+        self.health.count("clouds in")
+        self.health.count("points in", len(cloud))
+        stage = self._stage
+        try:
+            with self.health.timed():
+                result = stage(cloud)
+        except RefusedInput as refused:
+            self.health.problem(refused.kind, str(refused))
+            return None
+        if cloud.broken:
+            self.health.problem(
+                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
+            )
+        self.health.count("clouds out")
+        self.health.count("points out", int(np.count_nonzero(result.valid)))
+        self._publisher.publish(result)
+        for figure in self._figures:
+            figure.publish(self._type.figures[figure.name](stage))
+        return result
+
+
+def subscribe_to_clouds(topic: str, callback: object) -> rospy.Subscriber:
+    """Subscribe to StampedIntensityCloud, with a buffer that holds whole clouds."""
+    return rospy.Subscriber(
+        topic,
+        StampedIntensityCloudArrays,
+        callback,
+        queue_size=10,
+        buff_size=CLOUD_BUFFER_BYTES,
+        tcp_nodelay=True,
+    )

@@ -1,0 +1,140 @@
+"""Holds beams back until tf can place them at their own stamps; rospy's tf2 has no MessageFilter."""
+
+import threading
+from collections import deque
+from typing import Callable, Deque, List, NamedTuple, Optional
+
+import genpy
+import message_filters
+import rospy
+import tf2_ros
+
+from node_support.errors import RefusedInput
+from node_support.health import Health
+from node_support.ros.conversions import matrix_from_message
+from node_support.ros.node import guarded
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+
+QUEUE_SIZE = 120
+JUMP_BACK = 1.0
+_WAIT = 0.5
+
+
+class _WaitingBeam(NamedTuple):
+    beam: Beam
+    is_moving: bool
+
+
+class _NotifyingListener(tf2_ros.TransformListener):
+    def __init__(self, buffer: tf2_ros.Buffer, notify: Callable[[], None]) -> None:
+        self._notify = notify
+        super().__init__(buffer, queue_size=1000)
+
+    def callback(self, data: object) -> None:
+        super().callback(data)
+        self._notify()
+
+    def static_callback(self, data: object) -> None:
+        super().static_callback(data)
+        self._notify()
+
+
+class TransformFilter(message_filters.SimpleFilter):
+    """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
+
+    At most `QUEUE_SIZE` beams wait. A beam is dropped and counted when the queue is full, when it is older than one
+    that was delivered, or when tf can place a later beam of its frame but not this one. A stamp more than
+    `JUMP_BACK` seconds older than its predecessor means that time jumped: beams and transforms are forgotten.
+    """
+
+    def __init__(self, target_frame: str, health: Health, on_time_jump: Callable[[], None]) -> None:
+        super().__init__()
+        self._target_frame = target_frame
+        self._health = health
+        self._on_time_jump = guarded(health, on_time_jump)
+        self._condition = threading.Condition()
+        self._queue: Deque[_WaitingBeam] = deque()
+        self._newest_ns: Optional[int] = None
+        self._jumped = False
+        self._buffer = tf2_ros.Buffer(debug=False)
+        self._listener = _NotifyingListener(self._buffer, self._notify)
+        self._take = guarded(health, self._deliver_ready)
+        threading.Thread(target=self._work, daemon=True).start()
+
+    def add(self, beam: Beam, is_moving: bool = False) -> None:
+        """Queue a beam and whether the vehicle moved when it came; returns at once."""
+        with self._condition:
+            if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
+                self._take_older(beam)
+            if len(self._queue) >= QUEUE_SIZE:
+                oldest = self._queue.popleft().beam
+                self._drop(oldest, self._obstacle(oldest) or f"{QUEUE_SIZE} newer beams wait, the machine is too slow")
+            self._newest_ns = beam.stamp_ns
+            self._queue.append(_WaitingBeam(beam, is_moving))
+            self._condition.notify()
+
+    def _take_older(self, beam: Beam) -> None:
+        seconds = (self._newest_ns - beam.stamp_ns) * 1e-9
+        if seconds <= JUMP_BACK:
+            raise RefusedInput("beams out of order", f"{seconds:.3f} s older than its predecessor")
+        self._queue.clear()
+        self._jumped = True
+        self._health.problem("jumps back in time", f"by {seconds:.1f} s; the unfinished scan is forgotten")
+
+    def _notify(self) -> None:
+        with self._condition:
+            self._condition.notify()
+
+    def _work(self) -> None:
+        while not rospy.core.is_shutdown_requested():
+            self._take()
+            with self._condition:
+                self._condition.wait(_WAIT)
+
+    def _deliver_ready(self) -> None:
+        with self._condition:
+            jumped, self._jumped = self._jumped, False
+            if jumped:
+                self._buffer.clear()
+            ready = self._pop_ready()
+        if jumped:
+            self._on_time_jump()
+        for placed in ready:
+            self.signalMessage(placed)
+
+    def _pop_ready(self) -> List[PlacedBeam]:
+        queued = list(self._queue)
+        # From the newest back: what tf brings meanwhile can then only help the older ones.
+        placeable = [not self._obstacle(entry.beam) for entry in reversed(queued)][::-1]
+        newest = {entry.beam.frame_id: index for index, entry in enumerate(queued) if placeable[index]}
+        waits = [index > newest.get(entry.beam.frame_id, -1) for index, entry in enumerate(queued)]
+        self._queue = deque(entry for entry, wait in zip(queued, waits) if wait)
+        ready = []
+        for entry in (entry for entry, wait in zip(queued, waits) if not wait):
+            obstacle = self._obstacle(entry.beam)
+            if obstacle:
+                self._drop(entry.beam, obstacle)
+                continue
+            try:
+                ready.append(self._placed(entry))
+            except RefusedInput as refused:
+                self._health.problem(refused.kind, str(refused))
+        return ready
+
+    def _drop(self, beam: Beam, reason: str) -> None:
+        self._health.problem("beams without transform", f"from {beam.frame_id} to {self._target_frame}: {reason}")
+
+    def _obstacle(self, beam: Beam) -> str:
+        """Why tf cannot place a beam; empty when it can."""
+        can, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))
+        return "" if can else reason or "unknown to tf"
+
+    def _placed(self, entry: _WaitingBeam) -> PlacedBeam:
+        beam = entry.beam
+        stamped = self._buffer.lookup_transform_core(self._target_frame, beam.frame_id, _time(beam))
+        return PlacedBeam(beam, matrix_from_message(stamped.transform), entry.is_moving)
+
+
+def _time(beam: Beam) -> rospy.Time:
+    return rospy.Time(*divmod(beam.stamp_ns, 10**9)) if beam.stamp_ns else genpy.Time(0, 1)

@@ -1,0 +1,1 @@
+"""Beams together: scans, revolutions of the head, pictures."""

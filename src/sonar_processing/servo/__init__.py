@@ -1,0 +1,1 @@
+"""The servo that tilts the sonar."""

@@ -1,0 +1,1 @@
+"""Walls and round things in a scan."""

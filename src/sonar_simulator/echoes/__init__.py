@@ -1,0 +1,1 @@
+"""Echo models: from contacts to strengths."""

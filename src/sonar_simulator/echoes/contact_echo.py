@@ -1,0 +1,86 @@
+"""What the thesis's two echo models share: they count contacts by range, then write noise over them (6.4)."""
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from node_support.parameters import ParameterSet, parameter
+from sonar_simulator.rays.beam_pattern import BeamPattern, RayPattern
+from sonar_simulator.rays.contacts import Contacts
+from sonar_simulator.rays.mirrors import Mirrors
+
+
+@dataclass(frozen=True)
+class ContactEchoParameters(ParameterSet):
+    """Parameters of every model that counts contacts; the defaults are the thesis's numbers for the laser cone."""
+
+    bins: int = parameter(500, "bins of a beam", low=1, high=4096, thesis_name="binCount", tunable=False)
+    max_range: float = parameter(50.0, "range of the last bin's far end", unit="m", low=0.1, high=1000.0)
+    spread: float = parameter(1.0, "standard deviation of an echo about its contact", unit="m", low=0.0, high=100.0)
+    saturation: int = parameter(127, "greatest strength of a bin", low=1, high=255)
+    noise_echoes: int = parameter(15, "noise echoes written into each beam that hits something", low=0, high=10000)
+    noise_range_sd: float = parameter(
+        4.0, "standard deviation of noise echoes about the nearest contact", unit="m", low=0.0, high=1000.0
+    )
+    noise_strength_mean: float = parameter(53.0, "mean strength of a noise echo", low=0.0, high=255.0)
+    noise_strength_sd: float = parameter(20.0, "standard deviation of a noise echo's strength", low=0.0, high=255.0)
+
+
+class ContactEcho(ABC):
+    """Strengths from counts of contacts, and noise echoes around the nearest contact.
+
+    Three things differ from the thesis's code: an echo spreads about the contact itself and not about the
+    near end of its bin, which drew surfaces up to a bin too near; echoes of negative range are dropped, not
+    heaped into bin 0; a beam that hits nothing stays silent, it has no contact to lay noise around.
+    """
+
+    mirrors = Mirrors()
+
+    def __init__(self, parameters: ContactEchoParameters) -> None:
+        self._settings = parameters
+
+    @property
+    def bins(self) -> int:
+        """Number of bins in a beam."""
+        return self._settings.bins
+
+    @property
+    def max_range(self) -> float:
+        """Far end of the last bin, m."""
+        return self._settings.max_range
+
+    def pattern(self, fan: BeamPattern) -> RayPattern:
+        """Return the rays the model wants for a head whose beam is `fan`: those."""
+        return fan
+
+    def echoes(self, contacts: Contacts, rng: np.random.Generator) -> np.ndarray:
+        """Return strengths (beams, bins) uint8."""
+        ranges = np.where(contacts.ranges <= self.max_range, contacts.ranges, np.inf)
+        strengths = self.strengths(ranges, rng)
+        self._write_noise(strengths, ranges.min(axis=1, initial=np.inf), rng)
+        return strengths
+
+    @abstractmethod
+    def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
+
+    def counts(self, beams: int, beam: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+        """Return how many of the echoes at `ranges` (n,) m of beams number `beam` (n,) fall into each (beams, bins)."""
+        index, inside = self._bin_of(ranges)
+        cells = beam[inside] * self.bins + index[inside]
+        return np.bincount(cells, minlength=beams * self.bins).reshape(beams, self.bins)
+
+    def _write_noise(self, strengths: np.ndarray, nearest: np.ndarray, rng: np.random.Generator) -> None:
+        settings = self._settings
+        beam = np.repeat(np.flatnonzero(np.isfinite(nearest)), settings.noise_echoes)
+        ranges = rng.normal(nearest[beam], settings.noise_range_sd)
+        noise = rng.normal(settings.noise_strength_mean, settings.noise_strength_sd, size=len(beam))
+        index, inside = self._bin_of(ranges)
+        strengths[beam[inside], index[inside]] = np.clip(noise[inside], 0, settings.saturation)
+
+    def _bin_of(self, ranges: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return bin numbers and which of them exist; a bin holds its far end and not its near one."""
+        index = np.ceil(ranges * self.bins / self.max_range).astype(np.int64) - 1
+        return index, (index >= 0) & (index < self.bins)

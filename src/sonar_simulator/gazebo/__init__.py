@@ -1,0 +1,1 @@
+"""Sonar beams from the rays of a sensor in Gazebo."""

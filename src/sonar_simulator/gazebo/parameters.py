@@ -1,0 +1,82 @@
+"""The parameters of gazebo_sonar. Free of ROS."""
+
+import math
+from dataclasses import dataclass
+from enum import Enum
+from typing import Dict, Type
+
+from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_simulator.echoes.echo_model import ECHO_MODELS
+
+
+class HeadMode(Enum):
+    """Who turns the head."""
+
+    SWEEP = "SWEEP"
+    JOINT = "JOINT"
+
+
+@dataclass(frozen=True)
+class GazeboSonarParameters(ParameterSet):
+    """How rays become beams."""
+
+    head: HeadMode = parameter(
+        HeadMode.SWEEP,
+        "SWEEP: the ray sensor reaches around the circle, each scan gives the next beam; JOINT: it turns on a joint",
+        tunable=False,
+    )
+    beams_per_turn: int = parameter(120, "SWEEP: beams in a full turn", low=1, high=3600, tunable=False)
+    horizontal_opening_deg: float = parameter(
+        2.5, "SWEEP: rays so far apart make one beam", unit="deg", low=0.01, high=360.0, tunable=False
+    )
+    vertical_opening_deg: float = parameter(
+        22.0,
+        "LaserScan: from the ray sensor's lowest row to its highest; a cloud tells it",
+        unit="deg",
+        low=0.0,
+        high=179.0,
+        tunable=False,
+    )
+    ray_rows: int = parameter(
+        0,
+        "clouds: vertical samples of the ray sensor; 0: told by a pyramid below 180 deg",
+        low=0,
+        high=1000,
+        tunable=False,
+    )
+    nothing_range: float = parameter(
+        50.0,
+        "clouds: a point so far away means nothing was hit; the ray sensor's greatest range less its smallest",
+        unit="m",
+        low=0.1,
+        high=10000.0,
+        tunable=False,
+    )
+    frame_id: str = parameter("sonar", "frame of the beams, which tilts but does not turn with the head", tunable=False)
+    sensor_joint: str = parameter(
+        "sonar_servo_joint",
+        "joint of /joint_states that tilts the sonar, for sensorAngle; empty: none",
+        tunable=False,
+        may_be_empty=True,
+    )
+    echo_model: str = parameter("laser_cone", f"one of {', '.join(ECHO_MODELS)}", tunable=False)
+    seed: int = parameter(1, "of all random numbers", low=0, high=2**31 - 1, tunable=False)
+
+    def check(self) -> None:
+        """Refuse an echo model that does not exist."""
+        if self.echo_model not in ECHO_MODELS:
+            raise ParameterError(f"echo_model = {self.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
+
+    @property
+    def vertical_opening(self) -> float:
+        """Height of the ray sensor's pyramid, rad."""
+        return math.radians(self.vertical_opening_deg)
+
+    @property
+    def horizontal_opening(self) -> float:
+        """Width of a beam, rad."""
+        return math.radians(self.horizontal_opening_deg)
+
+
+GROUPS: Dict[str, Type[ParameterSet]] = {name: kind.parameters for name, kind in ECHO_MODELS.items()}
+"""The parameters that come in groups, one for each echo model; the one that `echo_model` names is used."""

@@ -1,0 +1,1 @@
+"""Rays, the surfaces they meet and mirrors."""

@@ -1,0 +1,194 @@
+"""The exact nearest surface inside beams.
+
+Rays sample a beam: between them they miss the near edge of a floor by metres and a rope altogether. The echo of a beam
+begins at the nearest point of all surfaces inside its pyramid, and that point follows from geometry alone: it is
+visible, for whatever hid it would be nearer and in the beam too.
+"""
+
+from typing import Iterator, Tuple
+
+import numpy as np
+
+from sonar_simulator.rays.triangle_groups import TriangleGroups
+from sonar_simulator.world.world import World
+
+# A segment cut to nothing by rounding alone still counts: m.
+_TOLERANCE = 1e-9
+# Planes of triangles that are no farther than this beyond the limit still count: m.
+_MARGIN = 1e-3
+# Of a cone's sides only as many are looked at as cut a triangle, rounded up to one of these.
+_CUTTING = (3, 5, 8, 12)
+_NEXT_CORNER = np.array([1, 2, 0])
+
+
+class NearestSurface:
+    """Finds the nearest point of a world's triangles inside beams that are convex pyramids."""
+
+    def __init__(self, world: World) -> None:
+        corners = world.vertices[world.faces]
+        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        self._faces = np.flatnonzero(np.einsum("ij,ij->i", normals, normals) > 0.0)
+        self._corners = corners[self._faces]
+        self._groups = TriangleGroups(self._corners)
+
+    def find(
+        self, origins: np.ndarray, rotations: np.ndarray, planes: np.ndarray, limits: np.ndarray
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the (n, 3) nearest points inside beams, in the beams' frames, and their (n,) faces, -1 if none.
+
+        origins: (n, 3) where the beams start, world frame, m. rotations: (n, 3, 3) R_world_beam.
+        planes: (k, 3) inward unit normals of the beam's sides, beam frame. limits: (n,) m, look no farther.
+        """
+        sides = planes[:: max(1, len(planes) // 4)]
+        beam, face = self._groups.reached(origins, np.einsum("nij,kj->kni", rotations, sides), limits)
+        triangles = (self._corners[face] - origins[beam, np.newaxis]) @ rotations[beam]
+        beam, face, triangles = _inside(beam, face, triangles, planes, limits)
+        points = np.empty((len(beam), 3))
+        for pairs, cutting in _cutting_planes(triangles, planes):
+            points[pairs] = _nearest_points(triangles[pairs], cutting)
+        squares = np.einsum("ij,ij->i", points, points)
+        order = np.lexsort((squares, beam))
+        order = order[np.isfinite(squares[order])]
+        chosen, first = np.unique(beam[order], return_index=True)
+        result = np.full((len(origins), 3), np.inf)
+        faces = np.full(len(origins), -1, dtype=np.int64)
+        result[chosen] = points[order[first]]
+        faces[chosen] = self._faces[face[order[first]]]
+        return result, faces
+
+
+def _inside(
+    beam: np.ndarray, face: np.ndarray, triangles: np.ndarray, planes: np.ndarray, limits: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Leave out triangles that lie behind one of the planes with all corners, or in a plane too far away."""
+    ahead = ~(triangles @ planes.T < 0.0).all(axis=1).any(axis=1)
+    beam, face, triangles = beam[ahead], face[ahead], triangles[ahead]
+    kept = _reach_of_planes(triangles, _widest_cosine(planes)) <= limits[beam] + _MARGIN
+    return beam[kept], face[kept], triangles[kept]
+
+
+def _reach_of_planes(triangles: np.ndarray, cosine: float) -> np.ndarray:
+    """Return how far the planes of triangles (p, 3, 3) are along the round cone, cosine of half its angle, at least."""
+    normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
+    heights = _dot(triangles[:, 0], normals)
+    forward = np.clip(normals[:, 0] * np.sign(heights), -1.0, 1.0)
+    # The cosine of the angle between a perpendicular to the plane and the cone: 1 if it runs inside.
+    nearest = forward * cosine + np.sqrt((1.0 - forward**2) * (1.0 - cosine**2))
+    nearest = np.where(forward >= cosine, 1.0, nearest)
+    return np.where(nearest > 0.0, np.abs(heights) / np.maximum(nearest, _TOLERANCE), np.inf)
+
+
+def _widest_cosine(planes: np.ndarray) -> float:
+    """Return the cosine of the angle between the beam's axis and its outermost edge; -1 if it has none."""
+    first, second = np.triu_indices(len(planes), 1)
+    edges = _cross(planes[first], planes[second])
+    lengths = np.sqrt(_dot(edges, edges))
+    edges = edges[lengths > _TOLERANCE] / lengths[lengths > _TOLERANCE, np.newaxis]
+    edges = np.concatenate([edges, -edges])
+    edges = edges[(edges @ planes.T >= -_TOLERANCE).all(axis=1)]
+    return float(edges[:, 0].min()) if len(edges) else -1.0
+
+
+def _cutting_planes(triangles: np.ndarray, planes: np.ndarray) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
+    """Yield pair numbers (q,) and planes (q, j, 3) that hold all that cut these triangles: of a cone's sides few do."""
+    depths = (triangles @ planes.T).min(axis=1)
+    cut_by = (depths < 0.0).sum(axis=1)
+    fewer = -1
+    for most in (*(count for count in _CUTTING if count < len(planes)), len(planes)):
+        pairs = np.flatnonzero((cut_by > fewer) & (cut_by <= most))
+        if most == len(planes):
+            yield pairs, np.broadcast_to(planes, (len(pairs), *planes.shape))
+        else:
+            yield pairs, planes[np.argpartition(depths[pairs], most - 1, axis=1)[:, :most]]
+        fewer = most
+
+
+def _nearest_points(triangles: np.ndarray, planes: np.ndarray) -> np.ndarray:
+    """Return the (p, 3) points of triangles (p, 3, 3) inside their planes (p, k, 3) nearest to the origin, inf if none.
+
+    The part of a triangle inside the beam is a convex polygon. Its nearest point is the foot of the perpendicular, or
+    lies on a side: on an edge of the triangle or on one of the planes.
+    """
+    normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
+    heights = _dot(triangles[:, 0], normals)
+    edges = triangles[:, _NEXT_CORNER] - triangles
+    edge_normals = _cross(normals[:, np.newaxis], edges)
+    edge_normals /= np.sqrt(_dot(edge_normals, edge_normals))[..., np.newaxis]
+    sides = np.concatenate([edge_normals, planes], axis=1)
+    offsets = np.concatenate([_dot(edge_normals, triangles), np.zeros(planes.shape[:2])], axis=1)
+    feet = heights[:, np.newaxis] * normals
+    within = (_dot(sides, feet[:, np.newaxis]) >= offsets - _TOLERANCE).all(axis=1)
+    points = np.where(within[:, np.newaxis], feet, np.inf)
+    rest = np.flatnonzero(~within)
+    axes = _axes(normals[rest], edges[rest, 0])
+    points[rest] = _nearest_on_sides(axes, feet[rest], sides[rest], offsets[rest])
+    return points
+
+
+def _axes(normals: np.ndarray, edges: np.ndarray) -> np.ndarray:
+    """Return (p, 2, 3) unit vectors that span the planes of triangles with these unit normals and edges, (p, 3)."""
+    first = edges / np.sqrt(_dot(edges, edges))[:, np.newaxis]
+    return np.stack([first, _cross(normals, first)], axis=1)
+
+
+def _nearest_on_sides(axes: np.ndarray, feet: np.ndarray, sides: np.ndarray, offsets: np.ndarray) -> np.ndarray:
+    """Return the (p, 3) point nearest to the foot on the sides of each polygon, inf if nothing of it is left.
+
+    It lies on a side that the foot is beyond, as the point of a convex polygon nearest to a point outside always does.
+    """
+    # In the triangle's own plane a half-space is a half-plane: its normal there, made a unit vector, and its offset.
+    flat = sides @ axes.transpose(0, 2, 1)
+    lengths = np.sqrt(_dot(flat, flat))
+    # A plane parallel to the triangle, which lies before it, cuts nothing.
+    cutting = lengths > _TOLERANCE
+    flat /= np.where(cutting, lengths, np.inf)[..., np.newaxis]
+    outside = offsets - _dot(sides, feet[:, np.newaxis])
+    beyond = np.where(cutting, outside / np.where(cutting, lengths, 1.0), -np.inf)
+    row, side = np.nonzero(beyond > 0.0)
+    normals, away = flat[row, side], beyond[row, side]
+    along = np.stack([-normals[:, 1], normals[:, 0]], axis=-1)
+    low, high = _cut(flat[row], beyond[row], away[:, np.newaxis] * normals, along)
+    steps = np.clip(0.0, low, np.maximum(low, high))
+    squares = np.full(beyond.shape, np.inf)
+    squares[row, side] = np.where(low <= high + _TOLERANCE, away**2 + steps**2, np.inf)
+    nearest = np.flatnonzero(squares[row, side] == squares.min(axis=1)[row])
+    nearest = nearest[np.isfinite(squares[row, side][nearest])]
+    chosen = away[nearest, np.newaxis] * normals[nearest] + steps[nearest, np.newaxis] * along[nearest]
+    points = np.full(feet.shape, np.inf)
+    points[row[nearest]] = feet[row[nearest]] + np.einsum("li,lij->lj", chosen, axes[row[nearest]])
+    return points
+
+
+def _cut(flat: np.ndarray, beyond: np.ndarray, starts: np.ndarray, along: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return from where to where, (l,) each, lines run inside half-planes; low > high: nowhere.
+
+    The lines begin at `starts` (l, 2) and run `along` (l, 2); the half-planes have normals `flat` (l, s, 2) and
+    offsets `beyond` (l, s).
+    """
+    slopes = _dot(flat, along[:, np.newaxis])
+    missing = beyond - _dot(flat, starts[:, np.newaxis])
+    rising, falling = slopes > _TOLERANCE, slopes < -_TOLERANCE
+    level = ~(rising | falling)
+    cuts = missing / np.where(level, 1.0, slopes)
+    low = np.where(rising, cuts, -np.inf).max(axis=1)
+    high = np.where(falling, cuts, np.inf).min(axis=1)
+    return np.where((level & (missing > _TOLERANCE)).any(axis=1), np.inf, low), high
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("...i,...i->...", a, b)
+
+
+def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    """Return the cross product; numpy's own takes several times as long for small batches."""
+    a, b = np.broadcast_arrays(a, b)
+    return np.stack(
+        [
+            a[..., 1] * b[..., 2] - a[..., 2] * b[..., 1],
+            a[..., 2] * b[..., 0] - a[..., 0] * b[..., 2],
+            a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0],
+        ],
+        axis=-1,
+    )

@@ -1,0 +1,86 @@
+"""gazebo_sonar: the scans of a ray sensor in Gazebo become sonar beams, so that no plugin has to be built."""
+
+from typing import Optional
+
+import rospy
+from sensor_msgs.msg import JointState
+
+from node_support.ros.node import guarded, make_health
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.ros.conversions import header
+from sonar_processing.ros.transform_filter import TransformFilter
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.gazebo.beams import GazeboBeams, RayScan
+from sonar_simulator.gazebo.parameters import GROUPS, GazeboSonarParameters, HeadMode
+from sonar_simulator.ros.gazebo_messages import ray_scan
+from sonar_simulator.ros.simulator_messages import scan_line
+from sonar_simulator.simulation.simulation import Ping
+from sonar_simulator.simulation.sonar_head import SonarHead
+from underwater_map_construction.msg import SonarScanLine
+
+_SCAN_BUFFER_BYTES = 2**23
+_ANY_TIME = 1.0
+
+
+class GazeboSonar:
+    """Subscribes to sonar/rays, publishes sonar/raw."""
+
+    def __init__(self) -> None:
+        """Raises ParameterError."""
+        self.health = make_health("gazebo_sonar")
+        values = dict(rospy.get_param("~", {}))
+        groups = {name: kind.from_group(name, values.pop(name, {})) for name, kind in GROUPS.items()}
+        self._parameters = GazeboSonarParameters.from_mapping(values)
+        name = self._parameters.echo_model
+        self._beams = GazeboBeams(make_echo_model(name, groups[name].to_mapping()), self._parameters.seed)
+        self._head = SonarHead(self._parameters.beams_per_turn, _ANY_TIME)
+        self._next_beam = 0
+        self._tilt: Optional[float] = None
+        self._publisher = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=100, tcp_nodelay=True)
+        self._filter = self._make_filter()
+        if self._parameters.sensor_joint:
+            rospy.Subscriber("joint_states", JointState, guarded(self.health, self._take_joints), queue_size=10)
+        rospy.Subscriber(
+            "sonar/rays",
+            rospy.AnyMsg,
+            guarded(self.health, self._take_scan),
+            queue_size=10,
+            buff_size=_SCAN_BUFFER_BYTES,
+            tcp_nodelay=True,
+        )
+
+    def _make_filter(self) -> Optional[TransformFilter]:
+        if self._parameters.head is HeadMode.SWEEP:
+            return None
+        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None)
+        made.registerCallback(guarded(self.health, self._turned))
+        return made
+
+    def _take_joints(self, joints: JointState) -> None:
+        angles = dict(zip(joints.name, joints.position))
+        self._tilt = angles.get(self._parameters.sensor_joint, self._tilt)
+
+    def _take_scan(self, message: rospy.AnyMsg) -> None:
+        self.health.count("scans in")
+        scan = ray_scan(message, self._parameters)
+        if self._filter is not None:
+            self._filter.add(scan)
+            return
+        with self.health.timed():
+            ping = self._beams.swept(scan, self._head, self._next_beam, self._parameters.horizontal_opening)
+        self._next_beam += 1
+        self._publish(ping, scan)
+
+    def _turned(self, placed: PlacedBeam) -> None:
+        scan: RayScan = placed.beam
+        with self.health.timed():
+            ping = self._beams.turned(scan, placed.T_target_sonar)
+        self._publish(ping, scan)
+
+    def _publish(self, ping: Ping, scan: RayScan) -> None:
+        if self._parameters.sensor_joint and self._tilt is None:
+            joint = self._parameters.sensor_joint
+            self.health.problem("beams of unknown tilt", f"joint {joint!r} is not in /joint_states; sensorAngle is 0")
+        stamped = header(scan.stamp_ns, self._parameters.frame_id)
+        self._publisher.publish(scan_line(ping, self._tilt or 0.0, stamped, self._beams.max_range))
+        self.health.count("beams out")

@@ -1,0 +1,109 @@
+"""What happens at one moment of a simulation, as messages: for publishers and for bags alike."""
+
+from typing import List, Tuple
+
+import numpy as np
+import rospy
+from genpy import Message
+from geometry_msgs.msg import Pose, TransformStamped, Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
+from tf2_msgs.msg import TFMessage
+
+from node_support.ros.conversions import pose_from_matrix
+from sonar_simulator.simulation.simulation import Moment, Ping
+from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
+from underwater_map_construction.msg import SonarScanLine
+
+ODOM_FRAME = "odom"
+WORLD_FRAME = "map"
+SERVO_JOINT = "sonar_servo_joint"
+
+TOPICS = {
+    "/tf": TFMessage,
+    "joint_states": JointState,
+    "velocity": Twist,
+    "odom": Odometry,
+    "ground_truth": Odometry,
+    "sonar/raw": SonarScanLine,
+}
+"""Topics, relative to the namespace but for /tf, and their types."""
+
+
+def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List[Tuple[str, Message]]:
+    """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
+
+    Transform and joint come with every moment, so that a beam can be placed at its own stamp; the rest comes with
+    ticks only, at the steady rate of an instrument.
+    """
+    messages = placing_messages(moment, stamp)
+    if moment.is_tick:
+        odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
+        velocity, true_velocity = _twist(moment.odometry.twist), _twist(moment.truth.twist)
+        true_pose = pose_from_matrix(moment.truth.T_world_base)
+        messages += [
+            ("velocity", velocity),
+            ("odom", _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
+            ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
+        ]
+    if moment.ping is not None:
+        header = Header(stamp=stamp, frame_id=SONAR_FRAME)
+        messages.append(("sonar/raw", scan_line(moment.ping, moment.tilt, header, max_range)))
+    return messages
+
+
+def placing_messages(moment: Moment, stamp: rospy.Time) -> List[Tuple[str, Message]]:
+    """Return the (topic, message) pairs that place vehicle and sonar, the transform first."""
+    odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
+    return [
+        ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
+        ("joint_states", joint_state(moment.tilt, stamp)),
+    ]
+
+
+def transform_message(pose: Pose, stamp: rospy.Time, parent: str, child: str) -> TransformStamped:
+    """Return the transform that places `child` at `pose` in `parent`."""
+    message = TransformStamped()
+    message.header.stamp = stamp
+    message.header.frame_id = parent
+    message.child_frame_id = child
+    message.transform.translation = pose.position
+    message.transform.rotation = pose.orientation
+    return message
+
+
+def joint_state(tilt: float, stamp: rospy.Time) -> JointState:
+    """Return where the sonar's servo stands, rad."""
+    message = JointState(name=[SERVO_JOINT], position=[tilt])
+    message.header.stamp = stamp
+    return message
+
+
+def scan_line(ping: Ping, tilt: float, header: Header, max_range: float) -> SonarScanLine:
+    """Return the message of a beam; `tilt` [rad] is that of the sonar's servo, `max_range` [m] the last bin's end."""
+    return SonarScanLine(
+        header=header,
+        angle=ping.angle,
+        intensities=ping.strengths.tobytes(),
+        maxrange_meters=max_range,
+        range_resolution=max_range / len(ping.strengths),
+        sensorAngle=tilt,
+    )
+
+
+def _twist(values: np.ndarray) -> Twist:
+    message = Twist()
+    message.linear.x, message.linear.y, message.linear.z = values[:3]
+    message.angular.x, message.angular.y, message.angular.z = values[3:]
+    return message
+
+
+def _odometry(pose: Pose, twist: Twist, stamp: rospy.Time, frame: str) -> Odometry:
+    message = Odometry()
+    message.header.stamp = stamp
+    message.header.frame_id = frame
+    message.child_frame_id = BASE_FRAME
+    message.pose.pose = pose
+    message.twist.twist = twist
+    return message

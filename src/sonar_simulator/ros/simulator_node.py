@@ -1,0 +1,121 @@
+"""The simulator as a node: it is the clock, the odometry, tf and the sonar."""
+
+import itertools
+import math
+import threading
+from pathlib import Path
+from typing import Iterator
+
+import numpy as np
+import rospkg
+import rospy
+from geometry_msgs.msg import Twist
+from std_msgs.msg import Float64
+
+from node_support.parameters import ParameterError
+from node_support.ros.node import guarded, make_health
+from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
+from sonar_simulator.simulation.pace import Pace
+from sonar_simulator.simulation.simulation import Drive, Moment
+from sonar_simulator.simulation.simulation_setup import PACKAGE, Settings, make_setup
+from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
+
+START_TIME = 1000.0
+_WAIT_STEP = 0.05
+_LISTENER_TIME = 0.5
+
+
+class Simulator:
+    """Runs a simulation against the wall clock, `real_time_factor` times as fast."""
+
+    def __init__(self) -> None:
+        """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
+        self.health = make_health("sonar_simulator")
+        settings = Settings.from_mapping(rospy.get_param("~", {}))
+        folder = Path(rospkg.RosPack().get_path(PACKAGE))
+        self._parameters = settings.simulator
+        self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
+        self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive)
+        self._publisher.publish_world(self._setup.world)
+        self._start_time = START_TIME
+        self._now = 0.0
+        self._lock = threading.Lock()
+        self._ended = threading.Event()
+        rospy.on_shutdown(self._ended.set)
+        self._subscribe()
+        threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
+
+    def _subscribe(self) -> None:
+        commands = {"sonar_servo/command": (Float64, self._take_servo_command)}
+        if self._parameters.drive is Drive.COMMANDS:
+            commands["cmd_vel"] = (Twist, self._take_velocity_command)
+        for topic, (kind, take) in commands.items():
+            rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=10, tcp_nodelay=True)
+
+    def _take_servo_command(self, command: Float64) -> None:
+        with self._lock:
+            self._setup.servo.command(command.data)
+
+    def _take_velocity_command(self, command: Twist) -> None:
+        linear, angular = command.linear, command.angular
+        twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
+        self.health.count("velocity commands")
+        with self._lock:
+            limited = self._setup.commanded.command(self._now, twist)
+        self.health.count("velocity commands limited", int(limited))
+
+    def _run(self) -> None:
+        if self._parameters.wait_for_listener and self._parameters.drive is Drive.SCRIPT:
+            self._wait_for_listener()
+        simulation, rate = self._setup.simulation, self._parameters.clock_rate
+        pace = Pace(self._parameters.real_time_factor, self._ended.wait)
+        moments = simulation.moments(rate)
+        while self._play(moments, pace):
+            self._publisher.publish_progress(self._now / simulation.duration)
+        self._publisher.publish_progress(1.0)
+        rest = (simulation.moment(tick / rate) for tick in itertools.count(math.floor(self._now * rate) + 1))
+        while self._play(rest, pace):
+            pass
+
+    def _play(self, moments: Iterator[Moment], pace: Pace) -> bool:
+        """Publish the next moment when its time has come; return False when there is none or the node ends."""
+        with self._lock, self.health.timed():
+            moment = next(moments, None)
+        if moment is None or self._ended.is_set():
+            return False
+        self._keep_pace(moment, pace)
+        if self._ended.is_set():
+            return False
+        self._publisher.publish(moment, self._stamp(moment.time))
+        self._now = moment.time
+        self.health.count("moments")
+        self.health.count("beams out", int(moment.ping is not None))
+        return True
+
+    def _keep_pace(self, moment: Moment, pace: Pace) -> None:
+        lost = pace.lost
+        pace.wait_for(moment.time)
+        if pace.lost > lost:
+            factor = self._parameters.real_time_factor
+            detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with real_time_factor {factor:g}"
+            self.health.problem("delays", detail)
+
+    def _wait_for_listener(self) -> None:
+        """Let the clock run until somebody takes the beams, and until he has had time to learn of tf as well."""
+        start, waited = self._setup.simulation.moment(0.0), 0.0
+        while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
+            waited += _WAIT_STEP if self._publisher.has_listener else 0.0
+            self._publisher.publish_rest(start, rospy.Time.from_sec(self._start_time))
+            self._start_time += _WAIT_STEP
+
+    def _stamp(self, seconds: float) -> rospy.Time:
+        return rospy.Time.from_sec(self._start_time + seconds)
+
+
+def _robot() -> RobotDescription:
+    try:
+        return RobotDescription(rospy.get_param("robot_description"))
+    except KeyError as error:
+        raise ParameterError("robot_description is not set: it says where the sonar is mounted") from error
+    except DescriptionError as error:
+        raise ParameterError(str(error)) from error

@@ -1,0 +1,1 @@
+"""World, vehicle and sonar on one time line."""

@@ -1,0 +1,148 @@
+"""World, vehicle and sonar together on one time line (thesis 6.4). Free of ROS."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Iterator, List, Optional, Sequence
+
+import numpy as np
+
+from node_support.parameters import ParameterSet, parameter
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
+from sonar_simulator.vehicle.movement import Motion, VehicleState
+from sonar_simulator.vehicle.odometry import Estimate, Odometry
+from sonar_simulator.vehicle.scripted_vehicle import TiltCommand
+from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
+
+
+class Drive(Enum):
+    """What moves the vehicle."""
+
+    SCRIPT = "SCRIPT"
+    COMMANDS = "CMD_VEL"
+
+
+@dataclass(frozen=True)
+class SimulatorParameters(ParameterSet):
+    """What is simulated, how fast and from which seed."""
+
+    world: str = parameter("worlds/basin.sdf", "SDF or mesh file; relative to the package's folder", tunable=False)
+    script: str = parameter(
+        "yaml/basin_tour.yaml", "moves of the vehicle; relative to the package's folder", tunable=False
+    )
+    echo_model: str = parameter(
+        "laser_cone", "how contacts become echoes: laser_cone, collision or physical", tunable=False
+    )
+    drive: Drive = parameter(
+        Drive.SCRIPT, "what moves the vehicle: its script, or from the script's start on commands", tunable=False
+    )
+    seed: int = parameter(1, "of all random numbers: same seed, same beams", low=0, high=2**31 - 1, tunable=False)
+    real_time_factor: float = parameter(
+        1.0, "simulated seconds per second of wall time", low=0.01, high=1000.0, tunable=False
+    )
+    clock_rate: float = parameter(
+        20.0, "ticks of /clock, odometry and tf", unit="1/s", low=1.0, high=1000.0, tunable=False
+    )
+    wait_for_listener: bool = parameter(True, "SCRIPT: begin when somebody subscribes to the beams", tunable=False)
+
+
+@dataclass(frozen=True)
+class Ping:
+    """One beam: head angle [rad] and strengths (bins,) uint8."""
+
+    angle: float
+    strengths: np.ndarray
+
+
+@dataclass(frozen=True)
+class Moment:
+    """All there is to know at one time [s since the start].
+
+    tilt: angle of the sonar's servo, rad. is_tick: whether it is a moment of the steady rate. head_angle: where the
+    head looks, rad, if it sends a beam now; `ping` is that beam once it was heard.
+    """
+
+    time: float
+    truth: VehicleState
+    odometry: Estimate
+    tilt: float
+    is_tick: bool = True
+    head_angle: Optional[float] = None
+    ping: Optional[Ping] = None
+
+
+class Simulation:
+    """Runs once, forwards. Ticks come at a steady rate, pings when the head sends them."""
+
+    def __init__(
+        self,
+        motion: Motion,
+        odometry: Odometry,
+        sonar: Sonar,
+        head: SonarHead,
+        T_base_sonar: np.ndarray,
+        servo: Optional[Servo] = None,
+        tilt_commands: Sequence[TiltCommand] = (),
+    ) -> None:
+        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` it stays there."""
+        self.duration = motion.duration
+        self._motion = motion
+        self._odometry = odometry
+        self._sonar = sonar
+        self._head = head
+        self._T_base_sonar = T_base_sonar
+        self._servo = servo or Servo(ServoParameters())
+        self._tilt_commands = list(tilt_commands)
+
+    def moments(self, tick_rate: float, beams_at_once: int = 1) -> Iterator[Moment]:
+        """Yield all moments from time 0 to the end of the motion, in order of time.
+
+        With `beams_at_once` > 1 moments are held back until so many beams can be cast together, which is faster and
+        draws random numbers in another order.
+        """
+        waiting: List[Moment] = []
+        beams = 0
+        for moment in self._unheard(tick_rate):
+            waiting.append(moment)
+            beams += int(moment.head_angle is not None)
+            if beams in (0, beams_at_once):
+                yield from self._heard(waiting)
+                waiting, beams = [], 0
+        yield from self._heard(waiting)
+
+    def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
+        """Return the state at `time`, not before that of the last call, with a beam still to be heard."""
+        self._command_tilt(time)
+        truth = self._motion.state(time)
+        return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), is_tick, head_angle)
+
+    def _unheard(self, tick_rate: float) -> Iterator[Moment]:
+        tick, beam = 0, 0
+        while True:
+            tick_time, beam_time = tick / tick_rate, self._head.time(beam)
+            if min(tick_time, beam_time) > self.duration:
+                return
+            if beam_time <= tick_time:
+                both = beam_time == tick_time
+                yield self.moment(beam_time, both, self._head.angle(beam))
+                beam += 1
+                tick += int(both)
+            else:
+                yield self.moment(tick_time)
+                tick += 1
+
+    def _heard(self, moments: List[Moment]) -> List[Moment]:
+        sending = [moment for moment in moments if moment.head_angle is not None]
+        if not sending:
+            return moments
+        poses = np.array([moment.truth.T_world_base @ tilted(self._T_base_sonar, moment.tilt) for moment in sending])
+        beams = iter(self._sonar.pings(poses, np.array([moment.head_angle for moment in sending])))
+        return [
+            moment if moment.head_angle is None else replace(moment, ping=Ping(moment.head_angle, next(beams)))
+            for moment in moments
+        ]
+
+    def _command_tilt(self, time: float) -> None:
+        while self._tilt_commands and self._tilt_commands[0].time <= time:
+            command = self._tilt_commands.pop(0)
+            self._servo.angle(command.time)
+            self._servo.command(command.angle)

@@ -1,0 +1,119 @@
+"""Makes a simulation of plain parameter values, for the node and for bags alike. Free of ROS."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Callable, Dict, Mapping, Type
+
+import numpy as np
+
+from node_support.parameters import ParameterError, ParameterSet
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.simulation import Drive, Simulation, SimulatorParameters
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_simulator.vehicle.commanded_vehicle import CommandedVehicle, VehicleParameters
+from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
+from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
+from sonar_simulator.vehicle.script_file import load_script
+from sonar_simulator.vehicle.scripted_vehicle import ScriptError
+from sonar_simulator.vehicle.servo import Servo, ServoParameters
+from sonar_simulator.world.errors import WorldError
+from sonar_simulator.world.world import World
+from sonar_simulator.world.world_file import load_world
+
+PACKAGE = "underwater_map_construction"
+BASE_FRAME = "base_link"
+SONAR_FRAME = "sonar"
+
+GROUPS: Dict[str, Type[ParameterSet]] = {
+    "sonar": SonarParameters,
+    "servo": ServoParameters,
+    "vehicle": VehicleParameters,
+    "odometry": OdometryParameters,
+    **{name: kind.parameters for name, kind in ECHO_MODELS.items()},
+}
+"""The parameters that come in groups; of the echo models' groups the one that `echo_model` names is used."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """All parameters of a simulation, validated; `echo` are those of the echo model that is used."""
+
+    simulator: SimulatorParameters
+    sonar: SonarParameters
+    servo: ServoParameters
+    vehicle: VehicleParameters
+    odometry: OdometryParameters
+    echo: ParameterSet
+
+    @classmethod
+    def from_mapping(cls, values: Mapping[str, Any]) -> "Settings":
+        """Build from the simulator's own keys and one mapping for each group; raises ParameterError."""
+        own = dict(values)
+        groups = {name: kind.from_group(name, own.pop(name, {})) for name, kind in GROUPS.items()}
+        simulator = SimulatorParameters.from_mapping(own)
+        if simulator.echo_model not in ECHO_MODELS:
+            raise ParameterError(f"echo_model = {simulator.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
+        echo = groups[simulator.echo_model]
+        parts = {name: group for name, group in groups.items() if name not in ECHO_MODELS}
+        return cls(simulator=simulator, echo=echo, **parts)
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return plain values, as `from_mapping` takes them; of the echo models the one that is used."""
+        groups = {name: getattr(self, name) for name in GROUPS if name not in ECHO_MODELS}
+        groups[self.simulator.echo_model] = self.echo
+        return {**self.simulator.to_mapping(), **{name: group.to_mapping() for name, group in groups.items()}}
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A simulation and the parts of it that others want to reach."""
+
+    simulation: Simulation
+    world: World
+    sonar: Sonar
+    servo: Servo
+    commanded: CommandedVehicle
+    T_base_sonar: np.ndarray
+
+
+def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: Callable[[str], None]) -> Setup:
+    """Load world and script, relative to `folder`, and put everything together.
+
+    `warn` receives what the world could not give. Raises ParameterError.
+    """
+    parameters = settings.simulator
+    model = make_echo_model(parameters.echo_model, settings.echo.to_mapping())
+    script = _loaded(lambda: load_script(folder / Path(parameters.script).expanduser()))
+    T_base_sonar = _loaded(lambda: robot.mount(BASE_FRAME, SONAR_FRAME))
+    world = _loaded(lambda: _load_world(folder / Path(parameters.world).expanduser(), warn))
+    # Streams of their own: a change of the odometry's noise must leave the beams as they are.
+    beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
+    sonar = Sonar(RayCaster(world), settings.sonar.pattern(), model, beams)
+    servo = Servo(settings.servo)
+    commanded = CommandedVehicle(settings.vehicle, script.start)
+    is_scripted = parameters.drive is Drive.SCRIPT
+    simulation = Simulation(
+        script if is_scripted else commanded,
+        Odometry(settings.odometry, script.pose(0.0), measurements),
+        sonar,
+        SonarHead(settings.sonar.beams_per_turn, settings.sonar.seconds_per_turn),
+        T_base_sonar,
+        servo,
+        script.tilt_commands if is_scripted else (),
+    )
+    return Setup(simulation, world, sonar, servo, commanded, T_base_sonar)
+
+
+def _load_world(path: Path, warn: Callable[[str], None]) -> World:
+    loaded = load_world(path)
+    for warning in loaded.warnings:
+        warn(warning)
+    return loaded.world
+
+
+def _loaded(load: Callable[[], Any]) -> Any:
+    try:
+        return load()
+    except (WorldError, ScriptError, DescriptionError) as error:
+        raise ParameterError(str(error)) from error

@@ -1,0 +1,91 @@
+"""The scanning head: when it looks where, and what it hears (thesis 4.1)."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from node_support.parameters import ParameterSet, parameter
+from sonar_simulator.echoes.echo_model import EchoModel
+from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.beam_tracer import BeamTracer
+from sonar_simulator.rays.ray_caster import RayCaster
+
+# Large enough for numpy, small enough for the cache.
+_BATCH = 120
+
+
+@dataclass(frozen=True)
+class SonarParameters(ParameterSet):
+    """The head's timing and the shape of its beam."""
+
+    beams_per_turn: int = parameter(
+        120, "beams in a full turn", low=1, high=3600, thesis_name="step = 360 / beams_per_turn", tunable=False
+    )
+    seconds_per_turn: float = parameter(16.0, "time of a full turn", unit="s", low=0.01, high=3600.0, tunable=False)
+    vertical_opening_deg: float = parameter(
+        22.0, "height of the beam", unit="deg", low=0.0, high=150.0, thesis_name="opening"
+    )
+    horizontal_opening_deg: float = parameter(2.5, "width of the beam", unit="deg", low=0.0, high=150.0)
+    ray_rows: int = parameter(50, "rays over the height of a beam", low=1, high=1000)
+    ray_columns: int = parameter(10, "rays over the width of a beam", low=1, high=1000)
+
+    def pattern(self) -> BeamPattern:
+        """Return the rays that these parameters describe."""
+        openings = math.radians(self.vertical_opening_deg), math.radians(self.horizontal_opening_deg)
+        return BeamPattern(*openings, self.ray_rows, self.ray_columns)
+
+
+@dataclass(frozen=True)
+class SonarHead:
+    """A head that turns counter-clockwise in equal steps and never stops; beam 0 looks along +x at time 0."""
+
+    beams_per_turn: int
+    seconds_per_turn: float
+
+    def angle(self, beam: int) -> float:
+        """Return the head angle of beam number `beam`, rad in (-pi, pi] about the sonar's +z from +x."""
+        step = beam % self.beams_per_turn
+        if 2 * step > self.beams_per_turn:
+            step -= self.beams_per_turn
+        return math.pi * (2 * step / self.beams_per_turn)
+
+    def time(self, beam: int) -> float:
+        """Return when beam number `beam` is sent, s since beam 0."""
+        return beam * self.seconds_per_turn / self.beams_per_turn
+
+
+class Sonar:
+    """Hears a world. Same seed and calls, same bytes; a batch draws its random numbers in another order."""
+
+    def __init__(self, caster: RayCaster, pattern: BeamPattern, model: EchoModel, rng: np.random.Generator) -> None:
+        self._tracer = BeamTracer(caster, model.pattern(pattern), model.mirrors)
+        self._model = model
+        self._rng = rng
+
+    @property
+    def max_range(self) -> float:
+        """Far end of the last bin, m."""
+        return self._model.max_range
+
+    @property
+    def range_resolution(self) -> float:
+        """Length of a bin, m."""
+        return self._model.max_range / self._model.bins
+
+    def ping(self, T_world_sonar: np.ndarray, angle: float) -> np.ndarray:
+        """Return the strengths (bins,) uint8 of one beam at head `angle` rad from the (4, 4) pose."""
+        return self.pings(T_world_sonar[np.newaxis], np.array([angle]))[0]
+
+    def pings(self, T_world_sonar: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        """Return the strengths (beams, bins) uint8 at head `angles` (beams,) rad from poses (beams, 4, 4).
+
+        Any number of beams: they are taken in batches that fit into memory.
+        """
+        starts = range(0, len(angles), _BATCH)
+        batches = [self._batch(T_world_sonar[i : i + _BATCH], angles[i : i + _BATCH]) for i in starts]
+        return np.concatenate([np.empty((0, self._model.bins), dtype=np.uint8), *batches])
+
+    def _batch(self, T_world_sonar: np.ndarray, angles: np.ndarray) -> np.ndarray:
+        contacts = self._tracer.contacts(T_world_sonar, angles, self._model.max_range, self._rng)
+        return self._model.echoes(contacts, self._rng)

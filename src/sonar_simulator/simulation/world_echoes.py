@@ -1,0 +1,74 @@
+"""Echoes of a world file for an emulated head, which asks for one ping at a time (thesis 6.4)."""
+
+import math
+from typing import Protocol
+
+import numpy as np
+
+from node_support.geometry.matrices import pose_matrix
+from node_support.parameters import ParameterError
+from sonar_simulator.echoes.laser_cone import LaserCone, LaserConeParameters
+from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world.errors import WorldError
+from sonar_simulator.world.world import World
+from sonar_simulator.world.world_file import load_world
+
+_FULL_STRENGTH_DB = 20.0
+
+
+class PingCommand(Protocol):
+    """What of a head's command changes its echoes: reach in m, gain in dB."""
+
+    max_range: int
+    start_gain_db: int
+
+
+class PingRequest(Protocol):
+    """One ping of an emulated head: angle in rad, counter-clockwise, number of bins, and the command."""
+
+    angle: float
+    bin_count: int
+    command: PingCommand
+
+
+class HeadInWorld(Protocol):
+    """Which world, and where the head stands in it: m, degrees counter-clockwise."""
+
+    world_file: str
+    x: float
+    y: float
+    z: float
+    yaw_deg: float
+    seed: int
+
+
+class WorldEchoes:
+    """Answers pings with what a head that stands still hears of a world; the gain scales the strengths."""
+
+    def __init__(self, world: World, T_world_sonar: np.ndarray, seed: int) -> None:
+        """Raises RuntimeError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
+        self._caster = RayCaster(world)
+        self._pose = T_world_sonar
+        self._pattern: BeamPattern = SonarParameters().pattern()
+        self._rng = np.random.default_rng(seed)
+
+    def echoes(self, ping: PingRequest) -> bytes:
+        """Return `ping.bin_count` echo strengths (0 to 255), nearest bin first."""
+        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.command.max_range))
+        sonar = Sonar(self._caster, self._pattern, model, self._rng)
+        factor = 10 ** ((ping.command.start_gain_db - _FULL_STRENGTH_DB) / 20)
+        strengths = sonar.ping(self._pose, ping.angle) * factor
+        return np.minimum(np.rint(strengths), 255).astype(np.uint8).tobytes()
+
+
+def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
+    """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
+    try:
+        world = load_world(parameters.world_file).world
+    except WorldError as error:
+        raise ParameterError(f"world_file: {error}") from error
+    position = parameters.x, parameters.y, parameters.z
+    pose = pose_matrix(position, (0.0, 0.0, math.radians(parameters.yaw_deg)))
+    return WorldEchoes(world, pose, parameters.seed)

@@ -1,0 +1,1 @@
+"""The simulated vehicle: movement, odometry, servo, description."""

@@ -1,0 +1,104 @@
+"""What the vehicle believes of its own motion (thesis 7.4)."""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+
+from node_support.geometry.matrices import pose_matrix, yaw_of
+from node_support.parameters import ParameterSet, parameter
+from sonar_simulator.vehicle.movement import VehicleState
+
+_NOISE_TIME = 1.0
+
+
+@dataclass(frozen=True)
+class OdometryParameters(ParameterSet):
+    """The error of the odometry. Depth is right: it comes from a pressure sensor (thesis 4.3.2)."""
+
+    scale_error: float = parameter(
+        0.3, "the vehicle really moves 1 + scale_error times what odometry says", low=-0.9, high=10.0
+    )
+    heading_drift_deg_per_minute: float = parameter(
+        0.0, "the believed heading turns away from the true one at this rate", unit="deg/min", low=-360.0, high=360.0
+    )
+    speed_noise: float = parameter(
+        0.0, "standard deviation of the measured speed along each axis, as a share of the speed", low=0.0, high=10.0
+    )
+    turn_rate_noise_deg: float = parameter(
+        0.0, "standard deviation of the measured turn rate while the vehicle moves", unit="deg/s", low=0.0, high=360.0
+    )
+
+
+class Estimate(NamedTuple):
+    """What odometry says: (4, 4) T_odom_base and the (6,) body twist, m/s and rad/s."""
+
+    T_odom_base: np.ndarray
+    twist: np.ndarray
+
+
+class Odometry:
+    """Dead reckoning from a speed and a turn rate that are measured wrongly. The odom frame begins as the world frame.
+
+    Noise is a Gauss-Markov process with a correlation time of 1 s, so that what it does to the pose does not depend
+    on how often odometry is asked. A vehicle that rests is measured to rest, but for the drift of its heading.
+    """
+
+    def __init__(self, parameters: OdometryParameters, start: np.ndarray, rng: np.random.Generator) -> None:
+        """`start`: (4, 4) T_world_base at time 0, when odometry is right."""
+        self._parameters = parameters
+        self._rng = rng
+        self._time = 0.0
+        self._true = start
+        self._position = start[:2, 3].copy()
+        self._heading_error = 0.0
+        self._noise = rng.standard_normal(3)
+
+    def estimate(self, time: float, state: VehicleState) -> Estimate:
+        """Return what odometry says at `time` s, never before that of the last call, of the true `state`."""
+        duration = max(time - self._time, 0.0)
+        self._advance(duration, state)
+        self._time = max(time, self._time)
+        x, y = self._position
+        yaw = yaw_of(state.T_world_base) + self._heading_error
+        pose = pose_matrix((x, y, state.T_world_base[2, 3]), (0.0, 0.0, yaw))
+        return Estimate(pose, self._measured(state))
+
+    def _advance(self, duration: float, state: VehicleState) -> None:
+        keep = math.exp(-duration / _NOISE_TIME)
+        self._noise = keep * self._noise + math.sqrt(1.0 - keep**2) * self._rng.standard_normal(3)
+        turned = self._turn_rate_error(state) * duration
+        yaw = yaw_of(state.T_world_base)
+        middle = 0.5 * (yaw_of(self._true) + _unwrapped(yaw, yaw_of(self._true)))
+        moved = _turned(state.T_world_base[:2, 3] - self._true[:2, 3], -middle)
+        measured = moved * self._scale * (1.0 + self._parameters.speed_noise * self._noise[:2])
+        self._position = self._position + _turned(measured, middle + self._heading_error + 0.5 * turned)
+        self._heading_error += turned
+        self._true = state.T_world_base
+
+    def _measured(self, state: VehicleState) -> np.ndarray:
+        twist = state.twist.copy()
+        twist[:2] *= self._scale * (1.0 + self._parameters.speed_noise * self._noise[:2])
+        if not state.is_still:
+            twist[5] += self._turn_rate_error(state)
+        return twist
+
+    def _turn_rate_error(self, state: VehicleState) -> float:
+        drift = self._parameters.heading_drift_deg_per_minute / 60.0
+        noise = 0.0 if state.is_still else self._parameters.turn_rate_noise_deg * self._noise[2]
+        return math.radians(drift + noise)
+
+    @property
+    def _scale(self) -> float:
+        return 1.0 / (1.0 + self._parameters.scale_error)
+
+
+def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
+    cos_angle, sin_angle = math.cos(angle), math.sin(angle)
+    x, y = vector
+    return np.array([cos_angle * x - sin_angle * y, sin_angle * x + cos_angle * y])
+
+
+def _unwrapped(angle: float, near: float) -> float:
+    return near + math.remainder(angle - near, 2.0 * math.pi)

@@ -1,0 +1,182 @@
+"""A vehicle that follows a script of moves: its pose and twist at any time, in closed form."""
+
+import math
+from dataclasses import dataclass
+from typing import Any, List, Mapping, NamedTuple, Sequence, Tuple
+
+import numpy as np
+
+from node_support.geometry.matrices import pose_matrix
+from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_simulator.vehicle.movement import VehicleState
+
+# The greatest slope of the minimum-jerk law, reached half way: peak speed over mean speed.
+_PEAK = 1.875
+
+
+class ScriptError(ValueError):
+    """A script cannot be followed; the text names entry number, key, value and what is allowed."""
+
+
+@dataclass(frozen=True)
+class Start(ParameterSet):
+    """Where a script begins, in the world frame."""
+
+    x: float = parameter(0.0, "start", unit="m")
+    y: float = parameter(0.0, "start", unit="m")
+    z: float = parameter(-2.0, "start, 0 at the water's surface", unit="m")
+    yaw_deg: float = parameter(0.0, "heading, counter-clockwise from +x", unit="deg")
+
+    def pose(self) -> np.ndarray:
+        """Return x, y, z [m] and yaw [rad]."""
+        return np.array([self.x, self.y, self.z, math.radians(self.yaw_deg)])
+
+
+@dataclass(frozen=True)
+class Move(ParameterSet):
+    """One entry of a script: a displacement along the axes of the world, with a turn, from rest to rest."""
+
+    x: float = parameter(0.0, "displacement", unit="m")
+    y: float = parameter(0.0, "displacement", unit="m")
+    z: float = parameter(0.0, "displacement, up positive", unit="m")
+    yaw_deg: float = parameter(0.0, "turn, counter-clockwise positive", unit="deg")
+    speed: float = parameter(1.0, "greatest speed on the way", unit="m/s", low=0.001)
+    turn_rate_deg: float = parameter(15.0, "greatest turn rate on the way", unit="deg/s", low=0.001)
+    seconds: float = parameter(0.0, "time of the move; 0: as speed and turn rate give", unit="s", low=0.0)
+
+    def check(self) -> None:
+        """Refuse a move that goes nowhere: a wait has its own entry."""
+        if not self.displacement().any():
+            raise ParameterError("x, y, z, yaw_deg are all 0: one must differ; to stay use wait")
+
+    def displacement(self) -> np.ndarray:
+        """Return x, y, z [m] and yaw [rad] to go."""
+        return np.array([self.x, self.y, self.z, math.radians(self.yaw_deg)])
+
+    def duration(self) -> float:
+        """Return the time of the move, s."""
+        distance = math.sqrt(self.x**2 + self.y**2 + self.z**2)
+        return self.seconds or _PEAK * max(distance / self.speed, abs(self.yaw_deg) / self.turn_rate_deg)
+
+
+@dataclass(frozen=True)
+class Wait(ParameterSet):
+    """One entry of a script: staying where it is."""
+
+    wait: float = parameter(0.0, "time to stay", unit="s", low=0.0)
+
+    def displacement(self) -> np.ndarray:
+        """Return x, y, z [m] and yaw [rad] to go: none."""
+        return np.zeros(4)
+
+    def duration(self) -> float:
+        """Return the time of the wait, s."""
+        return self.wait
+
+
+@dataclass(frozen=True)
+class Tilt(ParameterSet):
+    """One entry of a script: the sonar's servo turns from now on; the script goes on at once."""
+
+    tilt_deg: float = parameter(0.0, "angle of the servo, positive down", unit="deg", low=-180.0, high=180.0)
+
+    def displacement(self) -> np.ndarray:
+        """Return x, y, z [m] and yaw [rad] to go: none."""
+        return np.zeros(4)
+
+    def duration(self) -> float:
+        """Return the time it takes the vehicle, s: none."""
+        return 0.0
+
+
+class TiltCommand(NamedTuple):
+    """When the servo is told to turn, s since the script's start, and to which angle, rad."""
+
+    time: float
+    angle: float
+
+
+class VehicleScript:
+    """Moves one after the other; each follows the minimum-jerk law, so the twist is continuous.
+
+    `start` is (4,) x, y, z [m], yaw [rad]; `tilt_commands` are in order of time. Before time 0 the vehicle stands at
+    its start, after `duration` where the last move ended.
+    """
+
+    def __init__(self, entries: Sequence[Any], start: np.ndarray) -> None:
+        self._displacements = np.array([entry.displacement() for entry in entries]).reshape(-1, 4)
+        self._durations = np.array([entry.duration() for entry in entries], dtype=np.float64)
+        self._ends = np.cumsum(self._durations)
+        self._origins = np.vstack([start, start + np.cumsum(self._displacements, axis=0)])
+        self.start = np.array(start, dtype=np.float64)
+        self.tilt_commands: List[TiltCommand] = [
+            TiltCommand(float(end), math.radians(entry.tilt_deg))
+            for entry, end in zip(entries, self._ends)
+            if isinstance(entry, Tilt)
+        ]
+
+    @classmethod
+    def from_yaml_data(cls, moves: Any, start: Any = None) -> "VehicleScript":
+        """Build from a list of mappings, keys as in `Move`, `Wait` or `Tilt`, and a mapping with keys as in `Start`.
+
+        Raises ScriptError.
+        """
+        if not isinstance(moves, list) or not moves:
+            raise ScriptError(f"moves = {moves!r}: must be a list with at least one entry")
+        beginning = _entry(Start, {} if start is None else start, "start")
+        entries = [_entry(_kind_of(values), values, f"entry {number}") for number, values in enumerate(moves, 1)]
+        return cls(entries, beginning.pose())
+
+    @property
+    def duration(self) -> float:
+        """Time from the first move's start to the last one's end, s."""
+        return float(self._ends[-1])
+
+    def state(self, time: float) -> VehicleState:
+        """Return the vehicle's state at `time` s, in any order of times."""
+        return VehicleState(self.pose(time), self.twist(time), self.is_still(time))
+
+    def pose(self, time: float) -> np.ndarray:
+        """Return the (4, 4) T_world_base at `time` [s]; x forward, y left, z up."""
+        x, y, z, yaw = self._state(time)[0]
+        return pose_matrix((x, y, z), (0.0, 0.0, yaw))
+
+    def twist(self, time: float) -> np.ndarray:
+        """Return the (6,) velocity at `time` s in the body frame: linear x y z, m/s, angular x y z, rad/s."""
+        position, velocity = self._state(time)
+        cos_yaw, sin_yaw = math.cos(position[3]), math.sin(position[3])
+        forward = cos_yaw * velocity[0] + sin_yaw * velocity[1]
+        left = cos_yaw * velocity[1] - sin_yaw * velocity[0]
+        return np.array([forward, left, velocity[2], 0.0, 0.0, velocity[3]])
+
+    def is_still(self, time: float) -> bool:
+        """Return whether the vehicle rests between moves at `time` s; the slow ends of a move are no rest."""
+        index = self._index(time)
+        return time < 0.0 or index == len(self._ends) or not self._displacements[index].any()
+
+    def _index(self, time: float) -> int:
+        return int(np.searchsorted(self._ends, time, side="right"))
+
+    def _state(self, time: float) -> Tuple[np.ndarray, np.ndarray]:
+        index = self._index(time)
+        if time < 0.0 or index == len(self._ends):
+            return self._origins[0 if time < 0.0 else -1], np.zeros(4)
+        duration, displacement = self._durations[index], self._displacements[index]
+        u = (time - (self._ends[index] - duration)) / duration
+        travelled = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+        slope = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+        return self._origins[index] + travelled * displacement, slope * displacement
+
+
+def _kind_of(values: Any) -> type:
+    keys = values if isinstance(values, Mapping) else ()
+    return Wait if "wait" in keys else Tilt if "tilt_deg" in keys else Move
+
+
+def _entry(kind: type, values: Any, name: str) -> Any:
+    if not isinstance(values, Mapping):
+        raise ScriptError(f"{name} = {values!r}: must be keys and values")
+    try:
+        return kind.from_mapping(values)
+    except ParameterError as error:
+        raise ScriptError(f"{name}: {error}") from error

@@ -1,0 +1,1 @@
+"""The world around the sonar: files, shapes, materials."""

@@ -1,0 +1,94 @@
+"""Reads meshes from .dae, .stl, .obj, .ply, .glb and .gltf files, in metres and with z up."""
+
+from pathlib import Path
+from typing import Dict, List, Tuple
+from xml.etree import ElementTree as ET
+
+import numpy as np
+
+from sonar_simulator.world.errors import WorldError
+from sonar_simulator.world.primitives import Mesh
+
+MESH_SUFFIXES = (".dae", ".stl", ".obj", ".ply", ".glb", ".gltf")
+_Y_UP = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+_X_UP = np.array([[0.0, -1.0, 0.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0]])
+_COLLADA_AXES: Dict[str, np.ndarray] = {"X_UP": _X_UP, "Y_UP": _Y_UP, "Z_UP": np.eye(3)}
+
+
+def load_mesh(path: Path, submesh: str = "") -> Mesh:
+    """Return vertices (n, 3) in m, z up, and faces (m, 3) of a mesh file, or of one named mesh in it.
+
+    Collada says its unit and up axis, glTF is in metres and y up; the others are taken as metres and z up.
+    Raises WorldError, naming the file.
+    """
+    parts = _parts(path)
+    if submesh:
+        parts = [part for part in parts if part[0] == submesh]
+        if not parts:
+            raise WorldError(f"{path}: no mesh {submesh!r} in it")
+    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int32)], 0
+    for _, corners, triangles in parts:
+        vertices.append(corners)
+        faces.append(triangles + count)
+        count += len(corners)
+    return _checked(path, np.concatenate(vertices) @ _to_metres_z_up(path).T, np.concatenate(faces).astype(np.int32))
+
+
+def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
+    if path.suffix.lower() not in MESH_SUFFIXES:
+        raise WorldError(f"{path}: a mesh must be one of {', '.join(MESH_SUFFIXES)}")
+    try:
+        import trimesh
+    except ImportError as error:
+        raise WorldError(f"{path}: no reader for meshes ({error}); run scripts/bootstrap") from error
+    try:
+        scene = trimesh.load(str(path), force="scene", process=False)
+    except OSError as error:
+        raise WorldError(f"{path}: {error.strerror or error}") from error
+    except Exception as error:
+        # The readers of the formats fail each in their own way on files that are not what their name says.
+        reason = " ".join(str(error).split())
+        raise WorldError(f"{path}: not a mesh: {type(error).__name__}: {reason}") from error
+    parts = []
+    for node in scene.graph.nodes_geometry:
+        T_scene_node, name = scene.graph[node]
+        geometry = scene.geometry[name]
+        if len(getattr(geometry, "faces", ())):
+            corners = np.asarray(geometry.vertices) @ T_scene_node[:3, :3].T + T_scene_node[:3, 3]
+            parts.append((name, corners, np.asarray(geometry.faces)))
+    return parts
+
+
+def _to_metres_z_up(path: Path) -> np.ndarray:
+    """Return the (3, 3) matrix from a file's own coordinates."""
+    suffix = path.suffix.lower()
+    if suffix in (".glb", ".gltf"):
+        return _Y_UP
+    if suffix != ".dae":
+        return np.eye(3)
+    asset = next((child for child in ET.parse(str(path)).getroot() if _local(child) == "asset"), None)
+    described = {} if asset is None else {_local(child): child for child in asset}
+    unit = _metres(path, described["unit"].get("meter", "1")) if "unit" in described else 1.0
+    axis = (described["up_axis"].text or "").strip() if "up_axis" in described else "Y_UP"
+    return unit * _COLLADA_AXES.get(axis, _Y_UP)
+
+
+def _metres(path: Path, text: str) -> float:
+    try:
+        return float(text)
+    except ValueError:
+        raise WorldError(f"{path}: <unit meter={text!r}> is not a number") from None
+
+
+def _local(element: ET.Element) -> str:
+    return element.tag.rpartition("}")[2]
+
+
+def _checked(path: Path, vertices: np.ndarray, faces: np.ndarray) -> Mesh:
+    if not len(faces):
+        raise WorldError(f"{path}: no triangle in it")
+    if faces.max() >= len(vertices) or faces.min() < 0:
+        raise WorldError(f"{path}: a triangle names a vertex that is not there")
+    if not np.isfinite(vertices).all():
+        raise WorldError(f"{path}: a vertex is not finite")
+    return vertices, faces
