@@ -16,6 +16,7 @@ from imagenex_852_driver.logs.playback import timed
 from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
+from node_support import topics
 from node_support.health import Health
 from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded
@@ -34,7 +35,7 @@ class LogPlayer:
         self._options = options
         self.reader = opened(options.file)
         self.published = 0
-        self._beams = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=1000)
+        self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=1000)
 
     def run(self) -> None:
         """Play to the end, or for ever with `loop`; ends early at shutdown."""
@@ -93,7 +94,7 @@ class LogRecorder:
         except OSError as error:
             raise StartError(f"{options.file}: {error.strerror}") from error
         rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(health, self._take_settings))
-        self._beams = rospy.Subscriber("sonar/raw", SonarScanLine, guarded(health, self._record), queue_size=1000)
+        self._beams = rospy.Subscriber(topics.BEAMS, SonarScanLine, guarded(health, self._record), queue_size=1000)
         rospy.on_shutdown(self._end)
 
     def _take_settings(self, config: Config) -> None:

@@ -7,6 +7,7 @@ from visualization_msgs.msg import MarkerArray
 
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.blocks import Blocks
+from node_support import topics
 from sonar_processing.ros.conversions import header, point_cloud
 
 CLOUD_FIELDS = ("x", "y", "z", "intensity", "height", "depth", "count")
@@ -18,8 +19,8 @@ class MapPublisher:
     def __init__(self, map_frame: str) -> None:
         self._map_frame = map_frame
         self._block_markers = BlockMarkers()
-        self._markers = rospy.Publisher("MLSM/Markers", MarkerArray, queue_size=2, latch=True)
-        self._cloud = rospy.Publisher("MLSM/cloud", PointCloud2, queue_size=2, latch=True)
+        self._markers = rospy.Publisher(topics.MAP_MARKERS, MarkerArray, queue_size=2, latch=True)
+        self._cloud = rospy.Publisher(topics.MAP_CLOUD, PointCloud2, queue_size=2, latch=True)
 
     def publish(self, blocks: Blocks, stamp_ns: int) -> None:
         """Send the whole map."""

@@ -22,6 +22,7 @@ from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_transform import MapTransform
 from mlsm_manager.ros.odometry_track import OdometryTrack
 from mlsm_manager.surface_map.storage import map_path, write_ply
+from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import matrices
 from node_support.ros.node import every, guarded, make_health
@@ -54,7 +55,7 @@ class MlsmCore:
         rospy.Service(f"{prefix}save_map", SaveMap, self._save)
         rospy.Service(f"{prefix}reset", Trigger, self._reset)
         rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
-        rospy.Subscriber("startMatching", Bool, guarded(self.health, self._start_matching), queue_size=10)
+        rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
         every(parameters.map_period, self._publish_if_changed, self.health)
 
     def subscribe(self) -> None:
@@ -66,8 +67,8 @@ class MlsmCore:
         def take_echoes(message: StampedIntensityCloudArrays) -> None:
             self.match(cloud_from_message(message))
 
-        subscribe_to_clouds("sonar/scan/cleaned", guarded(self.health, take))
-        subscribe_to_clouds("sonar/scan/echoes", guarded(self.health, take_echoes))
+        subscribe_to_clouds(topics.CLEANED, guarded(self.health, take))
+        subscribe_to_clouds(topics.ECHOES, guarded(self.health, take_echoes))
 
     def insert(self, cloud: IntensityCloud) -> None:
         """Insert a cloud; one that cannot be placed in the map is counted and left out."""

@@ -1,11 +1,21 @@
 """Planar poses as arrays: x y [m] and yaw [rad] in the last axis; T_a_b takes coordinates in b to coordinates in a."""
 
+from typing import TypeVar
+
 import numpy as np
 
+FULL_TURN = 2.0 * np.pi
+Angle = TypeVar("Angle", float, np.ndarray)
 
-def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Return angles in [-pi, pi)."""
-    return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
+
+def wrapped(angle: Angle) -> Angle:
+    """Return an angle, or an array of angles, in [-pi, pi)."""
+    return (angle + np.pi) % FULL_TURN - np.pi
+
+
+def unwrapped(angle: float, near: float) -> float:
+    """Return the angle, plus or minus whole turns, that is nearest to `near`."""
+    return near + wrapped(angle - near)
 
 
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:

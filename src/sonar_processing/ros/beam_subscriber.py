@@ -4,16 +4,16 @@ from typing import Callable
 
 import rospy
 
+from node_support import topics
 from underwater_map_construction.msg import SonarScanLine
 
-BEAM_TOPIC = "sonar/raw"
 _BUFFER_BYTES = 2**20
 
 
 def subscribe_to_beams(callback: Callable[[SonarScanLine], None], queue_size: int = 200) -> rospy.Subscriber:
     """Subscribe to the beams without delay."""
     return rospy.Subscriber(
-        BEAM_TOPIC,
+        topics.BEAMS,
         SonarScanLine,
         callback,
         queue_size=queue_size,

@@ -4,17 +4,15 @@ from typing import List, Optional, Protocol
 
 import rospy
 
+from node_support import topics
 from node_support.health import Health
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.stage_table import POLAR_TOPIC
 from sonar_processing.ros.cloud_publisher import QUEUE_SIZE, CloudPublisher
 from sonar_processing.ros.conversions import LaserScanArrays, laser_scan_message
 from sonar_processing.scans.laser_scan import laser_turn
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
-
-LASER_SCAN_TOPIC = "sonar/scan/laserScan"
 
 
 class CloudTaker(Protocol):
@@ -27,13 +25,13 @@ class CloudTaker(Protocol):
 
 
 class TurnPublisher:
-    """The turn as organised cloud (`POLAR_TOPIC`) and as LaserScan; `taker` gets the cloud within the process."""
+    """The turn as organised cloud and as LaserScan; `taker` gets the cloud within the process."""
 
     def __init__(self, health: Health, taker: Optional[CloudTaker] = None) -> None:
         self._health = health
         self._taker = taker
-        self._clouds = CloudPublisher(POLAR_TOPIC)
-        self._lasers = rospy.Publisher(LASER_SCAN_TOPIC, LaserScanArrays, queue_size=QUEUE_SIZE)
+        self._clouds = CloudPublisher(topics.POLAR_SCANS)
+        self._lasers = rospy.Publisher(topics.LASER_SCANS, LaserScanArrays, queue_size=QUEUE_SIZE)
 
     def publish(self, beams: List[PlacedBeam], parameters: SonarToCloudParameters) -> None:
         """Send a finished turn to those who want it."""

@@ -7,6 +7,7 @@ import numpy as np
 import rospy
 from visualization_msgs.msg import MarkerArray
 
+from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.ros.node import guarded, make_health
 from node_support.ros.reconfigurable_parameters import LiveParameters
@@ -21,7 +22,6 @@ from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import RansacParameters
 from underwater_map_construction.msg import Circles, Walls
 
-INPUT_TOPIC = "sonar/scan/cleaned"
 QUEUE_SIZE = 10
 
 
@@ -43,7 +43,7 @@ class ShapeDetectorNode(ABC):
         self._inliers = PointsPublisher(self.topic)
         self._coefficients = rospy.Publisher(f"{self.topic}/coefficients", self.message, queue_size=QUEUE_SIZE)
         self._markers = rospy.Publisher(f"{self.topic}/markers", MarkerArray, queue_size=QUEUE_SIZE)
-        subscribe_to_clouds(INPUT_TOPIC, guarded(self.health, self._take))
+        subscribe_to_clouds(topics.CLEANED, guarded(self.health, self._take))
 
     @abstractmethod
     def _use_parameters(self, parameters: RansacParameters) -> None:
@@ -73,7 +73,7 @@ class ShapeDetectorNode(ABC):
 class LineDetectorNode(ShapeDetectorNode):
     """line_detector."""
 
-    name, topic, what, config_name = "line_detector", "sonar/scan/line", "walls", "LineDetector"
+    name, topic, what, config_name = "line_detector", topics.LINES, "walls", "LineDetector"
     parameters, message = LineDetectorParameters, Walls
 
     def _use_parameters(self, parameters: LineDetectorParameters) -> None:
@@ -95,7 +95,7 @@ class LineDetectorNode(ShapeDetectorNode):
 class CircleDetectorNode(ShapeDetectorNode):
     """circle_detector."""
 
-    name, topic, what, config_name = "circle_detector", "sonar/scan/circle", "circles", "CircleDetector"
+    name, topic, what, config_name = "circle_detector", topics.CIRCLES, "circles", "CircleDetector"
     parameters, message = CircleDetectorParameters, Circles
 
     def _use_parameters(self, parameters: CircleDetectorParameters) -> None:

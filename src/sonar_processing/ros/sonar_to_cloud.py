@@ -2,6 +2,7 @@
 
 from typing import Callable, Optional
 
+from node_support import topics
 from node_support.ros.node import guarded, make_health
 from node_support.ros.reconfigurable_parameters import LiveParameters
 from sonar_processing.beams.placed_beam import PlacedBeam
@@ -38,9 +39,9 @@ class SonarToCloud:
         self._live = LiveParameters(
             SonarToCloudParameters, namespace, "SonarToCloud", self.health, self._use_parameters
         )
-        self._scans = CloudPublisher("sonar/scan/sonarCloud")
-        self._laser_scans = PointsPublisher("sonar/scan/laserCloud")
-        self._newest_beam = PointsPublisher("sonar/beam")
+        self._scans = CloudPublisher(topics.SCANS)
+        self._laser_scans = PointsPublisher(topics.LASER_POINTS)
+        self._newest_beam = PointsPublisher(topics.NEWEST_BEAM)
         self._turns = TurnPublisher(self.health, polar_taker)
         parameters = self._live.current
         self._filter = TransformFilter(parameters.target_frame, self.health, self._forget_scan)

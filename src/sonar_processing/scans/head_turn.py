@@ -1,12 +1,9 @@
 """How far the head has turned since the first beam of a scan."""
 
 import bisect
-import math
 from typing import List, Optional
 
-from sonar_processing.beams.projection import wrapped
-
-FULL_TURN = 2.0 * math.pi
+from node_support.geometry.planar import FULL_TURN, wrapped
 
 
 class HeadTurn:

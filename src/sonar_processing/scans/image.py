@@ -7,9 +7,9 @@ from typing import Optional
 import numpy as np
 
 from node_support.errors import RefusedInput
+from node_support.geometry.planar import wrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.projection import wrapped
 
 MOST_PIXELS = 3000
 _USUAL_PIXELS = 501

@@ -6,7 +6,7 @@ from typing import Tuple
 
 import numpy as np
 
-from sonar_processing.scans.head_turn import FULL_TURN
+from node_support.geometry.planar import FULL_TURN, wrapped
 from sonar_processing.scans.laser_pick import picked_bins
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
@@ -56,7 +56,7 @@ def laser_turn(scan: PolarScan, parameters: SonarToCloudParameters) -> LaserTurn
 
 def usual_rays(angles: np.ndarray) -> int:
     """Return how many steps of the head's usual size make a turn; 1 when the head stands still."""
-    steps = np.abs((np.diff(angles) + math.pi) % FULL_TURN - math.pi)
+    steps = np.abs(wrapped(np.diff(angles)))
     steps = steps[steps > FULL_TURN / MOST_RAYS]
     return round(FULL_TURN / float(np.median(steps))) if steps.size else 1
 

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from node_support import topics
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
 
@@ -72,7 +73,7 @@ class ScanParameters(ParameterSet):
         0, "rays of the laser scan; 0: as many as the head makes steps in a turn", low=0, high=7200
     )
     velocity_topic: str = parameter(
-        "cmd_vel", "tells whether the vehicle moves", tunable=False, thesis_name="velocityTopic"
+        topics.VELOCITY_COMMANDS, "tells whether the vehicle moves", tunable=False, thesis_name="velocityTopic"
     )
     velocity_type: VelocityType = parameter(VelocityType.TWIST, "type of the velocity topic", tunable=False)
     velocity_timeout: float = parameter(

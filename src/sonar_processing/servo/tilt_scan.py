@@ -91,10 +91,7 @@ class TiltScan:
         return self._goals[self._step]
 
     def take_joint(self, time: float, angle: float) -> None:
-        """Note where the servo is; one that is no number is as good as none."""
-        if not math.isfinite(angle):
-            self._health.problem("joint states refused", f"{self.parameters.joint} at {angle} rad")
-            return
+        """Note where the servo is, rad; finite."""
         self._see_time(time)
         self._joint_time = time
         if self._angle is None or abs(angle - self._angle) > self._tolerance / 2.0:

@@ -157,12 +157,6 @@ def test_a_clock_that_begins_late_has_missed_nothing():
     assert rig.warnings == []
 
 
-def test_a_joint_that_is_no_number_is_refused():
-    rig = Rig()
-    rig.scan.take_joint(100.1, math.nan)
-    assert "nan" in rig.warnings[0]
-
-
 def test_a_range_in_the_wrong_order_is_refused():
     with pytest.raises(ParameterError, match="lowest_deg"):
         SonarControlParameters(lowest_deg=10.0, highest_deg=-10.0)
