@@ -17,9 +17,9 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
-    parser = argparse.ArgumentParser("map_bag", description="Map a recording without a master, faster than it was recorded.")
+    parser = argparse.ArgumentParser("map_bag", description="Map a recording without a ROS master.")
     parser.add_argument("bag", type=Path, help="recording with beams and tf (odom, base_link, sonar)")
-    parser.add_argument("--out", type=Path, required=True, help="folder to write to; it is created if it does not exist")
+    parser.add_argument("--out", type=Path, required=True, help="output folder; created if it does not exist")
     parser.add_argument("--matcher", choices=[name.value for name in MatcherName], help="which matcher")
     parser.add_argument("--truth", help="topic of the true position, to measure errors against")
     parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
