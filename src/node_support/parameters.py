@@ -41,7 +41,7 @@ class Description:
         if kind is bool:
             return "true or false"
         if kind is str:
-            return "a text" if self.may_be_empty else "a text that is not empty"
+            return "a string" if self.may_be_empty else "a non-empty string"
         number = "an integer" if kind is int else "a number"
         bounds = [
             f"{word} {bound:.12g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None
@@ -64,7 +64,7 @@ def parameter(
     """Declare one field of a `ParameterSet`.
 
     `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
-    the others only at start-up; `may_be_empty` allows an empty text; `thesis_name` is the parameter's name in the
+    the others only at start-up; `may_be_empty` allows an empty string; `thesis_name` is the parameter's name in the
     2015 package.
     """
     description = Description(text, unit, low, high, thesis_name, tunable, may_be_empty)

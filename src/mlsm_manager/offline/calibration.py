@@ -36,7 +36,7 @@ def calibrated(scans: List[Scan], parameters: ReplayParameters, held: Collection
     """Return `parameters` with those of the sensor model and `scale_deviation` estimated from raw `scans`.
 
     Those that are `held` stay. Only the leading edge of an echo lies beside the axis of a wide beam; its peak does not.
-    An odometry that disagrees with the sonar by more than both may be wrong is taken for as wrong as that.
+    Where odometry and sonar disagree by more than both may be off, `scale_deviation` is raised to match.
     """
     model = parameters.sensor_model()
     if "edge_half_width" not in held and parameters.mode is ExtractionMode.LEADING_EDGE:

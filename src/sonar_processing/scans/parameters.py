@@ -77,7 +77,7 @@ class ScanParameters(ParameterSet):
     )
     velocity_type: VelocityType = parameter(VelocityType.TWIST, "type of the velocity topic", tunable=False)
     velocity_timeout: float = parameter(
-        2.0, "a moving vehicle not heard of for longer is warned of", unit="s", low=0.0, high=3600.0
+        2.0, "warn when a moving vehicle sends no velocity for longer", unit="s", low=0.0, high=3600.0
     )
     still_speed: float = parameter(0.01, "slower than this counts as still", unit="m/s", low=0.0, high=1.0)
     still_turn_rate: float = parameter(

@@ -1,4 +1,4 @@
-"""The simulator as a node: it is the clock, the odometry, tf and the sonar."""
+"""The simulator as a node: publishes /clock, odometry, tf and the beams of the sonar."""
 
 import itertools
 import math

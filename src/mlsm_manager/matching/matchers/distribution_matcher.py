@@ -117,12 +117,12 @@ class DistributionMatcher:
         for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
-                return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
+                return MatchStatus.AMBIGUOUS, f"the second-best pose is only {lead:.1f} nats worse"
         values, vectors = np.linalg.eigh(best.covariance[:2, :2])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
-            return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
+            return MatchStatus.AMBIGUOUS, f"a pose beside it, in the worst direction, is only {lead:.1f} nats worse"
         return MatchStatus.CONVERGED, ""
 
 
