@@ -39,10 +39,15 @@ class Intervals:
         return Intervals(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
 
+def joined(first: Intervals, second: Intervals) -> Intervals:
+    """Return those of the first, then those of the second."""
+    names = first.__dataclass_fields__
+    return Intervals(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
+
+
 def concatenated(first: Intervals, second: Intervals) -> Intervals:
     """Return both, sorted by cell, then by bottom."""
-    names = first.__dataclass_fields__
-    both = Intervals(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
+    both = joined(first, second)
     return both.take(np.lexsort((both.bottom, both.cell)))
 
 

@@ -112,7 +112,7 @@ def test_columns_that_no_map_has_are_refused_even_with_a_right_checksum(file_byt
             changed[name] = rng.choice([np.nan, -1.0, 0.0, 1e9], arrays[name].shape).astype(kind)[: rng.randint(9)]
         if rng.randint(2):
             del changed[names[rng.randint(len(names))]]
-        with pytest.raises(ArrayFileError, match="^.*$"):
+        with pytest.raises(ArrayFileError, match=r"^.*$"):
             map_of_bytes(encoded(words, changed))
 
 
