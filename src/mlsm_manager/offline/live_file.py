@@ -31,6 +31,9 @@ def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) 
         target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
     )
     values["mlsm_core"].update(
+        size_x_meters=0.0,
+        size_y_meters=0.0,
+        map_frame="map" if odom_frame != "map" else "corrected_map",
         odom_frame=odom_frame,
         base_frame=base_frame,
         match_input=MatchInput.ECHOES.value,
