@@ -143,6 +143,8 @@ class MlsmCore:
         if newest is None:
             return self._localiser.mapper.correction
         time, pose = newest
+        if time is None:
+            return self._localiser.standing_correction(pose)
         self._notice_time(time)
         since = self._localiser.silent_since(time)
         if since is not None:
