@@ -50,13 +50,17 @@ class OdometryTrack:
         """Return the (4, 4) T_odom_base at `time` [s], which a track has been made of."""
         return matrix_from_message(self._buffer.lookup_transform_core(*self._frames, _stamp(time)).transform)
 
-    def newest(self) -> Optional[Tuple[float, np.ndarray]]:
-        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none."""
+    def newest(self) -> Optional[Tuple[Optional[float], np.ndarray]]:
+        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none.
+
+        Static transforms hold at all times and have none of their own: the time is then None.
+        """
         try:
             stamped = self._buffer.lookup_transform_core(*self._frames, rospy.Time(0))
         except tf2_ros.TransformException:
             return None
-        return stamped.header.stamp.to_sec(), _planar(matrix_from_message(stamped.transform))
+        stamp = stamped.header.stamp
+        return None if stamp.is_zero() else stamp.to_sec(), _planar(matrix_from_message(stamped.transform))
 
     def _wait_for(self, end: float) -> None:
         deadline = wall.monotonic() + _PATIENCE
