@@ -77,7 +77,7 @@ class UnreadTopics(unittest.TestCase):
         cls.transforms.sendTransform(mount)
         wait_for_publisher_links(cls.beams, 1)
         wait_for_publisher_links(cls.odometry, 1)
-        cls.time = 1000.0
+        cls.time = rospy.get_time()
 
     def send_turn(self) -> None:
         """Publish a full turn with an echo in every beam."""

@@ -47,7 +47,9 @@ class MlsmCore:
         self._stamp_ns = 0
         self._live = LiveParameters(MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters)
         parameters = self._live.current
-        self._odometry = OdometryTrack(parameters.odom_frame, parameters.base_frame)
+        self._odometry = OdometryTrack(
+            parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
+        )
         self._publisher = MapPublisher(parameters.map_frame)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
@@ -119,6 +121,7 @@ class MlsmCore:
         return self._mapper.take_cloud(Scan.from_stamps(cloud.points, cloud.time_stamps, time, nowhere))
 
     def _check(self, cloud: IntensityCloud) -> None:
+        self._odometry.check_stamp(cloud.stamp_ns)
         parameters = self._live.current
         if cloud.frame_id not in (parameters.odom_frame, parameters.map_frame):
             raise RefusedInput(

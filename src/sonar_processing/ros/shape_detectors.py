@@ -39,7 +39,7 @@ class ShapeDetectorNode(ABC):
         """Raises ParameterError for a bad parameter."""
         self.health = make_health(self.name)
         self._live = LiveParameters(self.parameters, "~", self.config_name, self.health, self._use_parameters)
-        self._places = SonarPlaces(self._live.current.sonar_frame)
+        self._places = SonarPlaces(self._live.current.sonar_frame, self.health, self._live.current.stamp_tolerance)
         self._inliers = PointsPublisher(self.topic)
         self._coefficients = rospy.Publisher(f"{self.topic}/coefficients", self.message, queue_size=QUEUE_SIZE)
         self._markers = rospy.Publisher(f"{self.topic}/markers", MarkerArray, queue_size=QUEUE_SIZE)
@@ -61,7 +61,7 @@ class ShapeDetectorNode(ABC):
             self.health.problem(
                 "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
             )
-        self._places.use_time(cloud.stamp_ns * 1e-9)
+        self._places.check_stamp(cloud.stamp_ns)
         with self.health.timed():
             shapes, coefficients, markers = self._detect(cloud)
         self.health.count(f"{self.what} out", len(shapes))

@@ -44,7 +44,9 @@ class SonarToCloud:
         self._newest_beam = PointsPublisher(topics.NEWEST_BEAM)
         self._turns = TurnPublisher(self.health, polar_taker)
         parameters = self._live.current
-        self._filter = TransformFilter(parameters.target_frame, self.health, self._forget_scan)
+        self._filter = TransformFilter(
+            parameters.target_frame, self.health, self._forget_scan, parameters.stamp_tolerance
+        )
         self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._motion, self.health)
         subscribe_to_beams(guarded(self.health, self._take_beam))

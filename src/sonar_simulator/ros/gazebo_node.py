@@ -51,7 +51,7 @@ class GazeboSonar:
     def _make_filter(self) -> Optional[TransformFilter]:
         if self._parameters.head is HeadMode.SWEEP:
             return None
-        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None)
+        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None, self._parameters.stamp_tolerance)
         made.registerCallback(guarded(self.health, self._turned))
         return made
 
