@@ -14,7 +14,7 @@ from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_point_stamps, check_stamp
 from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.scans.laser_scan import LaserTurn
+from sonar_processing.scans.laser_scan import PlanarLaserScan
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 StampedIntensityCloudArrays = numpy_msg(StampedIntensityCloud)
@@ -133,20 +133,20 @@ def points_to_message(cloud: IntensityCloud) -> PointCloud2:
     return message
 
 
-def laser_scan_message(turn: LaserTurn, stamp_ns: int, frame_id: str) -> LaserScan:
-    """Return a turn as LaserScan: all rays hold at `stamp_ns`, so there is no time between them."""
-    increment = turn.angle_increment
+def laser_scan_message(scan: PlanarLaserScan, stamp_ns: int, frame_id: str) -> LaserScan:
+    """Return a planar laser scan as LaserScan: all rays hold at `stamp_ns`, so there is no time between them."""
+    increment = scan.angle_increment
     return LaserScanArrays(
         header=header(stamp_ns, frame_id),
         angle_min=-math.pi,
-        angle_max=-math.pi + (turn.ranges.size - 1) * increment,
+        angle_max=-math.pi + (scan.ranges.size - 1) * increment,
         angle_increment=increment,
         time_increment=0.0,
-        scan_time=turn.duration,
-        range_min=turn.range_min,
-        range_max=turn.range_max,
-        ranges=turn.ranges,
-        intensities=turn.intensities,
+        scan_time=scan.duration,
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        ranges=scan.ranges,
+        intensities=scan.intensities,
     )
 
 

@@ -29,7 +29,7 @@ from sonar_processing.ros.conversions import (
     point_cloud,
     points_from_message,
 )
-from sonar_processing.scans.laser_scan import LaserTurn
+from sonar_processing.scans.laser_scan import PlanarLaserScan
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 # The generated message code of Noetic writes arrays with the old name of tobytes.
@@ -152,7 +152,9 @@ def test_a_cloud_that_says_it_is_finite_and_is_not_is_broken():
 
 
 def test_a_laser_scan_holds_at_one_moment_and_its_angles_grow():
-    turn = LaserTurn(np.array([1.0, np.inf, 3.0, 4.0], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0)
+    turn = PlanarLaserScan(
+        np.array([1.0, np.inf, 3.0, 4.0], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0
+    )
     scan = _sent(laser_scan_message(turn, STAMP_NS, "sonar"), LaserScan)
     assert (scan.header.frame_id, scan.header.stamp.to_nsec()) == ("sonar", STAMP_NS)
     assert (scan.angle_min, scan.angle_increment) == (pytest.approx(-math.pi), pytest.approx(math.pi / 2))
