@@ -9,6 +9,7 @@ from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
+from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 # A block takes 92 bytes: 1.5 GB, more than a vehicle's computer can spare.
@@ -120,7 +121,7 @@ class MlsmNodeParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters):
+class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameters):
     """All of mlsm_core's parameters, in one namespace."""
 
     def check(self) -> None:

@@ -21,10 +21,10 @@ from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import matrices
 from node_support.ros.node import every, guarded, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters, read_parameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
-from sonar_processing.ros.stage_runner import subscribe_to_clouds
+from sonar_processing.ros.subscribers import subscribe_to_clouds
 
 
 class MlsmCore:
@@ -33,10 +33,15 @@ class MlsmCore:
     def __init__(self, namespace: str = "~") -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health("mlsm_core")
+        self.healths = [self.health]
         parameters = read_parameters(MlsmCoreParameters, namespace)
         self._localiser = parameters.build_localiser()
-        self._live = LiveParameters(MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters)
-        self._odometry = OdometryTrack(parameters.odom_frame, parameters.base_frame)
+        self._live = ReconfigurableParameters(
+            MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters
+        )
+        self._odometry = OdometryTrack(
+            parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
+        )
         self._map = MapPublisher(parameters.map_frame)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
@@ -46,6 +51,13 @@ class MlsmCore:
         )  # fmt: skip
         rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
         every(parameters.map_period, self._publish_map, self.health)
+
+    @classmethod
+    def as_node(cls) -> "MlsmCore":
+        """Return the map as a node of its own, which takes clouds and echoes from their topics."""
+        core = cls()
+        core.subscribe()
+        return core
 
     def subscribe(self) -> None:
         """Take clouds from sonar/scan/cleaned and scans of echoes from sonar/scan/echoes."""
@@ -79,7 +91,7 @@ class MlsmCore:
         parameters = self._live.current
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
-        self._check_frame(cloud)
+        self._check_header(cloud)
         if cloud.broken:
             kind, detail = "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud"
             self.health.problem(kind, detail, cloud.broken)
@@ -99,7 +111,7 @@ class MlsmCore:
 
     def _match(self, cloud: IntensityCloud) -> None:
         self.health.count("scans in")
-        self._check_frame(cloud)
+        self._check_header(cloud)
         self._notice_time(cloud.stamp_ns * 1e-9)
         scan = self._scan(cloud)
         if scan is None:
@@ -110,7 +122,8 @@ class MlsmCore:
         tell_scan(self.health, taken.scan, self._localiser.matching)
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
-    def _check_frame(self, cloud: IntensityCloud) -> None:
+    def _check_header(self, cloud: IntensityCloud) -> None:
+        self._odometry.check_stamp(cloud.stamp_ns)
         allowed = self._live.current.odom_frame, self._live.current.map_frame
         if cloud.frame_id not in allowed:
             must = f"frame {cloud.frame_id!r}, must be {allowed[0]!r} or {allowed[1]!r}"

@@ -27,7 +27,7 @@ def read_parameters(parameters: Type[Parameters], namespace: str) -> Parameters:
     return parameters.from_mapping(rospy.get_param(namespace, {}) or {})
 
 
-class LiveParameters:
+class ReconfigurableParameters:
     """Holds the current, always valid `ParameterSet` of one stage."""
 
     def __init__(

@@ -29,6 +29,7 @@ class GazeboSonar:
     def __init__(self) -> None:
         """Raises ParameterError."""
         self.health = make_health("gazebo_sonar")
+        self.healths = [self.health]
         values = dict(rospy.get_param("~", {}))
         groups = {name: kind.from_group(name, values.pop(name, {})) for name, kind in GROUPS.items()}
         self._parameters = GazeboSonarParameters.from_mapping(values)
@@ -51,7 +52,7 @@ class GazeboSonar:
     def _make_filter(self) -> Optional[TransformFilter]:
         if self._parameters.head is HeadMode.SWEEP:
             return None
-        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None)
+        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None, self._parameters.stamp_tolerance)
         made.registerCallback(guarded(self.health, self._turned))
         return made
 

@@ -32,6 +32,7 @@ class Simulator:
     def __init__(self) -> None:
         """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
+        self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
         folder = Path(rospkg.RosPack().get_path(PACKAGE))
         self._parameters = settings.simulator
