@@ -1,4 +1,4 @@
-"""One ping of the maker's `.852` log, bytes to dataclass and back (Data storage file format, 16SEP15)."""
+"""One ping of the manufacturer's `.852` log, bytes to dataclass and back (Data storage file format, 16SEP15)."""
 
 import calendar
 import re
@@ -20,7 +20,7 @@ _ZERO_TRAIN = 70
 _TURNS_OFFSET = 100
 _DEFAULT_SPEED_OF_SOUND = 1500.0
 _FEET = 0.3048
-# What the maker calls reserved but always writes.
+# Bytes that the manufacturer calls reserved but always writes.
 _RESERVED = {42: 20, 43: 9}
 
 
@@ -28,9 +28,9 @@ _RESERVED = {42: 20, 43: 9}
 class LoggedPing:
     """One ping of a log.
 
-    `stamp` is seconds since 1970 (the log's date and time taken as UTC, hundredths), None where they cannot
-    be read; degrees are the head's own, clockwise; `depth` in metres, `heading_deg` and `turns` are None
-    where the logger had none; `text` is the user's, 31 characters at most. Sector, train angle, step and
+    `stamp` is seconds since 1970 (the log's date and time taken as UTC, hundredths), None if they cannot
+    be read; degrees are clockwise, as the head counts them; `depth` in metres, `heading_deg` and `turns` are None
+    if the logger had none; `text` is the user's, 31 characters at most. Sector, train angle, step and
     direction of an echo sounder mean nothing.
     """
 
@@ -53,7 +53,7 @@ class LoggedPing:
 
     @classmethod
     def of(cls, stamp: float, command: SwitchCommand, reply: Reply) -> "LoggedPing":
-        """Return what a log holds of a ping that the driver made."""
+        """Return the log's form of a ping of the driver."""
         return cls(
             reply=reply,
             stamp=stamp,
@@ -104,9 +104,9 @@ class LoggedPing:
 
 
 def decode_record(record: bytes) -> LoggedPing:
-    """Read one record, zero fill or not; raise FrameError when header or reply do not hold together.
+    """Read one record, with or without zero fill; raise FrameError if its header or reply is inconsistent.
 
-    Texts, times and the logger's own sensors are never a reason to refuse a ping.
+    Texts, times and values of the logger's own sensors never cause a ping to be refused.
     """
     kind = check_record_header(record)
     return LoggedPing(
