@@ -18,7 +18,7 @@ _NO_DATA = -9999.0
 _PIXEL_SCALE, _TIE_POINT, _GEO_KEYS, _GDAL_NO_DATA = 33550, 33922, 34735, 42113
 _DOUBLE, _SHORT, _ASCII = 12, 3, 2
 _LOCAL_GRID = (1, 1, 0, 2, 1024, 0, 1, 32767, 1025, 0, 1, 1)
-"""GeoTIFF 1.0: version; model type user-defined, for the map's frame is tied to no place on the globe; pixel is area."""
+"""GeoTIFF 1.0: version; model type user-defined, for the map's frame is tied to no place; a pixel is an area."""
 
 
 def write_map_server(path: Path, grid: Raster) -> None:
