@@ -66,10 +66,13 @@ class MultiLevelSurfaceMap:
             low, high
         )
 
-    def in_tile(self, tile: np.ndarray) -> Blocks:
-        """Return a copy of the blocks of one tile (2,) as `take_changed_tiles` names it."""
-        first = np.asarray(tile, dtype=np.int64) << TILE_BITS
-        return self._in_cells(first, first + (1 << TILE_BITS) - 1)
+    def in_tiles(self, tiles: np.ndarray) -> Blocks:
+        """Return a copy of the blocks of tiles (n, 2), none twice, as `take_changed_tiles` names them."""
+        side = np.arange(1 << TILE_BITS)
+        within = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(1, -1, 2)
+        cells = (np.asarray(tiles, dtype=np.int64).reshape(-1, 1, 2) << TILE_BITS) + within
+        rows, _ = self._store.find(cell_keys(cells.reshape(-1, 2)))
+        return self._store.blocks(rows, self.resolution)
 
     def take_changed_tiles(self) -> np.ndarray:
         """Return the (n, 2) int64 tiles whose blocks changed since the last call, sorted.
