@@ -41,6 +41,6 @@ class MapPublisher:
 
     def publish(self, blocks: Blocks, stamp_ns: int) -> None:
         """Send the whole map."""
-        self._markers.publish(self._block_markers.array(blocks, header(0, self._map_frame)))
+        self._markers.publish(self._block_markers.whole(blocks, header(0, self._map_frame)))
         rows = np.column_stack([blocks.mean, blocks.height, blocks.depth, blocks.count])
         self._cloud.publish(point_cloud(rows, stamp_ns, self._map_frame, fields=CLOUD_FIELDS))

@@ -6,8 +6,9 @@ import numpy as np
 
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 
-TILE_BITS = 5
-"""A tile has 2 ** 5 = 32 cells on a side: 16 m at 0.5 m, so that a scan of 50 m changes a few dozen of them."""
+TILE_BITS = 4
+"""A tile has 2 ** 4 = 16 cells on a side: 8 m at 0.5 m. Larger ones repeat more that did not change, smaller ones make
+more markers than rviz draws fluidly."""
 _MOST_PARTS = 64
 """So many insertions are noted before what they changed is put together; it bounds the memory of a map unasked."""
 

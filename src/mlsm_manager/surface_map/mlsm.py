@@ -66,10 +66,13 @@ class MultiLevelSurfaceMap:
             low, high
         )
 
-    def in_tile(self, tile: np.ndarray) -> Blocks:
-        """Return a copy of the blocks of one tile (2,) as `take_changed_tiles` names it."""
-        first = np.asarray(tile, dtype=np.int64) << TILE_BITS
-        return self._in_cells(first, first + (1 << TILE_BITS) - 1)
+    def in_tiles(self, tiles: np.ndarray) -> Blocks:
+        """Return a copy of the blocks of tiles (n, 2), none twice, as `take_changed_tiles` names them."""
+        side = np.arange(1 << TILE_BITS)
+        within = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(1, -1, 2)
+        cells = (np.asarray(tiles, dtype=np.int64).reshape(-1, 1, 2) << TILE_BITS) + within
+        rows, _ = self._store.find(cell_keys(cells.reshape(-1, 2)))
+        return self._store.blocks(rows, self.resolution)
 
     def take_changed_tiles(self) -> np.ndarray:
         """Return the (n, 2) int64 tiles whose blocks changed since the last call, sorted.
@@ -77,6 +80,34 @@ class MultiLevelSurfaceMap:
         Tile (i, j) covers 2 ** TILE_BITS cells on a side. A count of crossings is no change.
         """
         return self._changed.take()
+
+    def find(self, cells: np.ndarray) -> Tuple[Blocks, np.ndarray, np.ndarray]:
+        """Return the blocks (m) of cells (n, 2), the row of each (m,), and the index of its cell in `cells` (m,).
+
+        The rows are good for `count_crossings` and `remove`, until points are inserted or blocks removed.
+        """
+        rows, owners = self._store.find(cell_keys(cells))
+        return self._store.blocks(rows, self.resolution), rows, owners
+
+    def count_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
+        """Count `beams` (n,) more crossings of the blocks in `rows` (n,), none twice."""
+        self._store.add_crossings(rows, beams)
+
+    def remove(self, rows: np.ndarray) -> None:
+        """Forget the blocks in `rows` (n,), none twice."""
+        if not len(rows):
+            return
+        cells = np.unique(cell_keys(self._store.blocks(rows, self.resolution).cells))
+        slots = self._store.slots(cells)
+        held = self._store.stored(cells, slots)
+        kept = held.take(np.flatnonzero(~np.isin(held.row, rows)))
+        kept = kept.take(np.lexsort((kept.bottom, kept.cell)))
+        self._store.release(rows)
+        still = np.isin(cells, kept.cell)
+        self._store.empty(slots[~still])
+        if still.any():
+            self._store.chain(kept.row, kept.cell, slots[still])
+        self._changed.note(cells)
 
     def insert(self, points: np.ndarray) -> InsertReport:
         """Insert points (n, 4), x y z [m] and strength, in the map's frame, as one batch.
