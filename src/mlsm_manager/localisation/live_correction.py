@@ -8,7 +8,7 @@ import numpy as np
 
 from mlsm_manager.matching.problem.prediction import Belief, advanced, advanced_path
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.scan_path import POSE
+from mlsm_manager.matching.problem.state import POSE
 from node_support.geometry.planar import composed, inverse, wrapped
 
 _MOST_SAMPLES = 4000

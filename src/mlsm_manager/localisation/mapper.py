@@ -12,7 +12,7 @@ from mlsm_manager.matching.matchers.matcher import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.scan_path import ERRORS
+from mlsm_manager.matching.problem.state import ERRORS
 from mlsm_manager.matching.problem.undistort import corrected_points
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap

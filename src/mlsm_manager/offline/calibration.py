@@ -16,6 +16,7 @@ from mlsm_manager.matching.matchers.matcher import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.state import ERRORS, POSE
 from mlsm_manager.offline.beam_width_calibration import half_width_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -131,9 +132,9 @@ class Calibrator:
 
     def _prior(self) -> Prior:
         covariance = self.errors.covariance()
-        covariance[:3, :3] = np.diag([_PLACE_DEVIATION, _PLACE_DEVIATION, _HEADING_DEVIATION]) ** 2
-        covariance[3:] *= 1e-3
-        covariance[:, 3:] *= 1e-3
+        covariance[POSE, POSE] = np.diag([_PLACE_DEVIATION, _PLACE_DEVIATION, _HEADING_DEVIATION]) ** 2
+        covariance[ERRORS] *= 1e-3
+        covariance[:, ERRORS] *= 1e-3
         return Prior(np.zeros(3), np.zeros(3), np.zeros(2), covariance)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 from mlsm_manager.matching.matchers.matcher import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.matching.problem.state import MOTION
 from mlsm_manager.offline.keyframes import Keyframe, keyframes_of, path_through
 from mlsm_manager.offline.loops import ScanMatching, scan_edges
 from mlsm_manager.offline.pose_graph import Beliefs, RelativePoses, joined, smoothed
@@ -39,7 +40,7 @@ def refine(recording: Recording, replayed: Replayed, matcher: Matcher, on_match:
     if len(keyframes) < 2:
         return Refined(replayed.corrected, mapper.shown.blocks, 0)
     poses = np.array([keyframe.pose for keyframe in keyframes])
-    motion = replayed.updates[-1].belief.theta[6:]
+    motion = replayed.updates[-1].belief.theta[MOTION]
     matching = ScanMatching(matcher, mapper.errors, mapper.settings.match_resolution, motion)
     edges = scan_edges(keyframes, poses, matching, on_match)
     times = np.array([keyframe.time for keyframe in keyframes])

@@ -7,7 +7,8 @@ import numpy as np
 from mlsm_manager.matching.fit.distributions import LocalDistributions
 from mlsm_manager.matching.fit.normal_equations import Normal, PointEquations, support
 from mlsm_manager.matching.fit.residual_covariance import PointEvidence, residual_covariance
-from mlsm_manager.matching.problem.scan_path import POSE, PlanarMotion
+from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import POSE
 
 SCALES = (8.0, 4.0, 2.5)
 _ITERATIONS_PER_SCALE = 4

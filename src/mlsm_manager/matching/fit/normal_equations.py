@@ -9,7 +9,8 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.fit.distributions import LocalDistributions
 from mlsm_manager.matching.fit.robust import geman_mcclure, geman_mcclure_cost
-from mlsm_manager.matching.problem.scan_path import STATES, PlanarMotion
+from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import POSITION, STATES
 from node_support.geometry.planar import rotated
 
 INLIER = 3.0
@@ -167,7 +168,7 @@ class PointEquations:
         path = self._motion.path(theta)
         world = self._motion.points(path)
         turn = moves[:, np.newaxis, 2]
-        turned = rotated(world - theta[:2], turn) + theta[:2] + moves[:, np.newaxis, :2]
+        turned = rotated(world - theta[POSITION], turn) + theta[POSITION] + moves[:, np.newaxis, :2]
         return self._meeting(turned.reshape(-1, 2), rotated(self._motion.arms(world, path), turn).reshape(-1, 2))
 
     def _meeting(self, world: np.ndarray, arms: np.ndarray) -> Meeting:

@@ -22,7 +22,7 @@ from typing import Callable, Tuple
 import numpy as np
 from scipy.linalg import eigh
 
-from mlsm_manager.matching.problem.scan_path import POSE, STATES
+from mlsm_manager.matching.problem.state import POSE, STATES
 
 _GREATEST_LEVERAGE = 0.95
 _LEAST_SCALE = 0.01

@@ -13,7 +13,8 @@ from mlsm_manager.matching.judge.significance import lead_along, significance
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.matching.problem.scan_path import MOTION, POSE, RATE, STATES, PlanarMotion
+from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW
 from mlsm_manager.matching.search.correlative_search import YAW_STEP, SearchWindow, search, separation
 from mlsm_manager.matching.search.score_field import ScoreField
 from mlsm_manager.surface_map.blocks import Blocks
@@ -74,10 +75,10 @@ class DistributionMatcher:
         deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))
         seconds = max(motion.beam_times[-1] - motion.beam_times[0], 1e-3)
         step = 2.0 * YAW_STEP / seconds
-        rates = min(int(np.ceil(deviations[5] / step - 0.5)), _MOST_RATES // 2)
+        rates = min(int(np.ceil(deviations[RATE_YAW] / step - 0.5)), _MOST_RATES // 2)
         return SearchWindow(
-            distance=min(float(deviations[:2].max()), self.parameters.search_distance),
-            angle=min(float(deviations[2]), self.parameters.search_angle),
+            distance=min(float(deviations[POSITION].max()), self.parameters.search_distance),
+            angle=min(float(deviations[YAW]), self.parameters.search_angle),
             yaw_rates=np.arange(-rates, rates + 1) * step,
         )
 
@@ -94,17 +95,17 @@ class DistributionMatcher:
         jump = float(np.sqrt(2.0 * state.objection(best.theta)))
         if jump > parameters.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
-        agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[:2], target.mean[:, :2])
+        agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[POSITION], target.mean[:, :2])
         if agreed < parameters.min_agreement:
             return MatchStatus.DIVERGED, f"scan and map agree by {agreed:.2f} only, another place perhaps"
         return self._judge_certainty(best)
 
     def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
         parameters = self.parameters
-        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
+        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[POSITION, POSITION])[-1]))
         if position > parameters.max_position_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
-        yaw = float(np.sqrt(best.covariance[2, 2]))
+        yaw = float(np.sqrt(best.covariance[YAW, YAW]))
         if yaw > parameters.max_yaw_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
         return MatchStatus.CONVERGED, ""
@@ -118,7 +119,7 @@ class DistributionMatcher:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
                 return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
-        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
+        values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
@@ -128,15 +129,15 @@ class DistributionMatcher:
 
 def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
     """Return the blocks that points of the scan can meet: a match takes no longer in the map of a whole survey."""
-    offsets = motion.points(motion.path(state.mean)) - state.mean[:2]
+    offsets = motion.points(motion.path(state.mean)) - state.mean[POSITION]
     reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
-    distances = np.linalg.norm(target.mean[:, :2] - state.mean[:2], axis=1)
+    distances = np.linalg.norm(target.mean[:, :2] - state.mean[POSITION], axis=1)
     return Blocks(target.rows[distances < reach], target.resolution)
 
 
 def _excluded(fit: Fit, theta: np.ndarray) -> bool:
     difference = (theta - fit.theta)[POSE]
-    difference[2] = wrapped(difference[2])
+    difference[YAW] = wrapped(difference[YAW])
     return bool(difference @ np.linalg.solve(fit.covariance[POSE, POSE], difference) > _EXCLUDED**2)
 
 

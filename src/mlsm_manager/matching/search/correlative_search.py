@@ -6,6 +6,7 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import POSE, POSITION, RATE_YAW, YAW
 from mlsm_manager.matching.search.score_field import ScoreField
 from node_support.geometry.planar import rotated, wrapped
 
@@ -59,10 +60,10 @@ def search(
     scores = np.empty((len(window.yaw_rates), len(yaws), len(offsets), len(offsets)), dtype=np.float32)
     for number, rate in enumerate(window.yaw_rates):
         theta = center.copy()
-        theta[5] += rate
-        arms = motion.points(motion.path(theta))[chosen] - center[:2]
+        theta[RATE_YAW] += rate
+        arms = motion.points(motion.path(theta))[chosen] - center[POSITION]
         for index, yaw in enumerate(yaws):
-            points = center[:2] + rotated(arms, yaw)
+            points = center[POSITION] + rotated(arms, yaw)
             scores[number, index] = field.shifted_sums(points, weights, reach) - objection[index]
     return _peaks(scores, center, window.yaw_rates, yaws, offsets, count)
 
@@ -88,8 +89,8 @@ def _peaks(
         if not np.isfinite(best[index]):
             break
         theta = np.array(center, dtype=np.float64)
-        theta[:3] += offsets[index[2]], offsets[index[1]], yaws[index[0]]
-        theta[5] += rates[best_rate[index]]
+        theta[POSE] += offsets[index[2]], offsets[index[1]], yaws[index[0]]
+        theta[RATE_YAW] += rates[best_rate[index]]
         found.append(Candidate(theta, float(best[index])))
         _clear_around(best, index, yaws, offsets)
     return found
@@ -103,5 +104,5 @@ def _clear_around(best: np.ndarray, index: tuple, yaws: np.ndarray, offsets: np.
 
 def separation(first: np.ndarray, second: np.ndarray) -> float:
     """Return how far apart two states are: 1 where they differ by what keeps two candidates apart."""
-    distance = np.hypot(*(first[:2] - second[:2])) / _APART
-    return float(max(distance, abs(float(wrapped(first[2] - second[2]))) / _APART_YAW))
+    distance = np.hypot(*(first[POSITION] - second[POSITION])) / _APART
+    return float(max(distance, abs(float(wrapped(first[YAW] - second[YAW]))) / _APART_YAW))
