@@ -8,12 +8,11 @@ import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
-from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import ERRORS
-from mlsm_manager.matching.problem.undistort import corrected_points
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed

@@ -4,8 +4,7 @@ from dataclasses import dataclass, fields
 from typing import Type, TypeVar
 
 from mlsm_manager.localisation.sensor_model import BeamEdge
-from mlsm_manager.matching.matchers.matcher import Matcher
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
+from mlsm_manager.matching.matchers.matcher_table import MATCHERS, Matcher, MatcherName
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters, SegmentsMatcherParameters
 from node_support.parameters import ParameterSet, parameter
 

@@ -12,7 +12,7 @@ from typing import Collection, Iterator, List, Tuple
 import numpy as np
 
 from mlsm_manager.localisation.sensor_model import SensorModel
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan

@@ -6,9 +6,9 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.matching.problem.result import corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import POSE
-from mlsm_manager.matching.problem.undistort import corrected_points
 from node_support.geometry.planar import composed, inverse, transformed
 
 

@@ -9,7 +9,7 @@ from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.state import MOTION, POSE

@@ -5,7 +5,7 @@ from typing import Callable, List
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.matching.problem.state import MOTION

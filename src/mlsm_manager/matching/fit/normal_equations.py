@@ -8,7 +8,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.fit.distributions import LocalDistributions
-from mlsm_manager.matching.fit.robust import geman_mcclure, geman_mcclure_cost
 from mlsm_manager.matching.problem.scan_path import PlanarMotion
 from mlsm_manager.matching.problem.state import POSITION, STATES
 from node_support.geometry.planar import rotated
@@ -204,3 +203,16 @@ def _inverse(matrices: np.ndarray) -> np.ndarray:
     result[:, 0, 0], result[:, 1, 1] = d, a
     result[:, 0, 1] = result[:, 1, 0] = -b
     return result / (a * d - b * b)[:, np.newaxis, np.newaxis]
+
+
+def geman_mcclure(squared: np.ndarray, scale: float) -> np.ndarray:
+    """Return Gauss-Newton weights (n,) of squared normalised residuals (n,): 1 at 0, 1/4 at `scale`, towards 0.
+
+    Geman and McClure (1985).
+    """
+    return (1.0 + squared / scale**2) ** -2
+
+
+def geman_mcclure_cost(squared: np.ndarray, scale: float) -> np.ndarray:
+    """Return costs (n,) whose slope the weights are: half the square near 0, never above half of `scale` squared."""
+    return 0.5 * squared / (1.0 + squared / scale**2)
