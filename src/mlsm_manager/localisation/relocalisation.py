@@ -12,6 +12,8 @@ from mlsm_manager.matching.problem.state import YAW, X, Y
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import composed, inverse
 
+# Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
+# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.
 _EVERYWHERE = {
     "search_distance": 500.0, "search_angle": np.pi, "search_cell": 1.0, "candidates": 80, "min_gain_over_second": 6.0
 }  # fmt: skip

@@ -12,10 +12,15 @@ from mlsm_manager.matching.problem.scan import Track
 from node_support.errors import RefusedInput
 from node_support.ros.conversions import matrix_from_message
 
+# s that tf remembers: three slow turns of the head.
 _CACHE = 180.0
+# s to wait for odometry that is on its way; then the scan is given up.
 _PATIENCE = 1.0
+# s between two looks whether it came.
 _POLL = 0.01
+# Times of a track besides those of the beams: four a second in a turn of 16 s.
 _STEADY = 65
+# s: rounding of a time of today in a float is four times less.
 _ROUNDING = 1e-6
 
 

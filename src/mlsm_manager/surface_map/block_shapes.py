@@ -11,6 +11,7 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 
+# Power of two: a sixteenth of a cell is the thinnest box that still shows.
 THINNEST = -4
 
 

@@ -8,6 +8,7 @@ from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUA
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex, cell_keys
 from mlsm_manager.surface_map.linkage import Intervals, concatenated, group_points, link, merge
 
+# Of 88 bytes: a small map grows a few times only.
 _MIN_ROWS = 1024
 
 

@@ -93,7 +93,7 @@ def test_along_a_single_wall_a_scan_is_ambiguous():
     scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
     result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.5, 0.3, 0.02])
     assert result.status is MatchStatus.AMBIGUOUS
-    assert "worst direction" in result.reason
+    assert "least certain direction" in result.reason
 
 
 def test_along_a_single_wall_the_deviation_is_that_of_the_prior_and_across_it_that_of_the_match():

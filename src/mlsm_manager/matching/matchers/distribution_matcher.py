@@ -20,13 +20,21 @@ from mlsm_manager.matching.search.score_field import ScoreField
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import wrapped
 
+# Standard deviations of the prior that the search covers.
 _WINDOW_DEVIATIONS = 3.0
-_OBJECTION_SHARE = 0.01
+# Of a score from 0 to 1 per squared standard deviation of the prior: echoes that travel with the vehicle cannot win.
+_PRIOR_COST_SHARE = 0.01
+# Errors of the yaw rate that are tried: the next one costs a ninth more time.
 _MOST_RATES = 9
+# Keeps the covariance of a prior with fixed states invertible.
 _LEAST_VARIANCE = 1e-12
+# Width of the field in search cells: a basin reaches over the nearest grid poses.
 _FIELD_CELLS = 2.0
+# m: neighbours that make the distributions at the edge of the reach.
 _MARGIN = 15.0
+# Of what keeps two candidates of the search apart.
 _APART = 0.5
+# Standard deviations at which a covariance claims to exclude a place.
 _EXCLUDED = 4.0
 
 
@@ -64,11 +72,11 @@ class DistributionMatcher:
         field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
         pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
         found = search(
-            motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, parameters.candidates
+            motion, weights, field, state.mean, window, _PRIOR_COST_SHARE * pose_information, parameters.candidates
         )
         refiner = Refiner(motion, weights, LocalDistributions(target), state, parameters.range_scale_deviation)
         fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
-        inflation = max(fits, key=lambda fit: fit.support).inflation
+        inflation = max(fits, key=lambda fit: fit.log_likelihood_gain).inflation
         return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
 
     def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
@@ -85,50 +93,53 @@ class DistributionMatcher:
     def _judge(self, best: Fit, refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
         parameters = self.parameters
         if not best.converged:
-            return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
+            return MatchStatus.DIVERGED, f"not converged after {best.iterations} iterations"
         used = int(np.count_nonzero(best.inliers))
         if used < parameters.min_points:
             return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {parameters.min_points} or more"
         certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
         if certainty < parameters.min_significance:
             return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
-        jump = float(np.sqrt(2.0 * state.objection(best.theta)))
+        jump = float(np.sqrt(2.0 * state.prior_cost(best.theta)))
         if jump > parameters.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
         agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[POSITION], target.mean[:, :2])
         if agreed < parameters.min_agreement:
-            return MatchStatus.DIVERGED, f"scan and map agree by {agreed:.2f} only, another place perhaps"
+            return MatchStatus.DIVERGED, f"scan and map agree by only {agreed:.2f}: perhaps another place"
         return self._judge_certainty(best)
 
     def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
         parameters = self.parameters
         position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[POSITION, POSITION])[-1]))
         if position > parameters.max_position_deviation:
-            return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
+            return MatchStatus.AMBIGUOUS, f"standard deviation of {position:.2f} m in the least certain direction"
         yaw = float(np.sqrt(best.covariance[YAW, YAW]))
         if yaw > parameters.max_yaw_deviation:
-            return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
+            return MatchStatus.AMBIGUOUS, f"heading has a standard deviation of {yaw:.3f} rad"
         return MatchStatus.CONVERGED, ""
 
     def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
-        """Refuse a fix whose covariance excludes a place that fits nearly as well."""
+        """Reject a fix whose covariance excludes a pose that fits nearly as well."""
         least = self.parameters.min_gain_over_second
         if least == 0.0:
             return MatchStatus.CONVERGED, ""
         for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
-                return MatchStatus.AMBIGUOUS, f"a second place is only {lead:.1f} less likely"
+                return MatchStatus.AMBIGUOUS, f"the second-best pose is only {lead:.1f} nats worse"
         values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
-            return MatchStatus.AMBIGUOUS, f"a place beside it, in the worst direction, is only {lead:.1f} less likely"
+            return (
+                MatchStatus.AMBIGUOUS,
+                f"a pose beside it, in the least certain direction, is only {lead:.1f} nats worse",
+            )
         return MatchStatus.CONVERGED, ""
 
 
 def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
-    """Return the blocks that points of the scan can meet: a match takes no longer in the map of a whole survey."""
+    """Return the blocks within reach of the scan, so that the time of a match does not grow with the map."""
     offsets = motion.points(motion.path(state.mean)) - state.mean[POSITION]
     reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
     distances = np.linalg.norm(target.mean[:, :2] - state.mean[POSITION], axis=1)
@@ -142,7 +153,7 @@ def _excluded(fit: Fit, theta: np.ndarray) -> bool:
 
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:
-    """Return the prior over the eight states of planar_motion; states without variance are held."""
+    """Return the prior over the eight states of scan_path; states without variance are fixed."""
     covariance = prior.covariance + _LEAST_VARIANCE * np.eye(STATES)
     mean = np.concatenate([prior.pose(scan), prior.rate, prior.motion])
     return PriorState(mean, np.linalg.inv(covariance))

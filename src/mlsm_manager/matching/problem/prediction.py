@@ -28,7 +28,9 @@ from mlsm_manager.matching.problem.state import (
 from node_support.geometry.planar import composed, inverse, rotated, wrapped
 from node_support.parameters import ParameterSet, parameter
 
+# Times at which the odometry is read between two scans, about one a second.
 _NODES = 17
+# Of each state, for differences: small against a bend of the path, large against rounding.
 _DIFFERENCE = 1e-6
 
 
@@ -75,7 +77,7 @@ class OdometryErrors(ParameterSet):
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known at a time. theta: (8,) [pose, rate, motion] as in planar_motion. covariance: (8, 8)."""
+    """What is known at a time. theta: (8,) [pose, rate, motion] as in scan_path. covariance: (8, 8)."""
 
     time: float
     theta: np.ndarray
@@ -99,7 +101,7 @@ def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors)
     return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
 
 
-def held_to_heading(belief: Belief, heading: float, deviation: float) -> Belief:
+def updated_by_heading(belief: Belief, heading: float, deviation: float) -> Belief:
     """Return the belief after a compass said `heading` [rad] with standard `deviation`; 0 stands for no compass."""
     if deviation == 0.0:
         return belief

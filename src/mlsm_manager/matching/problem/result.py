@@ -29,7 +29,7 @@ class Prior:
     motion: (2,) relative error of the distances that the odometry reports, and error of their direction [rad]:
         the vehicle went 1 + motion[0] times as far, turned by motion[1] counter-clockwise.
     covariance: (8, 8) of [pose, rate, motion]; pose: x y [m] in map, yaw [rad] of base_link at the reference time.
-        A state without variance is held.
+        A state without variance is fixed.
     """
 
     correction: np.ndarray

@@ -37,6 +37,7 @@ from mlsm_manager.matching.problem.state import (
 )
 from node_support.geometry.planar import composed, inverse, rotated
 
+# Two a second in a turn of 16 s, where a scan has fewer echoes than that.
 _LEAST_NODES = 33
 
 

@@ -10,8 +10,11 @@ from mlsm_manager.matching.problem.state import POSE, POSITION, RATE_YAW, YAW
 from mlsm_manager.matching.search.score_field import ScoreField
 from node_support.geometry.planar import rotated, wrapped
 
+# rad: a point 20 m away moves by two search cells of 0.5 m.
 YAW_STEP = np.radians(2.75)
+# A scan has about 150 echoes; a dense one is thinned, so that it takes no longer.
 _MOST_POINTS = 160
+# m and rad: nearer candidates end in the same fit.
 _APART = 2.0
 _APART_YAW = np.radians(8.0)
 
@@ -30,7 +33,7 @@ class SearchWindow:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A state (8,) as in planar_motion, and its score, 0 to 1, less the prior's objection."""
+    """A state (8,) as in scan_path, and its score, 0 to 1, less the prior's cost."""
 
     theta: np.ndarray
     score: float
@@ -56,7 +59,7 @@ def search(
     steps = int(np.ceil(window.angle / YAW_STEP))
     yaws = np.arange(-steps, steps + 1) * YAW_STEP
     offsets = np.arange(-reach, reach + 1) * field.cell
-    objection = _objections(offsets, yaws, penalty)
+    prior_cost = _prior_costs(offsets, yaws, penalty)
     scores = np.empty((len(window.yaw_rates), len(yaws), len(offsets), len(offsets)), dtype=np.float32)
     for number, rate in enumerate(window.yaw_rates):
         theta = center.copy()
@@ -64,7 +67,7 @@ def search(
         arms = motion.points(motion.path(theta))[chosen] - center[POSITION]
         for index, yaw in enumerate(yaws):
             points = center[POSITION] + rotated(arms, yaw)
-            scores[number, index] = field.shifted_sums(points, weights, reach) - objection[index]
+            scores[number, index] = field.shifted_sums(points, weights, reach) - prior_cost[index]
     return _peaks(scores, center, window.yaw_rates, yaws, offsets, count)
 
 
@@ -72,7 +75,7 @@ def _thinned(count: int) -> np.ndarray:
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_POINTS)).astype(np.int64))
 
 
-def _objections(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> np.ndarray:
+def _prior_costs(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> np.ndarray:
     yaw, y, x = np.meshgrid(yaws, offsets, offsets, indexing="ij")
     difference = np.stack([x, y, yaw], axis=-1)
     return np.einsum("...a,ab,...b->...", difference, penalty, difference).astype(np.float32)
