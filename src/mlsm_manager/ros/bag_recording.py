@@ -22,6 +22,7 @@ from sonar_processing.ros.conversions import beam_from_message
 from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
+# s: longer than any recording; tf must not forget its beginning.
 _FOR_EVER = 1_000_000_000
 _TF_TOPICS = ("/tf", "/tf_static")
 _VELOCITY_TOPIC = "/cmd_vel"
