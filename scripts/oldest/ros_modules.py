@@ -11,12 +11,12 @@ from pathlib import Path
 from typing import List, Optional, Sequence
 
 
-class CompiledModule(ImportError):
+class CompiledModuleError(ImportError):
     """A module of the installed ROS is compiled for another Python."""
 
 
 class RosModules:
-    """A finder of top-level modules in `folders`; raises CompiledModule for one with compiled parts."""
+    """A finder of top-level modules in `folders`; raises CompiledModuleError for one with compiled parts."""
 
     def __init__(self, folders: Sequence[str]) -> None:
         self._folders = list(folders)
@@ -25,7 +25,7 @@ class RosModules:
         """Return the spec of a top-level module, None when the folders do not have it; see importlib."""
         spec = PathFinder.find_spec(name, self._folders) if "." not in name else None
         if spec is not None and _is_compiled(spec):
-            raise CompiledModule(f"{name} is compiled for another Python", name=name)
+            raise CompiledModuleError(f"{name} is compiled for another Python", name=name)
         return spec
 
 

@@ -1,6 +1,6 @@
 """Runs the unit tests with the oldest versions that the package claims, in an environment kept under build/oldest.
 
-    scripts/oldest/run.py [ARGUMENT ...]   arguments go to pytest
+Arguments go to pytest: python3 scripts/oldest/run.py test/unit/mlsm_manager
 """
 
 import glob
