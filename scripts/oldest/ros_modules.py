@@ -38,4 +38,5 @@ def _folders() -> List[str]:
     return [folder for folder in os.environ.get("ROS_PYTHON_FOLDERS", "").split(os.pathsep) if folder]
 
 
-sys.meta_path.append(RosModules(_folders()))
+if _folders():
+    sys.meta_path.append(RosModules(_folders()))
