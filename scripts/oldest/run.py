@@ -54,11 +54,15 @@ def make_environment(python: str) -> None:
 
 
 def environment() -> dict:
-    """Return the variables for processes of the environment: our sources, and where ROS's modules lie."""
+    """Return the variables for processes of the environment: our sources, and where ROS's modules lie.
+
+    PYTHONPATH keeps what it has: ROS's own tools, which tests start, run with the Python that ROS was built for.
+    """
     ours = [str(ROOT / "src"), str(ROOT / "scripts"), str(HERE)]
+    before = os.environ.get("PYTHONPATH", "").split(os.pathsep)
     return {
         **os.environ,
-        "PYTHONPATH": os.pathsep.join(ours),
+        "PYTHONPATH": os.pathsep.join([*ours, *filter(None, before)]),
         "ROS_PYTHON_FOLDERS": os.pathsep.join(_ros_folders()),
     }
 
