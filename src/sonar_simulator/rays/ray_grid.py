@@ -15,9 +15,9 @@ def contacts_of_grid(
 
     ranges: (rows, columns) m; values not finite or not above 0 mean that nothing was hit. elevations: (rows,) and
     bearings: (columns,) rad off the beam's axis, up and left positive. retro: (rows, columns) share of pressure
-    reflected, 0 to 1, as in <laser_retro>; 0 or None: the default material. Incidence angles follow from neighbours in the grid; with
-    one row, surfaces count as vertical; with one column, as perpendicular to the beam. Raises ValueError for shapes
-    that do not fit together.
+    reflected, 0 to 1, as in <laser_retro>; 0 or None: the default material. Incidence angles follow from neighbours in
+    the grid; with one row, surfaces count as vertical; with one column, as perpendicular to the beam. Raises ValueError
+    for shapes that do not fit together.
     """
     ranges = np.asarray(ranges, dtype=np.float64)
     if ranges.shape != (len(elevations), len(bearings)):
