@@ -7,11 +7,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, Type
 
-from node_table import NODES, NodeDescription
-
 from imagenex_852_driver.emulator.parameters import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
@@ -31,7 +30,7 @@ ROOT = Path(__file__).resolve().parent.parent
 NODES_INTRODUCTION = """\
 # Nodes: topics, services and parameters
 
-*Written by `scripts/document` from `scripts/node_table.py` and the parameter dataclasses; do not edit.*
+*Written by `scripts/document` from `src/node_support/node_table.py` and the parameter dataclasses; do not edit.*
 
 Topic names are relative, so that a namespace (`ROS_NAMESPACE`, `<group ns=...>`) can hold a whole vehicle. Every node
 also publishes `/diagnostics`. `yaml/<node>_default.yaml` holds every parameter with its meaning and default.

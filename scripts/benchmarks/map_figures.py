@@ -61,7 +61,7 @@ def marker_rows() -> List[Row]:
 
     def publish() -> None:
         buffer.seek(0)
-        markers.array(surface_map.blocks, Header(frame_id="map")).serialize(buffer)
+        markers.whole(surface_map.blocks, Header(frame_id="map")).serialize(buffer)
 
     seconds = median_seconds(publish)
     size = f"{len(surface_map)} blocks, {len(buffer.getvalue()) / 1e6:.1f} MB"

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 import yaml
 from document import LIVE_NODES, START_UP_NODES, LiveNode, generated
-from node_table import NODES
 
+from node_support.node_table import NODES
 from node_support.parameters import describe
 from sonar_processing.filters.stage_table import STAGES
 
@@ -30,7 +30,7 @@ def test_every_described_node_has_an_executable(name):
 
 @pytest.mark.parametrize("name", NODES)
 def test_every_described_topic_stands_in_the_source(name):
-    source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
+    source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py") if path.name != "node_table.py")
     names = [one.name.lstrip("~/") for one in NODES[name].interfaces]
     assert [topic for topic in names if topic.rpartition("/")[2] not in source] == []
 

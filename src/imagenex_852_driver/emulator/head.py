@@ -4,7 +4,7 @@ from typing import List, NamedTuple, Optional
 
 from imagenex_852_driver.emulator.echo_source import EchoSource, FixedPattern, PingRequest
 from imagenex_852_driver.emulator.faults import Fault, FaultInjector
-from imagenex_852_driver.emulator.head_rotation import ScanMotion
+from imagenex_852_driver.emulator.head_rotation import HeadRotation
 from imagenex_852_driver.line.timing import LineTiming
 from imagenex_852_driver.protocol import CommandReader, Reply, SwitchCommand
 from imagenex_852_driver.protocol.angles import head_angle
@@ -49,7 +49,7 @@ class EmulatedHead:
     def reboot(self) -> None:
         """Discard an unfinished command, the position and the direction, as after a loss of power."""
         self._reader = CommandReader()
-        self._motion = ScanMotion()
+        self._motion = HeadRotation()
 
     def receive(self, data: bytes, time: float) -> List[Transmission]:
         """Take bytes that arrived at `time`; return what the head sends in reply, in order of time."""

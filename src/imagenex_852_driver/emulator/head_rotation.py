@@ -6,7 +6,7 @@ from imagenex_852_driver.protocol.angles import AHEAD
 _TURN = 2400
 
 
-class ScanMotion:
+class HeadRotation:
     """The transducer's position, in the head's units (0.15 deg, clockwise, 1400 ahead).
 
     In a sector the head goes back and forth; with 360 deg it turns without end. A change of the command's

@@ -4,6 +4,8 @@ import argparse
 import math
 from typing import List
 
+from node_support import topics
+
 
 def play_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
@@ -33,7 +35,7 @@ def convert_arguments(arguments: List[str]) -> argparse.Namespace:
     parser.add_argument(
         "--start", type=_positive, help="time of the first ping, s since 1970 (default: the log's, else the file's)"
     )
-    parser.add_argument("--topic", default="/sonar/raw")
+    parser.add_argument("--topic", default=f"/{topics.BEAMS}")
     _add_mount(parser)
     return parser.parse_args(arguments)
 

@@ -7,12 +7,14 @@ from typing import Deque, Optional
 import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
+from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.scan_path import ERRORS
 from mlsm_manager.matching.problem.undistort import corrected_points
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
@@ -63,7 +65,6 @@ class Mapper:
         self.errors = errors
         self.matcher = matcher
         self.matching = False
-        self.newest: Optional[Scan] = None
         self.clear()
 
     def clear(self) -> None:
@@ -77,13 +78,26 @@ class Mapper:
         """Keep the map but forget where the vehicle is, because time jumped."""
         self.belief: Optional[Belief] = None
         self.correction = np.zeros(3)
-        self.newest = None
         self._history = CorrectionHistory()
-        self._waiting: Deque[Scan] = deque(maxlen=_MOST_WAITING)
+        self._waiting: Deque[TimedPoints] = deque(maxlen=_MOST_WAITING)
+
+    @property
+    def blocks(self) -> Blocks:
+        """The map that is shown."""
+        return self.shown.blocks
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks of the map that is shown."""
+        return len(self.shown)
+
+    @property
+    def target(self) -> Blocks:
+        """The map that is matched with."""
+        return self.matched.blocks
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
-        self.newest = scan
         belief = self._belief_at(scan)
         if not self.matching or len(self.matched) < self.settings.fewest_blocks:
             return self._place(scan, belief)
@@ -99,19 +113,23 @@ class Mapper:
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
         return ScanUpdate(scan, result, True, self.belief)
 
-    def take_cloud(self, cloud: Scan) -> CloudUpdate:
+    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
         """Insert a cloud into the map that is shown, or let it wait for the match of its time."""
         if not self.matching:
-            return CloudUpdate(self.shown.insert(transformed(self.correction, cloud.points)), False, 0)
-        if cloud.reference_time > self._history.end:
+            return self.take_placed(transformed(self.correction, cloud.points))
+        if cloud.end > self._history.end:
             self._waiting.append(cloud)
             return CloudUpdate(_NOTHING, True, 0)
         points, unplaced = self._history.placed(cloud)
         return CloudUpdate(self.shown.insert(points), False, unplaced)
 
+    def take_placed(self, points: np.ndarray) -> CloudUpdate:
+        """Insert points (n, 4) that are in map already into the map that is shown."""
+        return CloudUpdate(self.shown.insert(points), False, 0)
+
     def take_waiting(self) -> Optional[CloudUpdate]:
         """Insert the next cloud that waited, if its time is known now; None when there is none."""
-        if not self._waiting or (self.matching and self._waiting[0].reference_time > self._history.end):
+        if not self._waiting or (self.matching and self._waiting[0].end > self._history.end):
             return None
         return self.take_cloud(self._waiting.popleft())
 
@@ -123,7 +141,7 @@ class Mapper:
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)
         self._history.add(times, poses, scan.track, holds=True)
-        self.matched.insert(self._history.placed(scan)[0])
+        self.matched.insert(self._history.placed(TimedPoints.of_scan(scan))[0])
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
         # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
         if belief.theta[ERRORS].any():

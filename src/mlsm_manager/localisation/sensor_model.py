@@ -35,9 +35,9 @@ class SensorModel(BeamEdge, BeamCorrection):
     """How the echoes of a scan lie against the surfaces that made them."""
 
     def applied(self, scan: Scan) -> Scan:
-        """Return the scan with stamps and points put right; see `restamped`, `rescaled` and `trusted`."""
+        """Return the scan `restamped`, `rescaled` and `without_doubtful_points`."""
         timed = rescaled(restamped(scan, self.sonar_delay), self.range_scale)
-        return trusted(timed, self.edge_half_width)
+        return without_doubtful_points(timed, self.edge_half_width)
 
 
 def restamped(scan: Scan, delay: float) -> Scan:
@@ -72,7 +72,7 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
     return _turned(scan, half_width)[0]
 
 
-def trusted(scan: Scan, half_width: float) -> Scan:
+def without_doubtful_points(scan: Scan, half_width: float) -> Scan:
     """Return what `at_beam_edge` does, without the points whose place stays doubtful.
 
     A beam does not tell where within it a lone echo lies; and what would shift a point by more than a metre off its

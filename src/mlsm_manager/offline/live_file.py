@@ -31,6 +31,9 @@ def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) 
         target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
     )
     values["mlsm_core"].update(
+        size_x_meters=0.0,
+        size_y_meters=0.0,
+        map_frame="map" if odom_frame != "map" else "corrected_map",
         odom_frame=odom_frame,
         base_frame=base_frame,
         match_input=MatchInput.ECHOES.value,
@@ -55,8 +58,13 @@ def replay_values(values: Mapping[str, Any]) -> Dict[str, Any]:
 
 def write_live(path: Path, parameters: ReplayParameters, odom_frame: str, base_frame: str) -> None:
     """Write live.yaml whole or not at all; raises OSError."""
-    text = yaml.safe_dump(live_values(parameters, odom_frame, base_frame), sort_keys=False, allow_unicode=True)
-    write_whole(path, (_COMMENT + text).encode())
+    write_whole(path, live_text(parameters, odom_frame, base_frame).encode())
+
+
+def live_text(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> str:
+    """Return the text of live.yaml."""
+    values = live_values(parameters, odom_frame, base_frame)
+    return _COMMENT + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
 
 
 def _common(values: Mapping[str, Any], node: str) -> Dict[str, Any]:

@@ -9,6 +9,7 @@ import yaml
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support import topics
 from node_support.parameters import ParameterError
 
 
@@ -31,7 +32,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     )
     parser.add_argument("--parameters", type=Path, help="yaml file (a live.yaml, too); --set overrides it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
-    parser.add_argument("--beams", default="/sonar/raw", help="topic of the beams (default: %(default)s)")
+    parser.add_argument("--beams", default=f"/{topics.BEAMS}", help="topic of the beams (default: %(default)s)")
     parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
     parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: %(default)s)")
     options = parser.parse_args(arguments)

@@ -92,7 +92,7 @@ def _edges(state: np.ndarray, edges: RelativePoses) -> Tuple[np.ndarray, sparse.
     turned = rotated(edges.measured[:, :2], np.where(edges.by_odometry, direction, 0.0))
     stretch = np.where(edges.by_odometry, 1.0 + scale, 1.0)[:, np.newaxis]
     residual = np.column_stack([relative[:, :2] - stretch * turned, wrapped(relative[:, 2] - edges.measured[:, 2])])
-    return residual, _jacobian(state.size, edges, relative, first[:, 2], turned, stretch)
+    return residual, _jacobian(state.size, edges, relative, np.ascontiguousarray(first[:, 2]), turned, stretch)
 
 
 def _jacobian(

@@ -14,6 +14,12 @@ def cell_keys(cells: np.ndarray) -> np.ndarray:
     return (cells[:, 0] << 32) + cells[:, 1]
 
 
+def cells_of_keys(keys: np.ndarray) -> np.ndarray:
+    """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
+    low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
+    return np.column_stack([(keys - low) >> 32, low])
+
+
 class CellIndex:
     """An open-addressing hash table from cell keys to block numbers, in two numpy arrays.
 
@@ -45,6 +51,18 @@ class CellIndex:
             pending = pending[self._keys[place] != wanted]
             slots[pending] = (slots[pending] + 1) & (self._keys.size - 1)
         return slots
+
+    def find(self, keys: np.ndarray) -> np.ndarray:
+        """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
+        heads = np.full(keys.size, NO_BLOCK, dtype=np.int32)
+        slots, pending = self._first_slots(keys), np.arange(keys.size)
+        while pending.size:
+            held = self._keys[slots]
+            found = held == keys[pending]
+            heads[pending[found]] = self.heads[slots[found]]
+            further = ~found & (held != _EMPTY)
+            pending, slots = pending[further], (slots[further] + 1) & (self._keys.size - 1)
+        return heads
 
     def _allocate(self, minimum: int) -> None:
         capacity = 1 << max(int(minimum - 1).bit_length(), 10)

@@ -4,10 +4,10 @@ import sys
 import threading
 import time
 import traceback
-from typing import Any, Callable, List
+from typing import Any, Callable, Protocol, Sequence
 
 import rospy
-from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus, KeyValue
+from diagnostic_updater import DiagnosticStatusWrapper, Updater
 
 from node_support.errors import RefusedInput
 from node_support.health import Health
@@ -21,14 +21,22 @@ class StartError(Exception):
     """The node cannot start for a reason that the user must cure; the text is one line for the user."""
 
 
-def run(name: str, construct: Callable[[], Any]) -> None:
-    """Initialise the node, construct it and spin until Ctrl-C.
+class Node(Protocol):
+    """What `run` runs."""
+
+    healths: Sequence[Health]
+    """Of all stages that the node hosts, for /diagnostics."""
+
+
+def run(name: str, make_node: Callable[[], Node]) -> None:
+    """Initialise the node, make it, publish its diagnostics and spin until Ctrl-C.
 
     ParameterError and StartError end it with one line and status 1.
     """
     rospy.init_node(name)
     try:
-        node = construct()
+        node = make_node()
+        publish_diagnostics(node.healths)
     except (ParameterError, StartError) as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         sys.exit(1)
@@ -92,24 +100,21 @@ def every(period: float, callback: Callable[[], None], health: Health) -> thread
     return thread
 
 
-class DiagnosticsPublisher:
-    """Publishes the reports of a process's stages on /diagnostics once a second."""
-
-    def __init__(self, healths: List[Health]) -> None:
-        self._healths = healths
-        self._publisher = rospy.Publisher("/diagnostics", DiagnosticArray, queue_size=10)
-        every(DIAGNOSTICS_PERIOD, self._publish, healths[0])
-
-    def _publish(self) -> None:
-        array = DiagnosticArray()
-        array.header.stamp = rospy.Time.now()
-        array.status = [_status(health) for health in self._healths]
-        self._publisher.publish(array)
+def publish_diagnostics(healths: Sequence[Health]) -> None:
+    """Publish what a process's stages report on /diagnostics once a second, each as "node: stage"."""
+    updater = Updater()
+    updater.setHardwareID("none")
+    for health in healths:
+        updater.add(health.name, _filler(health))
+    every(DIAGNOSTICS_PERIOD, updater.force_update, healths[0])
 
 
-def _status(health: Health) -> DiagnosticStatus:
-    report = health.report()
-    values = [KeyValue(key=key, value=value) for key, value in report.values.items()]
-    return DiagnosticStatus(
-        level=int(report.level), name=health.name, message=report.text, hardware_id="none", values=values
-    )
+def _filler(health: Health) -> Callable[[DiagnosticStatusWrapper], DiagnosticStatusWrapper]:
+    def fill(status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
+        report = health.report()
+        status.summary(int(report.level), report.text)
+        for key, value in report.values.items():
+            status.add(key, value)
+        return status
+
+    return fill

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, Mapping, Optional, Type
 
+from node_support import topics
 from node_support.parameters import ParameterSet
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
@@ -11,8 +12,6 @@ from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverPara
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
 
 Stage = Callable[[IntensityCloud], IntensityCloud]
-SCAN_TOPIC = "sonar/scan/sonarCloud"
-POLAR_TOPIC = "sonar/scan/polar"
 
 
 @dataclass(frozen=True)
@@ -33,7 +32,7 @@ class StageType:
     @property
     def takes_polar_scans(self) -> bool:
         """Whether the stage works on whole polar scans, beside the chain of clouds."""
-        return self.input_topic == POLAR_TOPIC
+        return self.input_topic == topics.POLAR_SCANS
 
 
 STAGES: Dict[str, StageType] = {
@@ -41,23 +40,23 @@ STAGES: Dict[str, StageType] = {
         ThresholderParameters,
         Thresholder,
         "Thresholder",
-        SCAN_TOPIC,
-        "sonar/scan/thresholded",
+        topics.SCANS,
+        topics.THRESHOLDED,
         {"threshold": lambda stage: stage.newest_threshold},
     ),
     "outlier_remover": StageType(
         OutlierRemoverParameters,
         OutlierRemover,
         "OutlierRemover",
-        "sonar/scan/thresholded",
-        "sonar/scan/cleaned",
+        topics.THRESHOLDED,
+        topics.CLEANED,
     ),
     "echo_extractor": StageType(
         EchoExtractorParameters,
         EchoExtractor,
         "EchoExtractor",
-        POLAR_TOPIC,
-        "sonar/scan/echoes",
+        topics.POLAR_SCANS,
+        topics.ECHOES,
         {"threshold": lambda stage: stage.newest_threshold},
     ),
 }

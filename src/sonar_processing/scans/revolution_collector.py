@@ -10,7 +10,7 @@ from sonar_processing.scans.head_turn import HeadTurn
 MOST_BEAMS = 3600
 
 
-class TurnCollector:
+class RevolutionCollector:
     """Holds the beams of the unfinished turn, whatever a scan is; at most the newest `MOST_BEAMS`."""
 
     def __init__(self) -> None:

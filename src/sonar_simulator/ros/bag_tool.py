@@ -22,7 +22,7 @@ def main(arguments: List[str]) -> int:
     options = parse(arguments)
     try:
         _run(options)
-    except (ParameterError, DescriptionError, RuntimeError) as error:
+    except (ParameterError, DescriptionError) as error:
         print(f"simulate_bag: {error}", file=sys.stderr)
         return 1
     except OSError as error:

@@ -11,6 +11,7 @@ from geometry_msgs.msg import Pose
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from node_support import topics
 from node_support.files import whole_file
 from node_support.ros.conversions import pose_from_matrix
 from sonar_simulator.ros.simulator_messages import moment_messages, transform_message
@@ -21,7 +22,7 @@ from sonar_simulator.vehicle.servo import tilted
 
 START_TIME = 1000.0
 BEAMS_AT_ONCE = 120
-_TOPICS = {"velocity": "/cmd_vel"}
+_RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
 _SETTINGS_TOPIC = "/sonar_simulator/settings"
 
 
@@ -50,16 +51,16 @@ class BagWriter:
             transform_message(pose_from_matrix(joint.T_parent_child), start, joint.parent, joint.child)
             for joint in robot.fixed_joints
         ]
-        self._write("/tf_static", TFMessage(transforms=transforms), start)
+        self._write(topics.STATIC_TRANSFORMS, TFMessage(transforms=transforms), start)
         self._write(_SETTINGS_TOPIC, String(data=_told(settings)), start)
 
     def add(self, moment: Moment) -> None:
         """Write everything that belongs to a moment; its transforms are one message."""
         stamp = _stamp(moment.time)
         for topic, message in moment_messages(moment, stamp, self._setup.sonar.max_range):
-            if topic == "/tf":
+            if topic == topics.TRANSFORMS:
                 message.transforms.append(transform_message(self._mount(moment.tilt), stamp, BASE_FRAME, SONAR_FRAME))
-            self._write(_TOPICS.get(topic, topic), message, stamp)
+            self._write(_RENAMED.get(topic, topic), message, stamp)
 
     def _mount(self, tilt: float) -> Pose:
         if tilt != self._tilt:

@@ -12,6 +12,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64
 
+from node_support import topics
 from node_support.parameters import ParameterError
 from node_support.ros.node import guarded, make_health
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
@@ -31,6 +32,7 @@ class Simulator:
     def __init__(self) -> None:
         """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
+        self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
         folder = Path(rospkg.RosPack().get_path(PACKAGE))
         self._parameters = settings.simulator
@@ -46,9 +48,9 @@ class Simulator:
         threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
 
     def _subscribe(self) -> None:
-        commands = {"sonar_servo/command": (Float64, self._take_servo_command)}
+        commands = {topics.SERVO_COMMANDS: (Float64, self._take_servo_command)}
         if self._parameters.drive is Drive.COMMANDS:
-            commands["cmd_vel"] = (Twist, self._take_velocity_command)
+            commands[topics.VELOCITY_COMMANDS] = (Twist, self._take_velocity_command)
         for topic, (kind, take) in commands.items():
             rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=10, tcp_nodelay=True)
 

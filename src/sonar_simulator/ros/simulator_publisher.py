@@ -5,14 +5,13 @@ from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker
 
+from node_support import topics
 from sonar_simulator.ros.simulator_messages import TOPICS, WORLD_FRAME, moment_messages, placing_messages
 from sonar_simulator.ros.world_marker import world_marker
 from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.world.world import World
 
 _QUEUE_SIZE = 100
-_VELOCITY = "velocity"
-_COMMANDS = "cmd_vel"
 
 
 class SimulatorPublisher:
@@ -25,16 +24,18 @@ class SimulatorPublisher:
     def __init__(self, max_range: float, drive: Drive) -> None:
         """`max_range`: of the sonar, m."""
         self._max_range = max_range
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=_QUEUE_SIZE)
+        self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
         self._world = rospy.Publisher("~world", Marker, queue_size=1, latch=True)
         self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS.items()}
-        self._commands = _publisher(_COMMANDS, TOPICS[_VELOCITY]) if drive is Drive.SCRIPT else None
+        self._commands = (
+            _publisher(topics.VELOCITY_COMMANDS, TOPICS[topics.VELOCITY]) if drive is Drive.SCRIPT else None
+        )
 
     @property
     def has_listener(self) -> bool:
         """Whether anybody takes the beams."""
-        return self._publishers["sonar/raw"].get_num_connections() > 0
+        return self._publishers[topics.BEAMS].get_num_connections() > 0
 
     def publish_clock(self, stamp: rospy.Time) -> None:
         """Set everybody's time."""
@@ -59,7 +60,7 @@ class SimulatorPublisher:
         self.publish_clock(stamp)
         for topic, message in moment_messages(moment, stamp, self._max_range):
             self._publishers[topic].publish(message)
-            if topic == _VELOCITY and self._commands is not None:
+            if topic == topics.VELOCITY and self._commands is not None:
                 self._commands.publish(message)
 
 

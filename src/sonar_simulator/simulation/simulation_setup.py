@@ -89,7 +89,7 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
     world = _loaded(lambda: _load_world(folder / Path(parameters.world).expanduser(), warn))
     # Separate streams, so that a change of the odometry's noise does not change the beams.
     beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
-    sonar = Sonar(RayCaster(world), settings.sonar.pattern(), model, beams)
+    sonar = Sonar(_loaded(lambda: RayCaster(world)), settings.sonar.pattern(), model, beams)
     servo = Servo(settings.servo)
     commanded = CommandedVehicle(settings.vehicle, script.start)
     is_scripted = parameters.drive is Drive.SCRIPT

@@ -48,7 +48,7 @@ class WorldEchoes:
     """Answers pings with what a head at rest hears in a world; the gain scales the strengths."""
 
     def __init__(self, world: World, T_world_sonar: np.ndarray, seed: int) -> None:
-        """Raises RuntimeError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
+        """Raises MissingPackageError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
         self._caster = RayCaster(world)
         self._pose = T_world_sonar
         self._pattern: BeamPattern = SonarParameters().pattern()
@@ -65,10 +65,9 @@ class WorldEchoes:
 
 def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
     """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
-    try:
-        world = load_world(parameters.world_file).world
-    except WorldError as error:
-        raise ParameterError(f"world_file: {error}") from error
     position = parameters.x, parameters.y, parameters.z
     pose = pose_matrix(position, (0.0, 0.0, math.radians(parameters.yaw_deg)))
-    return WorldEchoes(world, pose, parameters.seed)
+    try:
+        return WorldEchoes(load_world(parameters.world_file).world, pose, parameters.seed)
+    except WorldError as error:
+        raise ParameterError(f"world_file: {error}") from error

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from node_support.geometry.matrices import pose_matrix, yaw_of
+from node_support.geometry.planar import rotated, unwrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 
@@ -70,10 +71,10 @@ class Odometry:
         self._noise = keep * self._noise + math.sqrt(1.0 - keep**2) * self._rng.standard_normal(3)
         turned = self._turn_rate_error(state) * duration
         yaw = yaw_of(state.T_world_base)
-        middle = 0.5 * (yaw_of(self._true) + _unwrapped(yaw, yaw_of(self._true)))
-        moved = _turned(state.T_world_base[:2, 3] - self._true[:2, 3], -middle)
+        middle = 0.5 * (yaw_of(self._true) + unwrapped(yaw, yaw_of(self._true)))
+        moved = rotated(state.T_world_base[:2, 3] - self._true[:2, 3], -middle)
         measured = moved * self._scale * (1.0 + self._parameters.speed_noise * self._noise[:2])
-        self._position = self._position + _turned(measured, middle + self._heading_error + 0.5 * turned)
+        self._position = self._position + rotated(measured, middle + self._heading_error + 0.5 * turned)
         self._heading_error += turned
         self._true = state.T_world_base
 
@@ -92,13 +93,3 @@ class Odometry:
     @property
     def _scale(self) -> float:
         return 1.0 / (1.0 + self._parameters.scale_error)
-
-
-def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
-    cos_angle, sin_angle = math.cos(angle), math.sin(angle)
-    x, y = vector
-    return np.array([cos_angle * x - sin_angle * y, sin_angle * x + cos_angle * y])
-
-
-def _unwrapped(angle: float, near: float) -> float:
-    return near + math.remainder(angle - near, 2.0 * math.pi)

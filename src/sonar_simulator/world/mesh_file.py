@@ -6,7 +6,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from sonar_simulator.world.errors import WorldError
+from sonar_simulator.world.errors import MissingPackageError, WorldError
 from sonar_simulator.world.primitives import Mesh
 
 MESH_SUFFIXES = (".dae", ".stl", ".obj", ".ply", ".glb", ".gltf")
@@ -39,8 +39,12 @@ def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
         raise WorldError(f"{path}: a mesh must be one of {', '.join(MESH_SUFFIXES)}")
     try:
         import trimesh
+
+        if path.suffix.lower() == ".dae":
+            # trimesh reads Collada with it, and without it would call every such file broken.
+            import collada  # noqa: F401
     except ImportError as error:
-        raise WorldError(f"{path}: no reader for meshes ({error}); run scripts/bootstrap") from error
+        raise MissingPackageError("reads meshes", "trimesh pycollada", error) from error
     try:
         scene = trimesh.load(str(path), force="scene", process=False)
     except OSError as error:

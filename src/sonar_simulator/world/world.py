@@ -5,7 +5,7 @@ from functools import cached_property
 from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from sonar_simulator.world import primitives
 from sonar_simulator.world.materials import DEFAULT_MATERIAL, Colour, Material
@@ -101,8 +101,8 @@ def _is_ground(vertices: np.ndarray) -> bool:
 def _outline(points: np.ndarray) -> np.ndarray:
     try:
         corners = ConvexHull(points).vertices
-    except QhullError:
-        # A flat vertical shape is a line when seen from above.
+    except RuntimeError:
+        # QhullError, which scipy 1.3 does not export: a flat vertical shape is a line when seen from above.
         ends = points[np.argsort(points @ np.ptp(points, axis=0))[[0, -1]]]
         return ends[[0, 1, 0]]
     return points[np.append(corners, corners[0])]

@@ -9,7 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from sonar_processing.beams.projection import project_beam, wrapped
+from node_support.geometry.planar import wrapped
+from sonar_processing.beams.projection import project_beam
 
 ANGLES = st.floats(-7.0, 7.0)
 SHIFTS = st.tuples(*[st.floats(-100.0, 100.0)] * 3)

@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -114,6 +115,16 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path, script, caps
     assert status == 1
     assert line in error
     assert error.count("\n") == 1
+    assert not out.exists()
+
+
+def test_without_the_ray_caster_one_line_says_what_to_install(tmp_path, script, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    status, out = _write(tmp_path, script)
+    error = capsys.readouterr().err
+    assert status == 1
+    assert error.count("\n") == 1
+    assert error.endswith("-m pip install embreex\n")
     assert not out.exists()
 
 

@@ -48,5 +48,6 @@ def _beside(values: np.ndarray, merged: np.ufunc) -> np.ndarray:
 
 def _polar(offsets: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return the number (n,) of the direction and the distance (n,) of offsets (n, 2)."""
-    turns = np.arctan2(offsets[:, 1], offsets[:, 0]) / (2.0 * np.pi) + 0.5
-    return (turns * _DIRECTIONS).astype(np.int64) % _DIRECTIONS, np.hypot(offsets[:, 0], offsets[:, 1])
+    x, y = np.array(offsets.T, order="C")
+    turns = np.arctan2(y, x) / (2.0 * np.pi) + 0.5
+    return (turns * _DIRECTIONS).astype(np.int64) % _DIRECTIONS, np.hypot(x, y)

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 
 from node_support.parameters import ParameterSet, parameter
+from sonar_processing.beams.beam_width import beam_width_parameter
 
 
 @dataclass(frozen=True)
@@ -17,7 +18,7 @@ class DistributionMatcherParameters(ParameterSet):
     )
     search_cell: float = parameter(0.5, "step of the search", unit="m", low=0.05, high=10.0)
     candidates: int = parameter(6, "places that the search hands to the refinement", low=1, high=100)
-    beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
+    beam_width: float = beam_width_parameter()
     range_scale_deviation: float = parameter(
         0.0, "how far all ranges may be off in proportion, as by the speed of sound", low=0.0, high=0.5
     )

@@ -1,4 +1,4 @@
-"""What docs/nodes.md says of every node besides its parameters: its purpose, its topics and its services."""
+"""What docs/nodes.md and --help say of every node besides its parameters: its purpose, topics and services."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -31,6 +31,14 @@ class NodeDescription:
     interfaces: Tuple[Interface, ...]
 
 
+@dataclass(frozen=True)
+class HostDescription:
+    """A node that runs other nodes in its process: its purpose in Markdown and the names of those nodes."""
+
+    summary: str
+    hosted: Tuple[str, ...]
+
+
 def _subscribes(name: str, kind: str, text: str) -> Interface:
     return Interface(Role.INPUT, name, kind, text)
 
@@ -49,6 +57,9 @@ _DRIVER_JOINTS_IN = _subscribes(
     "joint_states", "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
 )
 _AS_POINTS = "also as PointCloud2 on `.../cloud`"
+
+DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second")
+"""What every node publishes."""
 
 NODES: Dict[str, NodeDescription] = {
     "imagenex_852_driver": NodeDescription(
@@ -77,7 +88,11 @@ NODES: Dict[str, NodeDescription] = {
             _publishes("sonar/scan/sonarCloud", "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
             _publishes("sonar/scan/laserCloud", "sensor_msgs/PointCloud2", "scans of the LASER modes"),
             _publishes("sonar/scan/laserScan", "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
-            _publishes("sonar/scan/polar", "StampedIntensityCloud", "every revolution with all its bins, organised"),
+            _publishes(
+                "sonar/scan/polar",
+                "StampedIntensityCloud",
+                f"every revolution with all its bins, organised; {_AS_POINTS}",
+            ),
             _publishes("sonar/beam", "sensor_msgs/PointCloud2", "the newest beam"),
         ),
     ),
@@ -216,5 +231,21 @@ NODES: Dict[str, NodeDescription] = {
             _DRIVER_JOINTS_IN,
             _publishes("sonar/raw", "SonarScanLine", "beams"),
         ),
+    ),
+}
+
+_PROCESSING = ("sonar_to_cloud", "thresholder", "outlier_remover", "echo_extractor", "sonar_image")
+
+HOSTS: Dict[str, HostDescription] = {
+    "sonar_processing": HostDescription(
+        "Turns beams into clean clouds, with all stages in one process: clouds are handed on without being copied, and "
+        "a topic is serialised only while somebody subscribes to it. See [sonar_processing](sonar_processing.md).",
+        _PROCESSING,
+    ),
+    "mapping": HostDescription(
+        "Turns beams into a map, with all stages in one process: clouds are handed on without being copied, and "
+        "a topic is serialised only while somebody subscribes to it. See [sonar_processing](sonar_processing.md) "
+        "and [matching](matching.md).",
+        (*_PROCESSING, "mlsm_core"),
     ),
 }
