@@ -18,8 +18,8 @@ from node_support.ros.node import StartError, guarded
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_STOP = 1.0
-_PAUSE_AFTER_FAILURE = 1.0
+_LONGEST_STOP = 1.0  # s: a ping at the longest range ends within this time
+_PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 
 
 class DriverNode:

@@ -14,7 +14,7 @@ from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
 
 PACKAGE = "underwater_map_construction"
-_MOST_ORDERED = 100000
+_MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
 
 # Builds the echoes of the simulator; handed in, because the driver knows nothing of simulators.
 WorldEchoes = Callable[[EmulatorParameters], EchoSource]

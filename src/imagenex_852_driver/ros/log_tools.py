@@ -21,7 +21,7 @@ from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_SLEEP = 0.1
+_LONGEST_SLEEP = 0.1  # s: an end is noticed within this time
 # rospy sends from a queue, which dies with the process.
 _LAST_MESSAGES_LEAVE = 0.5
 

@@ -13,8 +13,8 @@ from node_support.errors import RefusedInput
 from node_support.health import Health
 from node_support.parameters import ParameterError
 
-DIAGNOSTICS_PERIOD = 1.0
-_SPIN_STEP = 0.05
+DIAGNOSTICS_PERIOD = 1.0  # s: as often as diagnostic aggregators expect it
+_SPIN_STEP = 0.05  # s: soon enough to end a node at once, seldom enough to cost nothing
 
 
 class StartError(Exception):

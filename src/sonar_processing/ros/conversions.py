@@ -24,7 +24,7 @@ LaserScanArrays = numpy_msg(LaserScan)
 """LaserScan whose ranges and intensities are numpy arrays."""
 
 POINT_FIELDS = ("x", "y", "z", "intensity")
-_FLOAT_BYTES = 4
+_FLOAT_BYTES = 4  # Of a FLOAT32 in a PointCloud2
 
 
 def header(stamp_ns: int, frame_id: str) -> Header:

@@ -16,7 +16,7 @@ from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
 from underwater_map_construction.msg import SonarScanLine
 from underwater_map_construction.srv import SetScanMode, SetScanModeRequest, SetScanModeResponse
 
-TICK_PERIOD = 0.1
+TICK_PERIOD = 0.1  # s: short against every timeout of sonar_control
 
 
 class SonarControl:

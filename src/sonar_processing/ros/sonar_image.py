@@ -17,7 +17,7 @@ from sonar_processing.ros.subscribers import subscribe_to_beams
 from sonar_processing.scans.image import PolarImage, SonarImageParameters
 from underwater_map_construction.msg import SonarScanLine
 
-QUEUE_SIZE = 2
+QUEUE_SIZE = 2  # Who is slow sees fewer images and not old ones
 
 
 class SonarImage(rospy.SubscribeListener):

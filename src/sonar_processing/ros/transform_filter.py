@@ -15,8 +15,8 @@ from node_support.ros.tf_buffer import JUMP_BACK, TfBuffer
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 
-QUEUE_SIZE = 120
-_WAIT = 0.5
+QUEUE_SIZE = 120  # One revolution of the usual head: tf may be late by a scan, not by more
+_WAIT = 0.5  # s: beams and transforms wake the thread; this is for shutdown alone
 
 
 class _WaitingBeam(NamedTuple):

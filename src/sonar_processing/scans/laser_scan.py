@@ -11,7 +11,7 @@ from sonar_processing.scans.laser_pick import picked_bins
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
-MOST_RAYS = 7200
+MOST_RAYS = 7200  # As many as `laser_scan_rays` allows; smaller steps are rounding of a head that stands still
 
 
 @dataclass(frozen=True)

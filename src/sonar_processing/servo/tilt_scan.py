@@ -11,7 +11,7 @@ from node_support.health import Health
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_processing.scans.head_turn import SweepCounter
 
-JUMP_BACK = 1.0
+JUMP_BACK = 1.0  # s: messages overtake each other by less; more is a bag that loops
 
 
 class ControlMode(Enum):

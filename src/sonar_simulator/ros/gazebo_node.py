@@ -19,8 +19,9 @@ from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 from underwater_map_construction.msg import SonarScanLine
 
+# A scan of 100,000 rays several times over; rospy reads one that is larger in pieces, slowly.
 _SCAN_BUFFER_BYTES = 2**23
-_ANY_TIME = 1.0
+_ANY_TIME = 1.0  # s: Gazebo says when the next scan comes, so the head's own period does not count
 
 
 class GazeboSonar:
