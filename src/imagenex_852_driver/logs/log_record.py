@@ -10,7 +10,7 @@ from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind, SwitchCom
 from imagenex_852_driver.protocol.errors import require
 
 MAGIC = b"852"
-HEADER_LENGTH = 100  # Bytes before the reply in each record (maker's log format)
+HEADER_LENGTH = 100  # Bytes before the reply in each record (manufacturer's log format)
 
 _INDICES = {ReplyKind.IPX: 0, ReplyKind.IMX: 2, ReplyKind.IGX: 3}
 _RECORD_LENGTHS = {ReplyKind.IPX: 128, ReplyKind.IMX: 384, ReplyKind.IGX: 640}
