@@ -11,7 +11,7 @@ from imagenex_852_driver.protocol.angles import head_angle
 from imagenex_852_driver.protocol.errors import SONAR_HEAD_ID
 from imagenex_852_driver.protocol.reply import OVERRUN, SWITCHES_ACCEPTED
 
-_SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (maker's specification)
+_SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (manufacturer's specification)
 # A serial adapter passes on the bytes of a reply in pieces of about this size.
 _PIECE = 64
 

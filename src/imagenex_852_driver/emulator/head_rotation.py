@@ -3,7 +3,7 @@
 from imagenex_852_driver.protocol import SwitchCommand
 from imagenex_852_driver.protocol.angles import AHEAD
 
-_TURN = 2400  # Head positions in a full turn, 0.15 deg each (maker's specification)
+_TURN = 2400  # Head positions in a full turn, 0.15 deg each (manufacturer's specification)
 
 
 class HeadRotation:
