@@ -4,14 +4,14 @@ from typing import List, NamedTuple, Optional
 
 from imagenex_852_driver.emulator.echo_source import EchoSource, FixedPattern, PingRequest
 from imagenex_852_driver.emulator.faults import Fault, FaultInjector
-from imagenex_852_driver.emulator.head_rotation import ScanMotion
+from imagenex_852_driver.emulator.head_rotation import HeadRotation
 from imagenex_852_driver.line.timing import LineTiming
 from imagenex_852_driver.protocol import CommandReader, Reply, SwitchCommand
 from imagenex_852_driver.protocol.angles import head_angle
 from imagenex_852_driver.protocol.errors import SONAR_HEAD_ID
 from imagenex_852_driver.protocol.reply import OVERRUN, SWITCHES_ACCEPTED
 
-_SONAR_STATUS = 0x01
+_SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (maker's specification)
 # A serial adapter hands on the bytes of a reply in pieces of about this size.
 _PIECE = 64
 
@@ -50,7 +50,7 @@ class EmulatedHead:
     def reboot(self) -> None:
         """Forget half a command, the position and the direction, as after a loss of power."""
         self._reader = CommandReader()
-        self._motion = ScanMotion()
+        self._motion = HeadRotation()
 
     def receive(self, data: bytes, time: float) -> List[Transmission]:
         """Take bytes that arrived at `time`; return what the head sends in answer, in order of time."""

@@ -3,10 +3,10 @@
 from imagenex_852_driver.protocol import SwitchCommand
 from imagenex_852_driver.protocol.angles import AHEAD
 
-_TURN = 2400
+_TURN = 2400  # Head positions in a full turn, 0.15 deg each (maker's specification)
 
 
-class ScanMotion:
+class HeadRotation:
     """The transducer's position, in the head's units (0.15 deg, clockwise, 1400 ahead).
 
     In a sector the head goes to and fro, with 360 deg it goes round for ever. A change of the command's

@@ -11,8 +11,8 @@ from typing import Callable, Deque, Optional
 
 from imagenex_852_driver.emulator.head import EmulatedHead, Transmission
 
-_READ_SIZE = 4096
-_PATIENCE = 1.0
+_READ_SIZE = 4096  # Bytes: many commands; a read takes what is there
+_PATIENCE = 1.0  # s: a thread that has not changed its state by now has failed
 
 
 class PtyServer:

@@ -11,7 +11,7 @@ import serial
 
 # A read returns after this time at the latest, so that a stop is noticed.
 READ_TIMEOUT = 0.05
-WRITE_TIMEOUT = 0.5
+WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is lost
 
 _REMOTE = ("socket://", "rfc2217://", "loop://")
 _USUAL_GROUP = "dialout"

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from imagenex_852_driver.protocol import SwitchCommand
 from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
 
-_BITS_PER_BYTE = 10
+_BITS_PER_BYTE = 10  # 8N1: one start bit, eight data bits, one stop bit
 
 
 @dataclass(frozen=True)

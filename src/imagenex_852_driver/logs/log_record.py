@@ -10,16 +10,16 @@ from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind, SwitchCom
 from imagenex_852_driver.protocol.errors import require
 
 MAGIC = b"852"
-HEADER_LENGTH = 100
+HEADER_LENGTH = 100  # Bytes before the reply in each record (maker's log format)
 
 _INDICES = {ReplyKind.IPX: 0, ReplyKind.IMX: 2, ReplyKind.IGX: 3}
 _RECORD_LENGTHS = {ReplyKind.IPX: 128, ReplyKind.IMX: 384, ReplyKind.IGX: 640}
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _STAMP = re.compile(rb"(\d\d)-([A-Za-z]{3})-(\d{4})\0(\d\d):(\d\d):(\d\d)\0\.(\d\d)\0")
-_ZERO_TRAIN = 70
+_ZERO_TRAIN = 70  # Codes of the maker's log format: train angle 0, and what is added to the number of turns
 _TURNS_OFFSET = 100
-_DEFAULT_SPEED_OF_SOUND = 1500.0
-_FEET = 0.3048
+_DEFAULT_SPEED_OF_SOUND = 1500.0  # m/s: what the head takes for its ranges
+_FEET = 0.3048  # m
 # What the maker calls reserved but always writes.
 _RESERVED = {42: 20, 43: 9}
 

@@ -4,7 +4,7 @@ from typing import Iterable, Iterator, Optional, Tuple
 
 from imagenex_852_driver.logs.log_record import LoggedPing
 
-USUAL_RATE = 10.0
+USUAL_RATE = 10.0  # 1/s: pings of a head at 30 m, for logs whose stamps do not tell
 
 
 def timed(pings: Iterable[LoggedPing], rate: Optional[float] = None) -> Iterator[Tuple[float, LoggedPing]]:

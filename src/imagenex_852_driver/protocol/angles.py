@@ -2,7 +2,7 @@
 
 import math
 
-AHEAD = 1400
+AHEAD = 1400  # Head position straight ahead (maker's specification)
 
 _RADIANS_PER_POSITION = math.radians(0.15)
 

@@ -6,7 +6,7 @@ from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID,
 from imagenex_852_driver.protocol.reply import ReplyKind
 
 HEADER = b"\xfe\x44"
-TERMINATOR = 0xFD
+TERMINATOR = 0xFD  # Bytes and codes of the maker's serial interface specification
 LENGTH = 27
 
 _REVERSE_BIT = 0x40

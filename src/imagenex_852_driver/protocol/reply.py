@@ -5,7 +5,7 @@ from enum import Enum
 
 from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID, require
 
-HEADER_LENGTH = 12
+HEADER_LENGTH = 12  # Lengths, bytes and bits of the maker's serial interface specification
 TERMINATOR = 0xFC
 SWITCHES_ACCEPTED = 0x40
 OVERRUN = 0x80

@@ -9,7 +9,7 @@ from imagenex_852_driver.protocol.reply import HEADER_LENGTH, Reply, ReplyKind, 
 
 _LETTERS = re.compile(b"I[MGP]X")
 _UNFINISHED_LETTERS = re.compile(b"I[MGP]?\\Z")
-_STATUS = 4
+_STATUS = 4  # Index of the status byte in the header
 
 
 class ParsedReply(NamedTuple):

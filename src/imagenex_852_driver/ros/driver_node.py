@@ -15,11 +15,11 @@ from imagenex_852_driver.ros.messages import scan_line
 from node_support import topics
 from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import StartError, guarded
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_STOP = 1.0
-_PAUSE_AFTER_FAILURE = 1.0
+_LONGEST_STOP = 1.0  # s: a ping at the longest range ends within this time
+_PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 
 
 class DriverNode:
@@ -32,7 +32,10 @@ class DriverNode:
         self._stop = threading.Event()
         self._last_stats = DeviceStats()
         self.health = DriverHealth(lambda line: rospy.logwarn("%s", line), self._stats)
-        self._live = LiveParameters(DriverParameters, namespace, "Imagenex852", self.health, self._use_parameters)
+        self.healths = [self.health]
+        self._live = ReconfigurableParameters(
+            DriverParameters, namespace, "Imagenex852", self.health, self._use_parameters
+        )
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
         self._connect()

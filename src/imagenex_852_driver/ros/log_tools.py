@@ -17,12 +17,11 @@ from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
 from node_support import topics
-from node_support.health import Health
 from node_support.parameters import ParameterError
-from node_support.ros.node import StartError, guarded
+from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_SLEEP = 0.1
+_LONGEST_SLEEP = 0.1  # s: an end is noticed within this time
 # rospy sends from a queue, which dies with the process.
 _LAST_MESSAGES_LEAVE = 0.5
 
@@ -81,9 +80,10 @@ def convert(options: Namespace) -> str:
 class LogRecorder:
     """Appends the beams of sonar/raw to a log, with the settings of the driver as they change."""
 
-    def __init__(self, options: Namespace, health: Health) -> None:
+    def __init__(self, options: Namespace) -> None:
         """Raises StartError when the log cannot be written."""
-        self._health = health
+        self._health = make_health("record_852")
+        self.healths = [self._health]
         self._driver = rospy.resolve_name(options.driver)
         self._settings = HeadSettings(head_id=rospy.get_param(f"{self._driver}/head_id", HeadSettings.head_id))
         self._inverted = False
@@ -93,8 +93,10 @@ class LogRecorder:
             self._writer = log_file.LogWriter(options.file)
         except OSError as error:
             raise StartError(f"{options.file}: {error.strerror}") from error
-        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(health, self._take_settings))
-        self._beams = rospy.Subscriber(topics.BEAMS, SonarScanLine, guarded(health, self._record), queue_size=1000)
+        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(self._health, self._take_settings))
+        self._beams = rospy.Subscriber(
+            topics.BEAMS, SonarScanLine, guarded(self._health, self._record), queue_size=1000
+        )
         rospy.on_shutdown(self._end)
 
     def _take_settings(self, config: Config) -> None:

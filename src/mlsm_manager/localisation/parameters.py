@@ -6,6 +6,7 @@ from enum import Enum
 from mlsm_manager.localisation.mapper import MapSettings
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.matching.problem.prediction import OdometryErrors
+from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 MAX_PREALLOCATED_CELLS = 16_000_000
@@ -99,7 +100,7 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MlsmCoreParameters(MatcherChoice, OdometryErrors, MatchingParameters, MapParameters):
+class MlsmCoreParameters(MatcherChoice, OdometryErrors, MatchingParameters, MapParameters, StampParameters):
     """All of mlsm_core's parameters, in one namespace."""
 
     def settings(self) -> MapSettings:

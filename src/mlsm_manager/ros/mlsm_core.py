@@ -26,10 +26,10 @@ from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import matrices
 from node_support.ros.node import every, guarded, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
-from sonar_processing.ros.stage_runner import subscribe_to_clouds
+from sonar_processing.ros.subscribers import subscribe_to_clouds
 from underwater_map_construction.srv import SaveMap, SaveMapRequest, SaveMapResponse
 
 _JUMP_BACK = 30.0
@@ -42,12 +42,17 @@ class MlsmCore:
     def __init__(self, namespace: str = "~") -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health("mlsm_core")
+        self.healths = [self.health]
         self._lock = threading.RLock()
         self._changed = False
         self._stamp_ns = 0
-        self._live = LiveParameters(MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(
+            MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters
+        )
         parameters = self._live.current
-        self._odometry = OdometryTrack(parameters.odom_frame, parameters.base_frame)
+        self._odometry = OdometryTrack(
+            parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
+        )
         self._publisher = MapPublisher(parameters.map_frame)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
@@ -57,6 +62,13 @@ class MlsmCore:
         rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
         rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
         every(parameters.map_period, self._publish_if_changed, self.health)
+
+    @classmethod
+    def as_node(cls) -> "MlsmCore":
+        """Return the map as a node of its own, which takes clouds and echoes from their topics."""
+        core = cls()
+        core.subscribe()
+        return core
 
     def subscribe(self) -> None:
         """Take clouds from sonar/scan/cleaned and scans of echoes from sonar/scan/echoes."""
@@ -119,6 +131,7 @@ class MlsmCore:
         return self._mapper.take_cloud(Scan.from_stamps(cloud.points, cloud.time_stamps, time, nowhere))
 
     def _check(self, cloud: IntensityCloud) -> None:
+        self._odometry.check_stamp(cloud.stamp_ns)
         parameters = self._live.current
         if cloud.frame_id not in (parameters.odom_frame, parameters.map_frame):
             raise RefusedInput(

@@ -17,7 +17,7 @@ class _RefusingServer(Server):
         pass
 
 
-class LiveParameters:
+class ReconfigurableParameters:
     """Holds the current, always valid `ParameterSet` of one stage."""
 
     def __init__(

@@ -11,9 +11,9 @@ from node_support.geometry.planar import wrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
 
-MOST_PIXELS = 3000
-_USUAL_PIXELS = 501
-_WIDEST_STEP = 0.2
+MOST_PIXELS = 3000  # A picture of 9 MB; more, at the rate of beams, is too much for a network
+_USUAL_PIXELS = 501  # Odd, so that the head is in the middle of a pixel; a bin is then about a pixel
+_WIDEST_STEP = 0.2  # rad: a wider step is no step but a gap, as where a sector begins anew
 
 
 @dataclass(frozen=True)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from enum import Enum
 
 from node_support import topics
+from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
 
@@ -86,5 +87,5 @@ class ScanParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class SonarToCloudParameters(BeamCorrection, ScanParameters):
+class SonarToCloudParameters(BeamCorrection, ScanParameters, StampParameters):
     """Parameters of sonar_to_cloud."""

@@ -9,9 +9,9 @@ import numpy as np
 
 from node_support.health import Health
 from node_support.parameters import ParameterError, ParameterSet, parameter
-from sonar_processing.scans.turn_counter import TurnCounter
+from sonar_processing.scans.head_turn import SweepCounter
 
-JUMP_BACK = 1.0
+JUMP_BACK = 1.0  # s: messages overtake each other by less; more is a bag that loops
 
 
 class ControlMode(Enum):
@@ -147,7 +147,7 @@ class TiltScan:
     def _look(self, time: float) -> None:
         is_horizontal = self.parameters.mode is ControlMode.HORIZONTAL
         self.state, self._since = (State.HOLDING if is_horizontal else State.SCANNING), time
-        self._counter = TurnCounter(self.parameters.scan_beams)
+        self._counter = SweepCounter(self.parameters.scan_beams)
 
     def _go_on(self, time: float) -> None:
         beyond = not 0 <= self._step + self._direction < len(self._goals)

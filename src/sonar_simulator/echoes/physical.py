@@ -20,7 +20,7 @@ _CAST_WIDTH = 1.6
 _NEAREST = 0.05
 # Levels at or below this are not there, dB.
 _NONE = -100.0
-_BEHIND = 1000.0
+_BEHIND = 1000.0  # dB: what lies behind the transducer is not heard
 
 
 class Detector(Enum):

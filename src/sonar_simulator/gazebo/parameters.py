@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Dict, Type
 
+from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_simulator.echoes.echo_model import ECHO_MODELS
 
@@ -17,7 +18,7 @@ class HeadMode(Enum):
 
 
 @dataclass(frozen=True)
-class GazeboSonarParameters(ParameterSet):
+class GazeboSonarParameters(StampParameters):
     """How rays become beams."""
 
     head: HeadMode = parameter(

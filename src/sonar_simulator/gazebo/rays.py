@@ -8,7 +8,7 @@ import numpy as np
 
 from node_support.errors import RefusedInput
 
-_NO_BEARING = 1e-6
+_NO_BEARING = 1e-6  # rad: less than any ray sensor's step; all rays of one column
 
 
 @dataclass(frozen=True)

@@ -4,7 +4,7 @@ from typing import Tuple
 
 import numpy as np
 
-_GROUP = 8
+_GROUP = 8  # Triangles behind one box: fewer make more boxes to test, more make each of them looser
 # Boxes are compared in float32, m.
 _MARGIN = 1e-3
 

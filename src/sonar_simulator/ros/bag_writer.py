@@ -20,8 +20,8 @@ from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME,
 from sonar_simulator.vehicle.robot_description import RobotDescription
 from sonar_simulator.vehicle.servo import tilted
 
-START_TIME = 1000.0
-BEAMS_AT_ONCE = 120
+START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
+BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head
 _RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
 _SETTINGS_TOPIC = "/sonar_simulator/settings"
 

@@ -19,8 +19,9 @@ from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 from underwater_map_construction.msg import SonarScanLine
 
+# A scan of 100,000 rays several times over; rospy reads one that is larger in pieces, slowly.
 _SCAN_BUFFER_BYTES = 2**23
-_ANY_TIME = 1.0
+_ANY_TIME = 1.0  # s: Gazebo says when the next scan comes, so the head's own period does not count
 
 
 class GazeboSonar:
@@ -29,6 +30,7 @@ class GazeboSonar:
     def __init__(self) -> None:
         """Raises ParameterError."""
         self.health = make_health("gazebo_sonar")
+        self.healths = [self.health]
         values = dict(rospy.get_param("~", {}))
         groups = {name: kind.from_group(name, values.pop(name, {})) for name, kind in GROUPS.items()}
         self._parameters = GazeboSonarParameters.from_mapping(values)
@@ -51,7 +53,7 @@ class GazeboSonar:
     def _make_filter(self) -> Optional[TransformFilter]:
         if self._parameters.head is HeadMode.SWEEP:
             return None
-        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None)
+        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None, self._parameters.stamp_tolerance)
         made.registerCallback(guarded(self.health, self._turned))
         return made
 

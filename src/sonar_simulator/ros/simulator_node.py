@@ -21,9 +21,9 @@ from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.simulation.simulation_setup import PACKAGE, Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
-START_TIME = 1000.0
-_WAIT_STEP = 0.05
-_LISTENER_TIME = 0.5
+START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
+_WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
+_LISTENER_TIME = 0.5  # s: a subscriber that has one topic has the others within this time
 
 
 class Simulator:
@@ -32,6 +32,7 @@ class Simulator:
     def __init__(self) -> None:
         """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
+        self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
         folder = Path(rospkg.RosPack().get_path(PACKAGE))
         self._parameters = settings.simulator

@@ -11,7 +11,7 @@ from sonar_simulator.ros.world_marker import world_marker
 from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.world.world import World
 
-_QUEUE_SIZE = 100
+_QUEUE_SIZE = 100  # A second of every topic at the usual rates
 
 
 class SimulatorPublisher:

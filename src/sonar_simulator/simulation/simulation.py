@@ -8,7 +8,7 @@ import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
-from sonar_simulator.vehicle.movement import Motion, VehicleState
+from sonar_simulator.vehicle.movement import Movement, VehicleState
 from sonar_simulator.vehicle.odometry import Estimate, Odometry
 from sonar_simulator.vehicle.scripted_vehicle import TiltCommand
 from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
@@ -75,7 +75,7 @@ class Simulation:
 
     def __init__(
         self,
-        motion: Motion,
+        movement: Movement,
         odometry: Odometry,
         sonar: Sonar,
         head: SonarHead,
@@ -84,8 +84,8 @@ class Simulation:
         tilt_commands: Sequence[TiltCommand] = (),
     ) -> None:
         """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` it stays there."""
-        self.duration = motion.duration
-        self._motion = motion
+        self.duration = movement.duration
+        self._movement = movement
         self._odometry = odometry
         self._sonar = sonar
         self._head = head
@@ -112,7 +112,7 @@ class Simulation:
     def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
         """Return the state at `time`, not before that of the last call, with a beam still to be heard."""
         self._command_tilt(time)
-        truth = self._motion.state(time)
+        truth = self._movement.state(time)
         return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), is_tick, head_angle)
 
     def _unheard(self, tick_rate: float) -> Iterator[Moment]:

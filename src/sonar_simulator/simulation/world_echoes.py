@@ -15,7 +15,7 @@ from sonar_simulator.world.errors import WorldError
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 
-_FULL_STRENGTH_DB = 20.0
+_FULL_STRENGTH_DB = 20.0  # Start gain at which an echo has the strength that the model gives it
 
 
 class PingCommand(Protocol):

@@ -10,8 +10,8 @@ from node_support.geometry.matrices import pose_matrix
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 
-_STEP = 0.01
-_STILL_SPEED = 1e-3
+_STEP = 0.01  # s: short against the time in which the vehicle reaches its speed
+_STILL_SPEED = 1e-3  # m/s and rad/s: slower is the tail of an exponential, and the vehicle rests
 
 
 @dataclass(frozen=True)

@@ -18,7 +18,7 @@ class VehicleState:
     is_still: bool
 
 
-class Motion(Protocol):
+class Movement(Protocol):
     """A vehicle on its way."""
 
     duration: float

@@ -11,7 +11,7 @@ from node_support.geometry.planar import rotated, unwrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 
-_NOISE_TIME = 1.0
+_NOISE_TIME = 1.0  # s: correlation time, about that of a vehicle's own dynamics
 
 
 @dataclass(frozen=True)

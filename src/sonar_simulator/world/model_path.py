@@ -9,7 +9,7 @@ PATH_VARIABLES = (
     "GAZEBO_MODEL_PATH", "SDF_PATH", "GAZEBO_RESOURCE_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH",
 )  # fmt: skip
 _HOME_MODELS = "~/.gazebo/models"
-_NEWEST = (1, 7)
+_NEWEST = (1, 7)  # Newest version of SDF that is read
 
 
 def model_folders() -> Tuple[Path, ...]:

@@ -8,8 +8,8 @@ Mesh = Tuple[np.ndarray, np.ndarray]
 
 # The chords of a 64-gon lie at most 0.12 % of the radius inside the circle: less than a bin at any range.
 _SEGMENTS = 64
-_RINGS = 32
-_ENDLESS = 4000.0
+_RINGS = 32  # Half of the segments, so that the facets of a sphere are as high as wide
+_ENDLESS = 4000.0  # m: far beyond any sonar's range, and still exact to a millimetre in float32
 
 
 def box(x: float, y: float, z: float) -> Mesh:
