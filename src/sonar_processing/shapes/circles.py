@@ -209,8 +209,8 @@ def hollow_depth(seen: Sightings) -> float:
     if len(seen.points) < 3:
         return 0.0
     outward = seen.towards.mean(axis=0)
-    order = np.argsort(seen.points @ np.array([-outward[1], outward[0]]))
-    return float(seen.ranges[order[1:-1]].mean() - seen.ranges[order[[0, -1]]].mean())
+    depth = (seen.points @ outward)[np.argsort(seen.points @ np.array([-outward[1], outward[0]]))]
+    return float(depth[1:-1].mean() - depth[[0, -1]].mean())
 
 
 def line_residual(points: np.ndarray, weights: np.ndarray) -> float:
