@@ -21,6 +21,7 @@ class StageType:
 
     figures: what else the stage tells of its newest cloud; each is published as Float32 on ~name and shown in
     /diagnostics, unless it is None.
+    when_empty: what to do when it removes every point of scan after scan.
     """
 
     parameters: Type[ParameterSet]
@@ -28,6 +29,7 @@ class StageType:
     config_name: str
     input_topic: str
     output_topic: str
+    when_empty: str
     figures: Mapping[str, Callable[[Any], Optional[float]]] = field(default_factory=dict)
 
     @property
@@ -43,6 +45,7 @@ STAGES: Dict[str, StageType] = {
         "Thresholder",
         SCAN_TOPIC,
         "sonar/scan/thresholded",
+        "lower what makes its mode's threshold (otsu_multiplier in OTSU+PROPORTIONAL), or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),
     "outlier_remover": StageType(
@@ -51,6 +54,7 @@ STAGES: Dict[str, StageType] = {
         "OutlierRemover",
         "sonar/scan/thresholded",
         "sonar/scan/cleaned",
+        "lower min_neighbors in RADIUS, raise stddev_multiplier in STATISTICAL, or set mode to NONE",
     ),
     "echo_extractor": StageType(
         EchoExtractorParameters,
@@ -58,6 +62,7 @@ STAGES: Dict[str, StageType] = {
         "EchoExtractor",
         POLAR_TOPIC,
         "sonar/scan/echoes",
+        "lower min_contrast or min_height, or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),
 }
