@@ -50,6 +50,12 @@ def test_a_simulated_bag_gives_all_files(basin):
     assert {path.name for path in basin.iterdir()} == FILES
 
 
+def test_the_same_command_writes_the_same_bytes(basin, tmp_path):
+    assert run(BASIN, "--out", tmp_path, "--truth", "/ground_truth", "--refine").returncode == 0
+    for name in FILES - {"summary.json"}:
+        assert (tmp_path / name).read_bytes() == (basin / name).read_bytes(), name
+
+
 def test_the_summary_has_the_promised_keys(basin):
     summary = summary_of(basin)
     counts = {"scans", "matched", "rejected", "blocks", "seconds", "times_real_time"}
