@@ -15,7 +15,7 @@ class ConnectionParameters(ParameterSet):
     speed_of_sound: float = parameter(1500.0, "what the head assumes", unit="m/s", low=1000.0, tunable=False)
     reply_margin: float = parameter(
         0.25,
-        "wait for a reply beyond sound and delay",
+        "how long to wait for a reply beyond the sound's travel time and the switch delay",
         unit="s",
         low=0.01,
         high=1.0,
@@ -23,13 +23,15 @@ class ConnectionParameters(ParameterSet):
     )
     late_window: float = parameter(
         0.25,
-        "wait after a timeout for a late reply, which the next ping must not get",
+        "how long to wait after a timeout for a late reply, so that the next ping does not get it",
         unit="s",
         low=0.0,
         high=1.0,
         tunable=False,
     )
-    byte_gap: float = parameter(0.1, "silence within a reply that ends it", unit="s", low=0.01, high=1.0, tunable=False)
+    byte_gap: float = parameter(
+        0.1, "silence that ends an incomplete reply", unit="s", low=0.01, high=1.0, tunable=False
+    )
     back_off_first: float = parameter(
         0.1, "wait before the first attempt to reopen the port", unit="s", low=0.01, high=1.0, tunable=False
     )

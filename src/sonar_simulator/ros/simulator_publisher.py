@@ -17,7 +17,7 @@ _QUEUE_SIZE = 100  # A second of every topic at the usual rates
 class SimulatorPublisher:
     """The simulator's topics. Its world is the frame `map`, which the odometry's error moves away from `odom`.
 
-    A vehicle that follows a script gets its commands from nobody: then the velocity is on cmd_vel as well, where the
+    Nobody sends commands to a vehicle that follows a script: then the velocity is on cmd_vel as well, where the
     rest of the graph expects it.
     """
 

@@ -33,9 +33,13 @@ class SimulatorParameters(ParameterSet):
         "laser_cone", "how contacts become echoes: laser_cone, collision or physical", tunable=False
     )
     drive: Drive = parameter(
-        Drive.SCRIPT, "what moves the vehicle: its script, or from the script's start on commands", tunable=False
+        Drive.SCRIPT,
+        "what moves the vehicle: its script, or commands from the script's start position on",
+        tunable=False,
     )
-    seed: int = parameter(1, "of all random numbers: same seed, same beams", low=0, high=2**31 - 1, tunable=False)
+    seed: int = parameter(
+        1, "seed of all random numbers: the same seed gives the same beams", low=0, high=2**31 - 1, tunable=False
+    )
     real_time_factor: float = parameter(
         1.0, "simulated seconds per second of wall time", low=0.01, high=1000.0, tunable=False
     )

@@ -26,7 +26,7 @@ class VehicleParameters(ParameterSet):
         0.6, "time constant of the speed; 80 % of a new command is reached after 3", unit="s", low=0.02, high=60.0
     )
     command_timeout: float = parameter(
-        0.5, "the vehicle stops when no command came for so long, simulated time", unit="s", low=0.01, high=3600.0
+        0.5, "simulated time without a command after which the vehicle stops", unit="s", low=0.01, high=3600.0
     )
 
     def limits(self) -> np.ndarray:

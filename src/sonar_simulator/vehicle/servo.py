@@ -40,7 +40,7 @@ class Servo:
         self._goal = 0.0
 
     def command(self, angle: float) -> None:
-        """Turn towards `angle` [rad], at most to the end of the range; raises RefusedInput when it is no number."""
+        """Turn towards `angle` [rad], at most to the end of the range; raises RefusedInput when it is not finite."""
         if not math.isfinite(angle):
             raise RefusedInput("servo commands refused", f"{angle} rad, must be a finite angle")
         self._goal = min(max(angle, self._lowest), self._highest)
