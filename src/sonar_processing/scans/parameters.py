@@ -7,6 +7,7 @@ from node_support import topics
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.beam_width import beam_width_parameter
 
 
 class ScanMode(Enum):
@@ -63,7 +64,7 @@ class ScanParameters(ParameterSet):
     )
     keep_organized: bool = parameter(False, "one row per beam, with NaN in place of removed points")
     dispersed_points: int = parameter(1, "points per bin, spread across the width of the beam", low=1, high=15)
-    beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
+    beam_width: float = beam_width_parameter()
     laser_pick: LaserPick = parameter(
         LaserPick.STRONGEST, "the bin that LASER and the laser scan take: the strongest, or the first strong enough"
     )
