@@ -36,8 +36,6 @@ class TfBuffer:
 
     Transforms that tf2 cannot take are refused and counted. When the stamps of a frame go back by more than
     `JUMP_BACK`, as when a bag loops, all transforms that change are forgotten.
-
-    Only one thread at a time is inside tf2: a look-up beside another thread that adds transforms crashed in tf2.
     """
 
     def __init__(
@@ -63,8 +61,7 @@ class TfBuffer:
     def obstacle(self, target: str, source: str, stamp_ns: int) -> str:
         """Return why `source` cannot be placed in `target` at a stamp [ns]; empty when it can."""
         check_stamp(stamp_ns)
-        with self._condition:
-            can, reason = self._buffer.can_transform_core(target, source, _time(stamp_ns))
+        can, reason = self._buffer.can_transform_core(target, source, _time(stamp_ns))
         return "" if can else reason or "unknown to tf"
 
     def matrix(self, target: str, source: str, stamp_ns: int) -> np.ndarray:
@@ -101,8 +98,7 @@ class TfBuffer:
 
     def _looked_up(self, target: str, source: str, stamp: genpy.Time) -> Tuple[int, np.ndarray]:
         try:
-            with self._condition:
-                found = self._buffer.lookup_transform_core(target, source, stamp)
+            found = self._buffer.lookup_transform_core(target, source, stamp)
         except tf2_ros.TransformException as error:
             raise RefusedInput("transforms missing", f"from {source} to {target}: {error}") from error
         return found.header.stamp.to_nsec(), matrix_from_message(found.transform)
