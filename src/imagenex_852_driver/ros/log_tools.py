@@ -3,6 +3,7 @@
 import os
 import time
 from argparse import Namespace
+from pathlib import Path
 from typing import Optional
 
 import rosbag
@@ -16,6 +17,7 @@ from imagenex_852_driver.logs.playback import timed
 from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
+from node_support.files import whole_file
 from node_support.health import Health
 from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded
@@ -60,11 +62,14 @@ class LogPlayer:
 
 
 def convert(options: Namespace) -> str:
-    """Write the bag of a log; return in words what was written. Raises StartError when that cannot be done."""
+    """Write the bag of a log, whole or not at all; return in words what was written.
+
+    Raises StartError when that cannot be done, and when the file holds no ping.
+    """
     reader = opened(options.file)
     count, start = 0, options.start
     try:
-        with rosbag.Bag(options.out, "w") as bag:
+        with whole_file(Path(options.out)) as temporary, rosbag.Bag(str(temporary), "w") as bag:
             for moment, ping in timed(reader, options.rate):
                 if start is None:
                     start = ping.stamp or os.path.getmtime(options.file)
@@ -72,6 +77,8 @@ def convert(options: Namespace) -> str:
                 if message is not None:
                     bag.write(options.topic, message, message.header.stamp)
                     count += 1
+            if not reader.ping_count:
+                raise StartError(f"{options.file}: not a .852 log, no ping in it; nothing was written")
     except OSError as error:
         raise StartError(f"{options.out}: {error.strerror}") from error
     return f"{options.out}: {count} beams; {summary(reader)}"
