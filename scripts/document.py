@@ -1,8 +1,7 @@
-"""Writes what is generated from the parameter dataclasses: the default yaml files and the tables of the documents."""
+"""Writes the generated files: the default yaml files, docs/nodes.md and docs/thesis_names.md."""
 
 import argparse
 import dataclasses
-import re
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,6 +10,7 @@ from typing import Dict, Type
 from imagenex_852_driver.emulator.parameters import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
@@ -27,8 +27,22 @@ from sonar_simulator.simulation.simulation import SimulatorParameters
 from sonar_simulator.simulation.simulation_setup import GROUPS
 
 ROOT = Path(__file__).resolve().parent.parent
-DOCUMENTS = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
-_BLOCK = re.compile(r"(<!-- parameters: ([\w/]+) -->\n).*?(<!-- end -->)", re.DOTALL)
+NODES_INTRODUCTION = """\
+# Nodes: topics, services and parameters
+
+*Written by `scripts/document` from `src/node_support/node_table.py` and the parameter dataclasses; do not edit.*
+
+Topic names are relative, so that a namespace (`ROS_NAMESPACE`, `<group ns=...>`) can hold a whole vehicle. Every node
+also publishes `/diagnostics`. `yaml/<node>_default.yaml` holds every parameter with its meaning and default.
+
+Parameters marked * can be changed with dynamic_reconfigure while the node runs. A value that is not allowed is
+refused, and the old value stays.
+
+`sonar_processing` and `mapping` run several of these nodes in one process. `sonar_processing` runs sonar_to_cloud,
+sonar_image and the stages listed in its parameter `~chain`, a list of node names, by default `[thresholder,
+outlier_remover, echo_extractor]`. `mapping` also runs mlsm_core. Topics are the same as with one node per stage, and
+parameters stay in the namespaces of the stages (`/thresholder/mode`).
+"""
 
 
 @dataclass(frozen=True)
@@ -53,22 +67,35 @@ LIVE_NODES: Dict[str, LiveNode] = {
     "thresholder": LiveNode(ThresholderParameters, "Thresholder"),
 }
 
+START_UP_NODES: Dict[str, Type[ParameterSet]] = {
+    "sonar_simulator": SimulatorParameters,
+    "gazebo_sonar": GazeboSonarParameters,
+}
+"""Nodes that read their parameters only when they start."""
+
 
 def generated() -> Dict[Path, str]:
-    """Return the whole text of every generated file. Raises KeyError for a table of an unknown node."""
+    """Return the whole text of every generated file."""
     texts = {
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, node.parameters) for name, node in LIVE_NODES.items()
     }
     texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
     texts[ROOT / "yaml/gazebo_sonar_default.yaml"] = gazebo_sonar_yaml()
-    texts.update({path: with_tables(path.read_text()) for path in DOCUMENTS})
+    texts[ROOT / "docs/nodes.md"] = nodes_page()
     texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     return texts
 
 
 def thesis_names() -> str:
     """Return the table that pairs the parameter names of the thesis with ours."""
-    lines = ["# Parameters of the thesis and their names here", "", "| node | thesis | here |", "| --- | --- | --- |"]
+    lines = [
+        "# Parameters of the thesis and their names here",
+        "",
+        "*Written by `scripts/document` from the parameter dataclasses; do not edit.*",
+        "",
+        "| node | thesis | here |",
+        "| --- | --- | --- |",
+    ]
     for name, node in LIVE_NODES.items():
         for field in dataclasses.fields(node.parameters):
             thesis_name = describe(field).thesis_name
@@ -77,13 +104,31 @@ def thesis_names() -> str:
     return "\n".join(lines) + "\n"
 
 
-def with_tables(text: str) -> str:
-    """Return the text with every block "<!-- parameters: NODE --> ... <!-- end -->" made anew."""
-    tables = {name: markdown_table(node.parameters) for name, node in LIVE_NODES.items()}
-    tables["sonar_simulator"] = markdown_table(SimulatorParameters, live=False)
-    tables["gazebo_sonar"] = markdown_table(GazeboSonarParameters, live=False)
-    tables.update({f"sonar_simulator/{name}": markdown_table(group, live=False) for name, group in GROUPS.items()})
-    return _BLOCK.sub(lambda block: f"{block[1]}\n{tables[block[2]]}\n{block[3]}", text)
+def nodes_page() -> str:
+    """Return docs/nodes.md: purpose, topics, services and parameters of every node."""
+    sections = [_node_section(name, node, _parameter_tables(name)) for name, node in NODES.items()]
+    return "\n".join([NODES_INTRODUCTION, *sections])
+
+
+def _node_section(name: str, node: NodeDescription, tables: Dict[str, str]) -> str:
+    lines = [f"## {name}", "", node.summary, "", "| | name | type | |", "| --- | --- | --- | --- |"]
+    for one in node.interfaces:
+        kind = f"`{one.type}`" if one.type else ""
+        lines.append(f"| {one.role.value} | `{one.name}` | {kind} | {one.text} |")
+    for title, table in tables.items():
+        lines += ["", f"<details><summary>{title}</summary>", "", table, "</details>"]
+    return "\n".join(lines) + "\n"
+
+
+def _parameter_tables(node: str) -> Dict[str, str]:
+    """Return the parameter tables of a node by their titles."""
+    if node in LIVE_NODES:
+        return {"Parameters": markdown_table(LIVE_NODES[node].parameters)}
+    tables = {"Parameters": markdown_table(START_UP_NODES[node], live=False)}
+    if node == "sonar_simulator":
+        groups = {name: markdown_table(group, live=False) for name, group in GROUPS.items()}
+        tables.update({f"Parameters in the group <code>{name}</code>": table for name, table in groups.items()})
+    return tables
 
 
 def main() -> int:

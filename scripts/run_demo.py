@@ -96,7 +96,7 @@ class Watch:
 
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         for status in message.status:
-            self.stages[status.name] = {item.key: item.value for item in status.values}
+            self.stages[status.name.rpartition(": ")[2]] = {item.key: item.value for item in status.values}
 
     def number(self, stage: str, counter: str) -> int:
         """Return a stage's counter, 0 while it has not counted."""

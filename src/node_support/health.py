@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Callable, Dict, Iterator
 
-WARNING_PERIOD = 10.0
+WARNING_PERIOD = 10.0  # s: often enough to be seen in a log, seldom enough to leave the rest of it readable
 
 
 class Level(IntEnum):

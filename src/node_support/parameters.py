@@ -12,7 +12,7 @@ From that declaration come the start-up check, the refusal at run time and the d
 import dataclasses
 import math
 from enum import Enum
-from typing import Any, Dict, Mapping, Optional, Tuple, Type, TypeVar
+from typing import Any, Callable, Dict, Mapping, Optional, Tuple, Type, TypeVar
 
 _METADATA_KEY = "parameter"
 Self = TypeVar("Self", bound="ParameterSet")
@@ -41,7 +41,7 @@ class Description:
         if kind is bool:
             return "true or false"
         if kind is str:
-            return "a text" if self.may_be_empty else "a text that is not empty"
+            return "a string" if self.may_be_empty else "a non-empty string"
         number = "an integer" if kind is int else "a number"
         bounds = [
             f"{word} {bound:.12g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None
@@ -64,7 +64,7 @@ def parameter(
     """Declare one field of a `ParameterSet`.
 
     `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
-    the others only at start-up; `may_be_empty` allows an empty text; `thesis_name` is the parameter's name in the
+    the others only at start-up; `may_be_empty` allows an empty string; `thesis_name` is the parameter's name in the
     2015 package.
     """
     description = Description(text, unit, low, high, thesis_name, tunable, may_be_empty)
@@ -123,6 +123,32 @@ class ParameterSet:
     def tunable_fields(cls) -> Tuple[dataclasses.Field, ...]:
         """Return the fields that may change while the node runs."""
         return tuple(field for field in dataclasses.fields(cls) if describe(field).tunable)
+
+
+def with_defaults(**defaults: Any) -> Callable[[type], type]:
+    """Give a `ParameterSet` other defaults for parameters that it inherits; texts, units and ranges stay::
+
+        @dataclass(frozen=True)
+        @with_defaults(radius=2.0)
+        class WideRadiusParameters(RadiusParameters):
+            ...
+
+    Raises ParameterError for a name that is not inherited or a default that is not allowed.
+    """
+
+    def changed(derived: type) -> type:
+        inherited = {field.name: field for base in derived.__bases__ for field in dataclasses.fields(base)}
+        annotations = dict(vars(derived).get("__annotations__", {}))
+        for name, value in defaults.items():
+            if name not in inherited:
+                raise ParameterError(f"{name} = {value!r}: {derived.__name__} inherits no such parameter")
+            field = inherited[name]
+            annotations[name] = field.type
+            setattr(derived, name, dataclasses.field(default=_validated(field, value), metadata=field.metadata))
+        derived.__annotations__ = annotations
+        return derived
+
+    return changed
 
 
 def _validated(field: dataclasses.Field, value: Any) -> Any:

@@ -37,7 +37,7 @@ class BadBeams(unittest.TestCase):
             wait_for_subscribers("/sonar/scan/sonarCloud", 1)
             wait_for_subscribers("/sonar/scan/thresholded", 1)
         wait_for_subscribers("/sonar/scan/cleaned/cloud", 1)
-        cls.time = 1000.0
+        cls.time = rospy.get_time()
 
     def send(self, frame: str = "sonar", **fields: object) -> None:
         """Publish one beam 0.1 s after the one before."""

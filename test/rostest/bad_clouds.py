@@ -27,7 +27,8 @@ def wall(points: int = 400) -> np.ndarray:
 
 def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
     """Return the points as a message with good stamps."""
-    return cloud_to_message(IntensityCloud(points, np.full(len(points), -10.0), 10 * 10**9, frame))
+    now = rospy.get_time()
+    return cloud_to_message(IntensityCloud(points, np.full(len(points), -now), int(now * 1e9), frame))
 
 
 def dense(cloud: StampedIntensityCloud) -> StampedIntensityCloud:

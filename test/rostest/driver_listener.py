@@ -56,7 +56,11 @@ def beams() -> Listener:
 
 def diagnostics(name: str = "imagenex_852_driver") -> Listener:
     """Return a listener of the diagnostics of one node."""
-    return Listener("/diagnostics", DiagnosticArray, lambda array: any(s.name == name for s in array.status))
+
+    def is_of_node(array: DiagnosticArray) -> bool:
+        return any(status.name.endswith(f": {name}") and status.values for status in array.status)
+
+    return Listener("/diagnostics", DiagnosticArray, is_of_node)
 
 
 def values(array: DiagnosticArray) -> Dict[str, str]:

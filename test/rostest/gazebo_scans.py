@@ -75,7 +75,7 @@ def cloud2(header: Header, opening: float, columns: int, wall: float) -> PointCl
 
 
 def header(seconds: float, frame_id: str) -> Header:
-    """Return a header."""
+    """Return a header of some seconds after the Epoch."""
     return Header(stamp=rospy.Time.from_sec(seconds), frame_id=frame_id)
 
 

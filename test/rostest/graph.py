@@ -86,7 +86,8 @@ class Diagnostics:
     def _take(self, array: DiagnosticArray) -> None:
         with self._condition:
             for status in array.status:
-                self._values[status.name] = {item.key: item.value for item in status.values}
+                stage = status.name.rpartition(": ")[2]
+                self._values[stage] = {item.key: item.value for item in status.values}
             self._condition.notify_all()
 
     def wait_for(self, stage: str, counter: str, number: int, timeout: float = 20.0) -> None:
@@ -96,6 +97,11 @@ class Diagnostics:
                 return
             known = self._values.get(stage)
         raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {known}")
+
+    def values(self, stage: str) -> Dict[str, str]:
+        """Return what is known of a stage now."""
+        with self._condition:
+            return dict(self._values.get(stage, {}))
 
     def _number(self, stage: str, counter: str) -> int:
         return int(self._values.get(stage, {}).get(counter, -1))

@@ -32,7 +32,9 @@ def scan() -> np.ndarray:
 
 def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
     """Return the points as a message, each of a beam of its own."""
-    return cloud_to_message(IntensityCloud(points, -10.0 - np.arange(len(points)) * 0.1, 20 * 10**9, frame))
+    start = round(rospy.get_time())
+    stamps = -start - np.arange(len(points)) * 0.1
+    return cloud_to_message(IntensityCloud(points, stamps, (start + 10) * 10**9, frame))
 
 
 class Shapes(unittest.TestCase):

@@ -15,9 +15,9 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
-from node_support.ros.node import DiagnosticsPublisher
+from node_support.ros.node import publish_diagnostics
 from sonar_processing.ros.conversions import LaserScanArrays, StampedIntensityCloudArrays
-from sonar_processing.ros.pipeline import ProcessingHost
+from sonar_processing.ros.pipeline import Pipeline
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 BEAMS = 60
@@ -66,8 +66,8 @@ class UnreadTopics(unittest.TestCase):
         """Host everything, with the odometry as velocity, and connect."""
         cls.counting = Counting([StampedIntensityCloudArrays, LaserScanArrays, PointCloud2, Image, CameraInfo, Float32])
         rospy.set_param("sonar_to_cloud", {"velocity_topic": "odom", "velocity_type": "ODOMETRY", "mode": "LASER"})
-        cls.host = ProcessingHost()
-        cls.diagnostics = DiagnosticsPublisher(cls.host.healths)
+        cls.host = Pipeline()
+        publish_diagnostics(cls.host.healths)
         cls.beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
         cls.odometry = rospy.Publisher("/odom", Odometry, queue_size=10)
         cls.transforms = tf2_ros.StaticTransformBroadcaster()
@@ -77,7 +77,7 @@ class UnreadTopics(unittest.TestCase):
         cls.transforms.sendTransform(mount)
         wait_for_publisher_links(cls.beams, 1)
         wait_for_publisher_links(cls.odometry, 1)
-        cls.time = 1000.0
+        cls.time = rospy.get_time()
 
     def send_turn(self) -> None:
         """Publish a full turn with an echo in every beam."""

@@ -3,7 +3,12 @@ from pathlib import Path
 
 from hypothesis import settings
 
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "scripts"))
+# Last, so that none of the rostests' modules hides another module.
+sys.path.append(str(ROOT / "test" / "rostest"))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
+# For a second run of all tests with other versions, see scripts/oldest.
+settings.register_profile("few", settings.get_profile("repeatable"), max_examples=20)
 settings.load_profile("repeatable")

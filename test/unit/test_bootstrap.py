@@ -1,6 +1,7 @@
 """What scripts/bootstrap would do, on this system and on the other."""
 
 import os
+import re
 import shutil
 import subprocess
 from pathlib import Path
@@ -92,3 +93,12 @@ def test_every_key_of_the_package_is_installed():
     keys = {element.text for element in package if element.tag.endswith("depend")}
     assert keys - {row[0] for row in ROWS} == set()
     assert "rospy" in keys
+
+
+def test_every_pip_key_of_the_package_is_in_the_requirements():
+    package = ET.parse(str(ROOT / "package.xml")).getroot()
+    keys = {element.text for element in package if (element.text or "").endswith("-pip")}
+    wanted = {key.replace("python3-", "").replace("-pip", "").replace("collada", "pycollada") for key in keys}
+    required = {re.split("[<>=]", line)[0] for line in (ROOT / "scripts" / "requirements.txt").read_text().splitlines()}
+    assert wanted == {"trimesh", "pycollada"}
+    assert wanted | {"embreex"} <= required

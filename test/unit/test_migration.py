@@ -2,14 +2,13 @@
 
 import re
 import subprocess
-from io import BytesIO
 from pathlib import Path
 
 import genpy
-import genpy.dynamic
 import numpy as np
 import pytest
 import rosbag
+from old_bag import old_type, serialized
 
 from sonar_processing.ros.conversions import header, point_cloud
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
@@ -42,37 +41,42 @@ def _recorded():
     return [("/sonar/raw", line) for line in lines] + [("/sonar/scan/cleaned", cloud)]
 
 
-def _old_type(new_type):
-    """Return the class of the 2015 package, made from text: its messages differ in the name of the package only."""
-    name = new_type._type.replace("underwater_map_construction", "avora_msgs")
-    return genpy.dynamic.generate_dynamic(name, new_type._full_text)[name]
-
-
-def _bytes(message):
-    buff = BytesIO()
-    message.serialize(buff)
-    return buff.getvalue()
-
-
 @pytest.fixture(scope="module")
-def fixed(tmp_path_factory):
-    """Return what `rosbag fix` makes of a bag of old types: (topic, message, time of recording)."""
-    folder = tmp_path_factory.mktemp("bags")
-    with rosbag.Bag(str(folder / "old.bag"), "w") as bag:
+def old_bag(tmp_path_factory):
+    """Return the path of a bag of old types."""
+    path = tmp_path_factory.mktemp("bags") / "old.bag"
+    with rosbag.Bag(str(path), "w") as bag:
         for second, (topic, message) in enumerate(_recorded()):
-            old = _old_type(type(message))().deserialize(_bytes(message))
+            old = old_type(type(message))().deserialize(serialized(message))
             bag.write(topic, old, START + genpy.Duration(second))
-    command = ["rosbag", "fix", "--noplugins", str(folder / "old.bag"), str(folder / "new.bag"), str(RULES)]
-    run = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    return path
+
+
+def _documented_commands():
+    """Return the commands with `rosbag fix` that the documents tell a user to type."""
+    pages = [ROOT / "README.md", *(ROOT / "docs").glob("*.md"), *(ROOT / "migration").glob("*.md")]
+    lines = [line.strip() for page in pages for line in page.read_text().splitlines()]
+    return sorted({line for line in lines if line.startswith("rosbag fix ") and ".bmr" in line})
+
+
+@pytest.fixture(scope="module", params=_documented_commands())
+def fixed(request, old_bag):
+    """Return what a documented command makes of the bag of old types: (topic, message, time of recording)."""
+    command = ["bash", "-c", request.param]
+    run = subprocess.run(command, cwd=str(old_bag.parent), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     assert run.returncode == 0, run.stdout
-    with rosbag.Bag(str(folder / "new.bag")) as bag:
+    with rosbag.Bag(str(old_bag.parent / "new.bag")) as bag:
         return list(bag.read_messages())
+
+
+def test_the_documents_say_how_to_fix_a_bag():
+    assert _documented_commands() != []
 
 
 @pytest.mark.parametrize("new_type", [SonarScanLine, StampedIntensityCloud])
 def test_the_old_types_are_those_that_the_rules_are_for(new_type):
-    old_type = _old_type(new_type)
-    assert f"class update_{old_type._type.replace('/', '_')}_{old_type._md5sum}(" in RULES.read_text()
+    old = old_type(new_type)
+    assert f"class update_{old._type.replace('/', '_')}_{old._md5sum}(" in RULES.read_text()
 
 
 def test_every_message_comes_out_as_one_of_ours(fixed):
@@ -81,7 +85,7 @@ def test_every_message_comes_out_as_one_of_ours(fixed):
 
 
 def test_every_byte_of_the_messages_stays(fixed):
-    assert [_bytes(entry.message) for entry in fixed] == [_bytes(message) for _, message in _recorded()]
+    assert [serialized(entry.message) for entry in fixed] == [serialized(message) for _, message in _recorded()]
 
 
 def test_topics_and_times_of_recording_stay(fixed):

@@ -5,8 +5,9 @@ from pathlib import Path
 
 import pytest
 import yaml
-from document import LIVE_NODES, LiveNode, generated
+from document import LIVE_NODES, START_UP_NODES, LiveNode, generated
 
+from node_support.node_table import NODES
 from node_support.parameters import describe
 from sonar_processing.filters.stage_table import STAGES
 
@@ -17,9 +18,21 @@ def test_generated_files_are_up_to_date():
     assert [path.name for path, text in generated().items() if path.read_text() != text] == []
 
 
-@pytest.mark.parametrize("name", LIVE_NODES)
-def test_the_readme_has_the_parameters_of_every_node(name):
-    assert f"<!-- parameters: {name} -->" in (ROOT / "README.md").read_text()
+@pytest.mark.parametrize("name", [*LIVE_NODES, *START_UP_NODES])
+def test_every_node_with_parameters_is_described(name):
+    assert name in NODES
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_described_node_has_an_executable(name):
+    assert (ROOT / "nodes" / name).is_file()
+
+
+@pytest.mark.parametrize("name", NODES)
+def test_every_described_topic_stands_in_the_source(name):
+    source = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py") if path.name != "node_table.py")
+    names = [one.name.lstrip("~/") for one in NODES[name].interfaces]
+    assert [topic for topic in names if topic.rpartition("/")[2] not in source] == []
 
 
 @pytest.mark.parametrize("name", LIVE_NODES)

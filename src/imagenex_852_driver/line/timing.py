@@ -1,11 +1,11 @@
-"""How long a ping takes on the wire and in the water; driver and emulated head must agree on it."""
+"""How long a ping takes on the line and in the water; used by both driver and emulated head."""
 
 from dataclasses import dataclass
 
 from imagenex_852_driver.protocol import SwitchCommand
 from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
 
-_BITS_PER_BYTE = 10
+_BITS_PER_BYTE = 10  # 8N1: one start bit, eight data bits, one stop bit
 
 
 @dataclass(frozen=True)
@@ -24,10 +24,10 @@ class LineTiming:
         return self.transmission(COMMAND_LENGTH)
 
     def reply_begins(self, command: SwitchCommand) -> float:
-        """Return when the reply can leave the head: after the farthest echo and the switch delay."""
+        """Return when the reply can leave the head at the earliest: after the farthest echo and the switch delay."""
         travel = 2 * command.max_range / self.speed_of_sound
         return self.ping_leaves() + travel + command.switch_delay_ms / 1000
 
     def reply_ends(self, command: SwitchCommand) -> float:
-        """Return when the last byte of the reply can have come."""
+        """Return when the last byte of the reply can have arrived at the earliest."""
         return self.reply_begins(command) + self.transmission(command.reply_kind.length)

@@ -4,14 +4,16 @@ import argparse
 import math
 from typing import List
 
+from node_support import topics
+
 
 def play_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
     parser = argparse.ArgumentParser("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
     _add_rate(parser)
-    parser.add_argument("--loop", action="store_true", help="begin again at the end")
-    parser.add_argument("--wait-for-subscribers", action="store_true", help="begin when somebody subscribes")
+    parser.add_argument("--loop", action="store_true", help="start again at the end")
+    parser.add_argument("--wait-for-subscribers", action="store_true", help="start when somebody subscribes")
     _add_mount(parser)
     return parser.parse_args(arguments)
 
@@ -33,7 +35,7 @@ def convert_arguments(arguments: List[str]) -> argparse.Namespace:
     parser.add_argument(
         "--start", type=_positive, help="time of the first ping, s since 1970 (default: the log's, else the file's)"
     )
-    parser.add_argument("--topic", default="/sonar/raw")
+    parser.add_argument("--topic", default=f"/{topics.BEAMS}")
     _add_mount(parser)
     return parser.parse_args(arguments)
 

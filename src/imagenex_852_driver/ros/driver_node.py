@@ -4,7 +4,6 @@ import threading
 from typing import Optional
 
 import rospy
-from sensor_msgs.msg import JointState
 
 from imagenex_852_driver.line.device import Ping, SonarDevice
 from imagenex_852_driver.line.driver_health import DriverHealth
@@ -13,36 +12,39 @@ from imagenex_852_driver.line.port import PortError
 from imagenex_852_driver.line.scanner import Scanner
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.ros.messages import scan_line
+from node_support import topics
+from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import StartError, guarded
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_STOP = 1.0
-_PAUSE_AFTER_FAILURE = 1.0
+_LONGEST_STOP = 1.0  # s: a ping at the longest range ends within this time
+_PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 
 
 class DriverNode:
-    """Keeps the head pinging and publishes every good reply once, in order."""
+    """Keeps the head pinging, and publishes every valid reply once, in order."""
 
     def __init__(self, namespace: str = "~") -> None:
-        """Raises ParameterError for a bad parameter in `namespace` and StartError for a port to be cured first."""
+        """Raises ParameterError for a bad parameter in `namespace` and StartError for an unusable port."""
         self._device: Optional[SonarDevice] = None
         self._scanner: Optional[Scanner] = None
         self._stop = threading.Event()
         self._last_stats = DeviceStats()
-        self._sensor_angle: Optional[float] = None
         self.health = DriverHealth(lambda line: rospy.logwarn("%s", line), self._stats)
-        self._live = LiveParameters(DriverParameters, namespace, "Imagenex852", self.health, self._use_parameters)
-        self._beams = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=200, tcp_nodelay=True)
-        if self._live.current.sensor_joint:
-            rospy.Subscriber("joint_states", JointState, guarded(self.health, self._take_joints), queue_size=10)
+        self.healths = [self.health]
+        self._live = ReconfigurableParameters(
+            DriverParameters, namespace, "Imagenex852", self.health, self._use_parameters
+        )
+        self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
+        self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
         self._connect()
         self._thread = threading.Thread(target=self._scan, daemon=True)
         self._thread.start()
         rospy.on_shutdown(self._end)
 
     def _stats(self) -> DeviceStats:
-        # A port that is closed because the node ends is no loss.
+        # A port that is closed because the node ends does not count as lost.
         if self._device is not None and not self._stop.is_set():
             self._last_stats = self._device.stats
         return self._last_stats
@@ -76,20 +78,11 @@ class DriverNode:
             ping.command.start_gain_db,
             parameters.frame_id,
             parameters.inverted,
-            self._tilt(parameters.sensor_joint),
+            self._tilt.for_beam(),
         )
         if message is not None:
             self._beams.publish(message)
             self.health.count("beams out")
-
-    def _tilt(self, joint: str) -> float:
-        if joint and self._sensor_angle is None:
-            self.health.problem("beams of unknown tilt", f"joint {joint!r} is not in /joint_states; sensorAngle is 0")
-        return self._sensor_angle or 0.0
-
-    def _take_joints(self, joints: JointState) -> None:
-        angles = dict(zip(joints.name, joints.position))
-        self._sensor_angle = angles.get(self._live.current.sensor_joint, self._sensor_angle)
 
     def _end(self) -> None:
         self._stop.set()

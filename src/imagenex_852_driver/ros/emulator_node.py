@@ -1,4 +1,4 @@
-"""The ROS side of the emulated head: parameters and orders of faults in; a serial port out."""
+"""The ROS side of the emulated head: parameters and requests for faults in; a serial port out."""
 
 import os
 from contextlib import ExitStack
@@ -10,13 +10,13 @@ import rospy
 from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FixedPattern, PtyServer
 from imagenex_852_driver.emulator.parameters import EchoSourceKind, EmulatorParameters
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError, every, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
 
 PACKAGE = "underwater_map_construction"
-_MOST_ORDERED = 100000
+_MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
 
-# Builds the echoes of the simulator; handed in, because the driver knows nothing of simulators.
+# Builds the simulator's echoes; passed in, because the driver must not depend on the simulator.
 WorldEchoes = Callable[[EmulatorParameters], EchoSource]
 
 
@@ -26,8 +26,11 @@ class EmulatorNode:
     def __init__(self, world_echoes: WorldEchoes) -> None:
         """Raises ParameterError for a bad parameter, and StartError when the world or the port cannot be made."""
         self.health = make_health("imagenex_852_emulator")
+        self.healths = [self.health]
         self._faults: Optional[FaultInjector] = None
-        self._live = LiveParameters(EmulatorParameters, "~", "Imagenex852Emulator", self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(
+            EmulatorParameters, "~", "Imagenex852Emulator", self.health, self._use_parameters
+        )
         parameters = self._live.current
         source = _echo_source(parameters, world_echoes)
         head = EmulatedHead(source, self._faults, parameters.timing(), parameters.head_id)

@@ -1,4 +1,4 @@
-"""The ROS side of .852 logs: play them, record them, convert them to bags."""
+"""The ROS side of .852 logs: plays them, records them, and converts them to bags."""
 
 import os
 import time
@@ -17,29 +17,29 @@ from imagenex_852_driver.logs.playback import timed
 from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
+from node_support import topics
 from node_support.files import whole_file
-from node_support.health import Health
 from node_support.parameters import ParameterError
-from node_support.ros.node import StartError, guarded
+from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_SLEEP = 0.1
-# rospy sends from a queue, which dies with the process.
+_LONGEST_SLEEP = 0.1  # s: an end is noticed within this time
+# rospy sends from a queue, which is lost when the process ends.
 _LAST_MESSAGES_LEAVE = 0.5
 
 
 class LogPlayer:
-    """Publishes a log on sonar/raw, stamped with the present time."""
+    """Publishes a log on sonar/raw, stamped with the current time."""
 
     def __init__(self, options: Namespace) -> None:
         """Raises StartError when the log cannot be read."""
         self._options = options
         self.reader = opened(options.file)
         self.published = 0
-        self._beams = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=1000)
+        self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=1000)
 
     def run(self) -> None:
-        """Play to the end, or for ever with `loop`; ends early at shutdown."""
+        """Play to the end, or without end with `loop`; stops early at shutdown."""
         while self._options.wait_for_subscribers and not self._beams.get_num_connections():
             if rospy.is_shutdown():
                 return
@@ -87,9 +87,10 @@ def convert(options: Namespace) -> str:
 class LogRecorder:
     """Appends the beams of sonar/raw to a log, with the settings of the driver as they change."""
 
-    def __init__(self, options: Namespace, health: Health) -> None:
+    def __init__(self, options: Namespace) -> None:
         """Raises StartError when the log cannot be written."""
-        self._health = health
+        self._health = make_health("record_852")
+        self.healths = [self._health]
         self._driver = rospy.resolve_name(options.driver)
         self._settings = HeadSettings(head_id=rospy.get_param(f"{self._driver}/head_id", HeadSettings.head_id))
         self._inverted = False
@@ -99,8 +100,10 @@ class LogRecorder:
             self._writer = log_file.LogWriter(options.file)
         except OSError as error:
             raise StartError(f"{options.file}: {error.strerror}") from error
-        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(health, self._take_settings))
-        self._beams = rospy.Subscriber("sonar/raw", SonarScanLine, guarded(health, self._record), queue_size=1000)
+        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(self._health, self._take_settings))
+        self._beams = rospy.Subscriber(
+            topics.BEAMS, SonarScanLine, guarded(self._health, self._record), queue_size=1000
+        )
         rospy.on_shutdown(self._end)
 
     def _take_settings(self, config: Config) -> None:
@@ -115,7 +118,7 @@ class LogRecorder:
     def _record(self, message: SonarScanLine) -> None:
         position = head_position(message.angle, self._inverted)
         if self._last_position not in (None, position):
-            # The head may have passed the seam behind it, where positions start again.
+            # The head may have passed straight astern, where positions wrap around.
             self._clockwise = 0 < (position - self._last_position) % 2400 < 1200
         self._last_position = position
         self._writer.write(logged_ping(message, self._settings, self._inverted, self._clockwise))
@@ -127,7 +130,7 @@ class LogRecorder:
 
 
 def opened(path: str) -> log_file.LogReader:
-    """Return the reader of a log; raises StartError when there is none."""
+    """Return the reader of a log; raises StartError if it cannot be read."""
     try:
         return log_file.read(path)
     except OSError as error:
@@ -135,7 +138,7 @@ def opened(path: str) -> log_file.LogReader:
 
 
 def summary(reader: log_file.LogReader) -> str:
-    """Return in words what a log held, as far as it was read."""
+    """Return in words what the part of a log that was read contains."""
     damages = "; ".join(str(damage) for damage in reader.damages[:3])
     skipped = f", skipped {reader.damage_count} damaged parts: {damages}" if reader.damage_count else ""
     return f"{reader.ping_count} pings in the log{skipped}"

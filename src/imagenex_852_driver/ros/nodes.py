@@ -8,31 +8,21 @@ from imagenex_852_driver.logs.arguments import convert_arguments, play_arguments
 from imagenex_852_driver.ros.driver_node import DriverNode
 from imagenex_852_driver.ros.emulator_node import EmulatorNode, WorldEchoes
 from imagenex_852_driver.ros.log_tools import LogPlayer, LogRecorder, convert, summary
-from node_support.ros.node import DiagnosticsPublisher, StartError, make_health, run
+from node_support.ros.node import StartError, run
 
 
 def run_driver() -> None:
     """Run the driver."""
-
-    def construct() -> tuple:
-        node = DriverNode()
-        return node, DiagnosticsPublisher([node.health])
-
-    run("imagenex_852_driver", construct)
+    run("imagenex_852_driver", DriverNode)
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
     """Run the emulated head; `world_echoes` builds the echoes of the simulator."""
-
-    def construct() -> tuple:
-        node = EmulatorNode(world_echoes)
-        return node, DiagnosticsPublisher([node.health])
-
-    run("imagenex_852_emulator", construct)
+    run("imagenex_852_emulator", lambda: EmulatorNode(world_echoes))
 
 
 def run_player() -> None:
-    """Publish a log and end."""
+    """Publish a log, then end."""
     options = play_arguments(rospy.myargv()[1:])
     rospy.init_node("play_852", anonymous=True)
     try:
@@ -46,12 +36,7 @@ def run_player() -> None:
 def run_recorder() -> None:
     """Record a log until Ctrl-C."""
     options = record_arguments(rospy.myargv()[1:])
-
-    def construct() -> tuple:
-        health = make_health("record_852")
-        return LogRecorder(options, health), DiagnosticsPublisher([health])
-
-    run("record_852", construct)
+    run("record_852", lambda: LogRecorder(options))
 
 
 def run_converter() -> None:

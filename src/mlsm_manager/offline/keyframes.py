@@ -6,9 +6,10 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.matching.problem.result import corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.undistort import corrected_points
-from node_support.geometry.planar import composed, inverse, transformed
+from mlsm_manager.matching.problem.state import POSE
+from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 
 @dataclass(frozen=True)
@@ -38,7 +39,7 @@ def keyframes_of(updates: List[ScanUpdate]) -> List[Keyframe]:
 
 
 def _keyframe(update: ScanUpdate) -> Keyframe:
-    scan, pose = update.scan, update.belief.theta[:3]
+    scan, pose = update.scan, update.belief.theta[POSE]
     if update.result is None:
         points = transformed(composed(pose, inverse(scan.reference_pose)), scan.points)
     else:
@@ -58,7 +59,7 @@ def path_through(poses: np.ndarray, times: np.ndarray, motion: np.ndarray, track
     following = np.minimum(owner + 1, len(times) - 1)
     expected = composed(poses[owner], _relative(known[owner], known[following], motion))
     left = poses[following] - expected
-    left[:, 2] = (left[:, 2] + np.pi) % (2.0 * np.pi) - np.pi
+    left[:, 2] = wrapped(left[:, 2])
     span = np.maximum(times[following] - times[owner], 1e-9)
     share = np.clip((track.times - times[owner]) / span, 0.0, 1.0) * (following > owner)
     return guess + share[:, np.newaxis] * left

@@ -14,8 +14,9 @@ from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 from sonar_processing.filters.echo_extractor import EchoExtractor
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
-from sonar_processing.scans.revolution_collector import TurnCollector
+from sonar_processing.scans.revolution_collector import RevolutionCollector
 
+# s of odometry around the end of a scan: the slowest turn of a head, and the largest sonar_delay.
 _BEFORE = 60.0
 _AFTER = 10.0
 
@@ -73,7 +74,7 @@ def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[
 
     Its track begins a minute before its end and reaches 10 s beyond, for stamps that are to be moved.
     """
-    collector, extractor, cloud = TurnCollector(), EchoExtractor(echoes), SonarToCloudParameters()
+    collector, extractor, cloud = RevolutionCollector(), EchoExtractor(echoes), SonarToCloudParameters()
     for placed in recording.beams:
         turn = collector.add(placed)
         if turn is None:

@@ -6,12 +6,16 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 
 from mlsm_manager.matching.problem.result import MatchResult
-from mlsm_manager.matching.problem.scan_path import POSE
+from mlsm_manager.matching.problem.state import POSE
+from node_support import topics
 from node_support.ros.conversions import pose_from_matrix
 from sonar_processing.ros.conversions import header
 
+# m^2 and rad^2: what a filter such as robot_localization takes for "not measured".
 _UNKNOWN_VARIANCE = 1e6
+# x, y and yaw among the six axes of a covariance message.
 _ROS_AXES = np.array([0, 1, 5])
+# Poses: four days of scans of 16 s, 1.5 MB.
 _LONGEST_PATH = 20000
 
 
@@ -21,9 +25,9 @@ class FixPublisher:
     def __init__(self, map_frame: str, base_frame: str) -> None:
         self._map_frame = map_frame
         self._base_frame = base_frame
-        self._pose = rospy.Publisher("MLSM/pose", PoseWithCovarianceStamped, queue_size=10)
-        self._odometry = rospy.Publisher("MLSM/odometry", Odometry, queue_size=10)
-        self._path = rospy.Publisher("MLSM/path", Path, queue_size=2, latch=True)
+        self._pose = rospy.Publisher(topics.MATCHED_POSE, PoseWithCovarianceStamped, queue_size=10)
+        self._odometry = rospy.Publisher(topics.MATCHED_ODOMETRY, Odometry, queue_size=10)
+        self._path = rospy.Publisher(topics.MATCHED_PATH, Path, queue_size=2, latch=True)
         self._way = Path()
 
     def clear(self) -> None:

@@ -1,36 +1,38 @@
 """The vehicle's way by odometry, from tf."""
 
-import threading
-import time as wall
 from typing import Optional, Tuple
 
 import numpy as np
-import rospy
-import tf2_ros
 
 from mlsm_manager.matching.problem.scan import Track
 from node_support.errors import RefusedInput
-from node_support.ros.conversions import matrix_from_message
+from node_support.headers import DAY
+from node_support.health import Health
+from node_support.ros.tf_buffer import TfBuffer, stamp_of
 
+# s that tf remembers: three slow turns of the head.
 _CACHE = 180.0
+# s to wait for odometry that is on its way; then the scan is given up.
 _PATIENCE = 1.0
-_POLL = 0.01
+# Times of a track besides those of the beams: four a second in a turn of 16 s.
 _STEADY = 65
-_ROUNDING = 1e-6
 
 
 class OdometryTrack:
     """Looks up odom -> base_link at many times."""
 
-    def __init__(self, odom_frame: str, base_frame: str) -> None:
+    def __init__(self, odom_frame: str, base_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
+        """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frames = odom_frame, base_frame
-        self._buffer = tf2_ros.Buffer(rospy.Duration(_CACHE), debug=False)
-        self._listener = tf2_ros.TransformListener(self._buffer, queue_size=1000)
-        self._pause = threading.Event()
+        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance)
+
+    def check_stamp(self, stamp_ns: int) -> None:
+        """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
+        self._transforms.check_stamp(stamp_ns)
 
     def clear(self) -> None:
         """Forget the past, because time jumped."""
-        self._buffer.clear()
+        self._transforms.clear()
 
     def track(self, start: float, times: np.ndarray, end: float) -> Track:
         """Return the track from `start` to `end` [s], exact at `times` (n,).
@@ -38,48 +40,39 @@ class OdometryTrack:
         What tf no longer knows of the past is left out. Raises RefusedInput when tf does not learn the vehicle's place
         at `end` within a second.
         """
-        self._wait_for(end)
+        obstacle = self._transforms.wait_for(*self._frames, stamp_of(end), _PATIENCE)
+        if obstacle:
+            raise self._without_odometry(obstacle)
         wanted = np.unique(np.concatenate([np.linspace(start, end, _STEADY), times[(times >= start) & (times <= end)]]))
         found = [(time, self._pose(time)) for time in wanted]
         known = [(time, pose) for time, pose in found if pose is not None]
         if not known:
-            raise RefusedInput("scans without odometry", self._obstacle(end))
+            raise self._without_odometry(f"nothing from {start:.3f} to {end:.3f} s")
         return Track(np.array([time for time, _ in known]), np.array([pose for _, pose in known]))
 
     def matrix(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_odom_base at `time` [s], which a track has been made of."""
-        return matrix_from_message(self._buffer.lookup_transform_core(*self._frames, _stamp(time)).transform)
+        return self._transforms.matrix(*self._frames, stamp_of(time))
 
-    def newest(self) -> Optional[Tuple[float, np.ndarray]]:
-        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none."""
-        try:
-            stamped = self._buffer.lookup_transform_core(*self._frames, rospy.Time(0))
-        except tf2_ros.TransformException:
+    def newest(self) -> Optional[Tuple[Optional[float], np.ndarray]]:
+        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none.
+
+        Static transforms hold at all times and have none of their own: the time is then None.
+        """
+        found = self._transforms.newest(*self._frames)
+        if found is None:
             return None
-        return stamped.header.stamp.to_sec(), _planar(matrix_from_message(stamped.transform))
-
-    def _wait_for(self, end: float) -> None:
-        deadline = wall.monotonic() + _PATIENCE
-        while self._obstacle(end):
-            if wall.monotonic() > deadline or rospy.is_shutdown():
-                raise RefusedInput("scans without odometry", self._obstacle(end))
-            self._pause.wait(_POLL)
+        stamp_ns, matrix = found
+        return (stamp_ns * 1e-9 if stamp_ns else None), _planar(matrix)
 
     def _pose(self, time: float) -> Optional[np.ndarray]:
         try:
             return _planar(self.matrix(time))
-        except tf2_ros.TransformException:
+        except RefusedInput:
             return None
 
-    def _obstacle(self, time: float) -> str:
-        can, reason = self._buffer.can_transform_core(*self._frames, _stamp(time))
-        frames = f"from {self._frames[1]} to {self._frames[0]}"
-        return "" if can else f"{frames}: {reason or 'unknown to tf'}"
-
-
-def _stamp(time: float) -> rospy.Time:
-    # Seconds in a float are rounded; a moment earlier, so that tf's newest pose can be asked for at its own time.
-    return rospy.Time.from_sec(max(time - _ROUNDING, 0.0))
+    def _without_odometry(self, reason: str) -> RefusedInput:
+        return RefusedInput("scans without odometry", f"from {self._frames[1]} to {self._frames[0]}: {reason}")
 
 
 def _planar(matrix: np.ndarray) -> np.ndarray:

@@ -1,15 +1,28 @@
 """Planar poses as arrays: x y [m] and yaw [rad] in the last axis; T_a_b takes coordinates in b to coordinates in a."""
 
+from typing import TypeVar
+
 import numpy as np
 
+FULL_TURN = 2.0 * np.pi
+Angle = TypeVar("Angle", float, np.ndarray)
 
-def wrapped(angle: np.ndarray) -> np.ndarray:
-    """Return angles in [-pi, pi)."""
-    return (np.asarray(angle) + np.pi) % (2.0 * np.pi) - np.pi
+
+def wrapped(angle: Angle) -> Angle:
+    """Return an angle, or an array of angles, in [-pi, pi)."""
+    return (angle + np.pi) % FULL_TURN - np.pi
+
+
+def unwrapped(angle: float, near: float) -> float:
+    """Return the angle, plus or minus whole turns, that is nearest to `near`."""
+    return near + wrapped(angle - near)
 
 
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
+    # On a column of a table numpy picks between two sines by where in memory the result lies; they differ in the last
+    # bit, so that equal runs would end differently. Contiguous values always take the same one.
+    yaw = np.asarray(yaw, order="C")
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = vectors[..., 0], vectors[..., 1]
     first = cos * x - sin * y

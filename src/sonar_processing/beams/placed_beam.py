@@ -6,7 +6,7 @@ import numpy as np
 
 from sonar_processing.beams.beam import Beam
 
-SERVO_DEAD_BAND = 1e-3
+SERVO_DEAD_BAND = 1e-3  # rad: a servo that holds its place trembles by less, and none steps by as little
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Places the bins of a beam in space (thesis 6.5.2)."""
 
-import math
-
 import numpy as np
 
 from sonar_processing.beams.beam import Beam
@@ -14,19 +12,39 @@ def project_beam(beam: Beam, T_target_sonar: np.ndarray, dispersed_points: int, 
     lies on the beam's axis. Points come ordered by side, then by range. T_target_sonar is (4, 4).
     """
     headings = beam.angle + _offsets(dispersed_points, beam_width)
-    directions = np.column_stack([np.cos(headings), np.sin(headings)]) @ T_target_sonar[:3, :2].T
-    points = np.empty((dispersed_points, beam.intensities.size, 4), dtype=np.float32)
-    points[..., :3] = directions[:, np.newaxis, :] * beam.ranges[:, np.newaxis] + T_target_sonar[:3, 3]
-    points[..., 3] = beam.intensities
-    return points.reshape(-1, 4)
+    origins = np.broadcast_to(T_target_sonar[:3, 3], (dispersed_points, 3))
+    return bin_points(origins, beam_directions(headings, T_target_sonar), beam.ranges, beam.intensities).reshape(-1, 4)
+
+
+def beam_directions(headings: np.ndarray, T_target_sonar: np.ndarray) -> np.ndarray:
+    """Return (n, 3) unit vectors in the target frame along `headings` (n,) of the head [rad].
+
+    T_target_sonar is (4, 4), or (n, 4, 4) with one pose for each heading.
+    """
+    heads = np.column_stack([np.cos(headings), np.sin(headings)])
+    return np.einsum("...ij,...j->...i", T_target_sonar[..., :3, :2], heads)
+
+
+def bin_points(origins: np.ndarray, directions: np.ndarray, ranges: np.ndarray, strengths: np.ndarray) -> np.ndarray:
+    """Return (n, bins, 4) float32: x y z [m] of all bins of n beams, and their echo strengths.
+
+    origins: (n, 3) m; directions: (n, 3) unit vectors; ranges: (bins,) m; strengths: (bins,) or (n, bins).
+    """
+    points = np.empty((len(origins), ranges.size, 4), dtype=np.float32)
+    points[..., :3] = directions[:, np.newaxis] * ranges[:, np.newaxis] + origins[:, np.newaxis]
+    points[..., 3] = strengths
+    return points
+
+
+def kept_bins(ranges: np.ndarray, heights: np.ndarray, min_range: float, height_limit: float) -> np.ndarray:
+    """Return bool of the shape of `heights` [m]: the bins that are neither too near nor too high.
+
+    ranges [m] must broadcast to `heights`, which are in the target frame.
+    """
+    return (ranges >= min_range) & (heights <= height_limit)
 
 
 def _offsets(count: int, beam_width: float) -> np.ndarray:
     if count == 1:
         return np.zeros(1)
     return np.linspace(-beam_width / 2.0, beam_width / 2.0, count)
-
-
-def wrapped(angle: float) -> float:
-    """Return the angle in [-pi, pi)."""
-    return (angle + math.pi) % (2.0 * math.pi) - math.pi

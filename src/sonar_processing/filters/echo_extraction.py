@@ -18,10 +18,10 @@ from node_support.parameters import ParameterSet, parameter
 from sonar_processing.filters.echo_peaks import find_peaks, leading_edges, points_along_runs
 from sonar_processing.filters.otsu import HIGHEST_LEVEL, otsu_threshold
 
-FEWEST_BEAMS = 10
-_SMALLEST_SIGMA_BINS = 0.5
-_SPREAD = 0.1
-_SPREAD_SIGMAS = 4.0
+FEWEST_BEAMS = 10  # Fewer directions tell no quantile over them
+_SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it is sampled
+_SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do not count as spread
+_SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included
 
 
 class ExtractionMode(Enum):

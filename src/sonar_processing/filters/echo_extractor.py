@@ -8,7 +8,7 @@ from node_support.errors import RefusedInput
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
 
-_ROWS_MEASURED = 8
+_ROWS_MEASURED = 8  # Rows of a cloud that tell the length of a bin; it is the same in all of them
 
 
 class EchoExtractor:

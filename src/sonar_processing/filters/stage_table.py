@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, Mapping, Optional, Type
 
+from node_support import topics
 from node_support.parameters import ParameterSet
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
@@ -11,8 +12,6 @@ from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverPara
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
 
 Stage = Callable[[IntensityCloud], IntensityCloud]
-SCAN_TOPIC = "sonar/scan/sonarCloud"
-POLAR_TOPIC = "sonar/scan/polar"
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class StageType:
     @property
     def takes_polar_scans(self) -> bool:
         """Whether the stage works on whole polar scans, beside the chain of clouds."""
-        return self.input_topic == POLAR_TOPIC
+        return self.input_topic == topics.POLAR_SCANS
 
 
 STAGES: Dict[str, StageType] = {
@@ -43,8 +42,8 @@ STAGES: Dict[str, StageType] = {
         ThresholderParameters,
         Thresholder,
         "Thresholder",
-        SCAN_TOPIC,
-        "sonar/scan/thresholded",
+        topics.SCANS,
+        topics.THRESHOLDED,
         "lower what makes its mode's threshold (otsu_multiplier in OTSU+PROPORTIONAL), or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),
@@ -52,16 +51,16 @@ STAGES: Dict[str, StageType] = {
         OutlierRemoverParameters,
         OutlierRemover,
         "OutlierRemover",
-        "sonar/scan/thresholded",
-        "sonar/scan/cleaned",
+        topics.THRESHOLDED,
+        topics.CLEANED,
         "lower min_neighbors in RADIUS, raise stddev_multiplier in STATISTICAL, or set mode to NONE",
     ),
     "echo_extractor": StageType(
         EchoExtractorParameters,
         EchoExtractor,
         "EchoExtractor",
-        POLAR_TOPIC,
-        "sonar/scan/echoes",
+        topics.POLAR_SCANS,
+        topics.ECHOES,
         "lower min_contrast or min_height, or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),

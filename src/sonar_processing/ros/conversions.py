@@ -11,9 +11,10 @@ from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
+from node_support.headers import check_frame, check_point_stamps, check_stamp
 from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.scans.laser_scan import LaserTurn
+from sonar_processing.scans.laser_scan import PlanarLaserScan
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 StampedIntensityCloudArrays = numpy_msg(StampedIntensityCloud)
@@ -23,7 +24,7 @@ LaserScanArrays = numpy_msg(LaserScan)
 """LaserScan whose ranges and intensities are numpy arrays."""
 
 POINT_FIELDS = ("x", "y", "z", "intensity")
-_FLOAT_BYTES = 4
+_FLOAT_BYTES = 4  # Of a FLOAT32 in a PointCloud2
 
 
 def header(stamp_ns: int, frame_id: str) -> Header:
@@ -31,10 +32,17 @@ def header(stamp_ns: int, frame_id: str) -> Header:
     return Header(stamp=genpy.Time(*divmod(int(stamp_ns), 10**9)), frame_id=frame_id)
 
 
+def check_header(head: Header, kind: str) -> None:
+    """Raise RefusedInput, a bad frame counted as `kind`, for a header whose stamp or frame nobody can use."""
+    check_frame(head.frame_id, kind)
+    check_stamp(head.stamp.to_nsec())
+
+
 def beam_from_message(message: SonarScanLine) -> Beam:
     """Return the beam of a SonarScanLine; raises RefusedInput for one that cannot be used."""
     if not message.maxrange_meters > 0.0:
         raise RefusedInput("beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m")
+    check_header(message.header, "beams refused")
     return Beam(
         stamp_ns=message.header.stamp.to_nsec(),
         frame_id=message.header.frame_id,
@@ -50,9 +58,12 @@ def cloud_from_message(message: StampedIntensityCloud) -> IntensityCloud:
 
     A cloud of one row that says it may hold points that are not finite is organised: a single beam.
     """
+    check_header(message.header, "clouds refused")
+    time_stamps = np.asarray(message.timeStamps, dtype=np.float64)
+    check_point_stamps(time_stamps, message.header.stamp.to_nsec())
     return IntensityCloud(
         points=points_from_message(message.cloud),
-        time_stamps=np.asarray(message.timeStamps, dtype=np.float64),
+        time_stamps=time_stamps,
         stamp_ns=message.header.stamp.to_nsec(),
         frame_id=message.header.frame_id,
         height=max(message.cloud.height, 1),
@@ -122,20 +133,20 @@ def points_to_message(cloud: IntensityCloud) -> PointCloud2:
     return message
 
 
-def laser_scan_message(turn: LaserTurn, stamp_ns: int, frame_id: str) -> LaserScan:
-    """Return a turn as LaserScan: all rays hold at `stamp_ns`, so there is no time between them."""
-    increment = turn.angle_increment
+def laser_scan_message(scan: PlanarLaserScan, stamp_ns: int, frame_id: str) -> LaserScan:
+    """Return a planar laser scan as LaserScan: all rays hold at `stamp_ns`, so there is no time between them."""
+    increment = scan.angle_increment
     return LaserScanArrays(
         header=header(stamp_ns, frame_id),
         angle_min=-math.pi,
-        angle_max=-math.pi + (turn.ranges.size - 1) * increment,
+        angle_max=-math.pi + (scan.ranges.size - 1) * increment,
         angle_increment=increment,
         time_increment=0.0,
-        scan_time=turn.duration,
-        range_min=turn.range_min,
-        range_max=turn.range_max,
-        ranges=turn.ranges,
-        intensities=turn.intensities,
+        scan_time=scan.duration,
+        range_min=scan.range_min,
+        range_max=scan.range_max,
+        ranges=scan.ranges,
+        intensities=scan.intensities,
     )
 
 

@@ -7,21 +7,21 @@ import numpy as np
 import rospy
 from visualization_msgs.msg import MarkerArray
 
+from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.ros.node import guarded, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.ros.cloud_publisher import PointsPublisher
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.ros.publishers import PointsPublisher
 from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
 from sonar_processing.ros.sonar_places import SonarPlaces
-from sonar_processing.ros.stage_runner import subscribe_to_clouds
+from sonar_processing.ros.subscribers import subscribe_to_clouds
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import RansacParameters
 from underwater_map_construction.msg import Circles, Walls
 
-INPUT_TOPIC = "sonar/scan/cleaned"
 QUEUE_SIZE = 10
 
 
@@ -38,12 +38,13 @@ class ShapeDetectorNode(ABC):
     def __init__(self) -> None:
         """Raises ParameterError for a bad parameter."""
         self.health = make_health(self.name)
-        self._live = LiveParameters(self.parameters, "~", self.config_name, self.health, self._use_parameters)
-        self._places = SonarPlaces(self._live.current.sonar_frame)
+        self.healths = [self.health]
+        self._live = ReconfigurableParameters(self.parameters, "~", self.config_name, self.health, self._use_parameters)
+        self._places = SonarPlaces(self._live.current.sonar_frame, self.health, self._live.current.stamp_tolerance)
         self._inliers = PointsPublisher(self.topic)
         self._coefficients = rospy.Publisher(f"{self.topic}/coefficients", self.message, queue_size=QUEUE_SIZE)
         self._markers = rospy.Publisher(f"{self.topic}/markers", MarkerArray, queue_size=QUEUE_SIZE)
-        subscribe_to_clouds(INPUT_TOPIC, guarded(self.health, self._take))
+        subscribe_to_clouds(topics.CLEANED, guarded(self.health, self._take))
 
     @abstractmethod
     def _use_parameters(self, parameters: RansacParameters) -> None:
@@ -61,7 +62,7 @@ class ShapeDetectorNode(ABC):
             self.health.problem(
                 "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
             )
-        self._places.use_time(cloud.stamp_ns * 1e-9)
+        self._places.check_stamp(cloud.stamp_ns)
         with self.health.timed():
             shapes, coefficients, markers = self._detect(cloud)
         self.health.count(f"{self.what} out", len(shapes))
@@ -73,7 +74,7 @@ class ShapeDetectorNode(ABC):
 class LineDetectorNode(ShapeDetectorNode):
     """line_detector."""
 
-    name, topic, what, config_name = "line_detector", "sonar/scan/line", "walls", "LineDetector"
+    name, topic, what, config_name = "line_detector", topics.LINES, "walls", "LineDetector"
     parameters, message = LineDetectorParameters, Walls
 
     def _use_parameters(self, parameters: LineDetectorParameters) -> None:
@@ -95,7 +96,7 @@ class LineDetectorNode(ShapeDetectorNode):
 class CircleDetectorNode(ShapeDetectorNode):
     """circle_detector."""
 
-    name, topic, what, config_name = "circle_detector", "sonar/scan/circle", "circles", "CircleDetector"
+    name, topic, what, config_name = "circle_detector", topics.CIRCLES, "circles", "CircleDetector"
     parameters, message = CircleDetectorParameters, Circles
 
     def _use_parameters(self, parameters: CircleDetectorParameters) -> None:

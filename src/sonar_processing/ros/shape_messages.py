@@ -16,9 +16,9 @@ from underwater_map_construction import msg
 
 WALL_COLOR = ColorRGBA(r=1.0, g=0.25, b=0.75, a=1.0)
 CIRCLE_COLOR = ColorRGBA(r=0.2, g=1.0, b=0.45, a=0.8)
-_LINE_WIDTH = 0.25
-_TEXT_HEIGHT = 2.5
-_LEAST_HEIGHT = 0.5
+_LINE_WIDTH = 0.25  # m: seen in rviz beside the cells of a map
+_TEXT_HEIGHT = 2.5  # m: legible where a scan fills the window
+_LEAST_HEIGHT = 0.5  # m: a circle is drawn as a flat disc, since its height is unknown
 
 
 def walls_message(cloud: IntensityCloud, lines: Sequence[Line], sonar: np.ndarray) -> msg.Walls:

@@ -5,17 +5,18 @@ import threading
 from typing import Optional
 
 import rospy
-from sensor_msgs.msg import JointState
 from std_msgs.msg import Float64, UInt32
 
+from node_support import topics
 from node_support.parameters import ParameterError
+from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import every, guarded, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
 from underwater_map_construction.msg import SonarScanLine
 from underwater_map_construction.srv import SetScanMode, SetScanModeRequest, SetScanModeResponse
 
-TICK_PERIOD = 0.1
+TICK_PERIOD = 0.1  # s: short against every timeout of sonar_control
 
 
 class SonarControl:
@@ -24,14 +25,17 @@ class SonarControl:
     def __init__(self) -> None:
         """Raises ParameterError for a bad parameter."""
         self.health = make_health("sonar_control")
+        self.healths = [self.health]
         self._lock = threading.RLock()
         self._scan: Optional[TiltScan] = None
-        self._commands = rospy.Publisher("sonar_servo/command", Float64, queue_size=1, latch=True)
+        self._commands = rospy.Publisher(topics.SERVO_COMMANDS, Float64, queue_size=1, latch=True)
         self._sweeps = rospy.Publisher("~sweeps", UInt32, queue_size=1, latch=True)
-        self._live = LiveParameters(SonarControlParameters, "~", "SonarControl", self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(
+            SonarControlParameters, "~", "SonarControl", self.health, self._use_parameters
+        )
         rospy.Service("~set_mode", SetScanMode, self._set_mode)
-        rospy.Subscriber("joint_states", JointState, guarded(self.health, self._take_joints), queue_size=10)
-        rospy.Subscriber("sonar/raw", SonarScanLine, guarded(self.health, self._take_beam), queue_size=100)
+        self._joint = JointAngle(self._live.current.joint, self.health, self._take_angle)
+        rospy.Subscriber(topics.BEAMS, SonarScanLine, guarded(self.health, self._take_beam), queue_size=100)
         every(TICK_PERIOD, self._tick, self.health)
 
     def _use_parameters(self, parameters: SonarControlParameters) -> None:
@@ -45,11 +49,9 @@ class SonarControl:
         self._commands.publish(Float64(data=angle))
         self.health.count("commands")
 
-    def _take_joints(self, joints: JointState) -> None:
-        angle = dict(zip(joints.name, joints.position)).get(self._live.current.joint)
-        if angle is not None:
-            with self._lock:
-                self._scan.take_joint(rospy.get_time(), angle)
+    def _take_angle(self, angle: float) -> None:
+        with self._lock:
+            self._scan.take_joint(rospy.get_time(), angle)
 
     def _take_beam(self, beam: SonarScanLine) -> None:
         with self._lock:

@@ -8,17 +8,16 @@ import numpy as np
 import rospy
 from sensor_msgs.msg import CameraInfo, Image
 
+from node_support import topics
 from node_support.ros.node import guarded, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.beams.beam import Beam
-from sonar_processing.ros.beam_subscriber import subscribe_to_beams
 from sonar_processing.ros.conversions import beam_from_message, header
+from sonar_processing.ros.subscribers import subscribe_to_beams
 from sonar_processing.scans.image import PolarImage, SonarImageParameters
 from underwater_map_construction.msg import SonarScanLine
 
-IMAGE_TOPIC = "sonar/image"
-CAMERA_INFO_TOPIC = "sonar/camera_info"
-QUEUE_SIZE = 2
+QUEUE_SIZE = 2  # Who is slow sees fewer images and not old ones
 
 
 class SonarImage(rospy.SubscribeListener):
@@ -28,12 +27,15 @@ class SonarImage(rospy.SubscribeListener):
         """Raises ParameterError for a bad parameter in `namespace`."""
         super().__init__()
         self.health = make_health("sonar_image")
+        self.healths = [self.health]
         self._lock = threading.Lock()
         self._beams: Optional[rospy.Subscriber] = None
         self._next_image = 0.0
-        self._live = LiveParameters(SonarImageParameters, namespace, "SonarImage", self.health, self._use_parameters)
-        self._infos = rospy.Publisher(CAMERA_INFO_TOPIC, CameraInfo, queue_size=QUEUE_SIZE)
-        self._images = rospy.Publisher(IMAGE_TOPIC, Image, queue_size=QUEUE_SIZE, subscriber_listener=self)
+        self._live = ReconfigurableParameters(
+            SonarImageParameters, namespace, "SonarImage", self.health, self._use_parameters
+        )
+        self._infos = rospy.Publisher(topics.CAMERA_INFO, CameraInfo, queue_size=QUEUE_SIZE)
+        self._images = rospy.Publisher(topics.IMAGE, Image, queue_size=QUEUE_SIZE, subscriber_listener=self)
 
     def _use_parameters(self, parameters: SonarImageParameters) -> None:
         self._picture = PolarImage(parameters)

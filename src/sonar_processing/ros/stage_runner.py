@@ -3,20 +3,17 @@
 from typing import Optional
 
 import numpy as np
-import rospy
 
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet
 from node_support.ros.node import guarded, make_health
-from node_support.ros.reconfigurable_parameters import LiveParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.emptied_scans import EmptiedScans
 from sonar_processing.filters.stage_table import STAGES
-from sonar_processing.ros.cloud_publisher import CloudPublisher
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
-from sonar_processing.ros.figure_publisher import FigurePublisher
-
-CLOUD_BUFFER_BYTES = 2**24
+from sonar_processing.ros.publishers import CloudPublisher, FigurePublisher
+from sonar_processing.ros.subscribers import subscribe_to_clouds
 
 
 class StageRunner:
@@ -25,9 +22,10 @@ class StageRunner:
     def __init__(self, name: str, namespace: str) -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health(name)
+        self.healths = [self.health]
         self._type = STAGES[name]
         self._emptied = EmptiedScans()
-        self._live = LiveParameters(
+        self._live = ReconfigurableParameters(
             self._type.parameters, namespace, self._type.config_name, self.health, self._use_parameters
         )
         self._publisher = CloudPublisher(self._type.output_topic)
@@ -45,6 +43,13 @@ class StageRunner:
     def is_read(self) -> bool:
         """Whether anybody listens to any of the stage's topics."""
         return self._publisher.is_read or any(figure.is_read for figure in self._figures)
+
+    @classmethod
+    def as_node(cls, name: str) -> "StageRunner":
+        """Return the stage `name` as a node of its own, which takes clouds from its input topic."""
+        runner = cls(name, "~")
+        runner.subscribe()
+        return runner
 
     def subscribe(self) -> None:
         """Take clouds from the stage's input topic."""
@@ -84,15 +89,3 @@ class StageRunner:
             self.health.problem(
                 "rows of scans left without a point", f"{emptied} scans in a row; {self._type.when_empty}"
             )
-
-
-def subscribe_to_clouds(topic: str, callback: object) -> rospy.Subscriber:
-    """Subscribe to StampedIntensityCloud, with a buffer that holds whole clouds."""
-    return rospy.Subscriber(
-        topic,
-        StampedIntensityCloudArrays,
-        callback,
-        queue_size=10,
-        buff_size=CLOUD_BUFFER_BYTES,
-        tcp_nodelay=True,
-    )

@@ -4,21 +4,19 @@ import threading
 from collections import deque
 from typing import Callable, Deque, List, NamedTuple, Optional
 
-import genpy
 import message_filters
 import rospy
-import tf2_ros
 
 from node_support.errors import RefusedInput
+from node_support.headers import DAY
 from node_support.health import Health
-from node_support.ros.conversions import matrix_from_message
 from node_support.ros.node import guarded
+from node_support.ros.tf_buffer import JUMP_BACK, TfBuffer
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 
-QUEUE_SIZE = 120
-JUMP_BACK = 1.0
-_WAIT = 0.5
+QUEUE_SIZE = 120  # One revolution of the usual head: tf may be late by a scan, not by more
+_WAIT = 0.5  # s: beams and transforms wake the thread; this is for shutdown alone
 
 
 class _WaitingBeam(NamedTuple):
@@ -26,29 +24,18 @@ class _WaitingBeam(NamedTuple):
     is_moving: bool
 
 
-class _NotifyingListener(tf2_ros.TransformListener):
-    def __init__(self, buffer: tf2_ros.Buffer, notify: Callable[[], None]) -> None:
-        self._notify = notify
-        super().__init__(buffer, queue_size=1000)
-
-    def callback(self, data: object) -> None:
-        super().callback(data)
-        self._notify()
-
-    def static_callback(self, data: object) -> None:
-        super().static_callback(data)
-        self._notify()
-
-
 class TransformFilter(message_filters.SimpleFilter):
     """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
     At most `QUEUE_SIZE` beams wait. A beam is dropped and counted when the queue is full, when it is older than one
     that was delivered, or when tf can place a later beam of its frame but not this one. A stamp more than
-    `JUMP_BACK` seconds older than its predecessor means that time jumped: beams and transforms are forgotten.
+    `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are forgotten.
     """
 
-    def __init__(self, target_frame: str, health: Health, on_time_jump: Callable[[], None]) -> None:
+    def __init__(
+        self, target_frame: str, health: Health, on_time_jump: Callable[[], None], stamp_tolerance: float = DAY
+    ) -> None:
+        """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         super().__init__()
         self._target_frame = target_frame
         self._health = health
@@ -57,13 +44,16 @@ class TransformFilter(message_filters.SimpleFilter):
         self._queue: Deque[_WaitingBeam] = deque()
         self._newest_ns: Optional[int] = None
         self._jumped = False
-        self._buffer = tf2_ros.Buffer(debug=False)
-        self._listener = _NotifyingListener(self._buffer, self._notify)
+        self._transforms = TfBuffer(health, tolerance=stamp_tolerance, on_news=self._notify)
         self._take = guarded(health, self._deliver_ready)
         threading.Thread(target=self._work, daemon=True).start()
 
     def add(self, beam: Beam, is_moving: bool = False) -> None:
-        """Queue a beam and whether the vehicle moved when it came; returns at once."""
+        """Queue a beam and whether the vehicle moved when it came; returns at once.
+
+        Raises RefusedInput for a stamp that is not near odometry or clock, and for a beam out of order.
+        """
+        self._transforms.check_stamp(beam.stamp_ns)
         with self._condition:
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
@@ -95,8 +85,6 @@ class TransformFilter(message_filters.SimpleFilter):
     def _deliver_ready(self) -> None:
         with self._condition:
             jumped, self._jumped = self._jumped, False
-            if jumped:
-                self._buffer.clear()
             ready = self._pop_ready()
         if jumped:
             self._on_time_jump()
@@ -127,14 +115,9 @@ class TransformFilter(message_filters.SimpleFilter):
 
     def _obstacle(self, beam: Beam) -> str:
         """Why tf cannot place a beam; empty when it can."""
-        can, reason = self._buffer.can_transform_core(self._target_frame, beam.frame_id, _time(beam))
-        return "" if can else reason or "unknown to tf"
+        return self._transforms.obstacle(self._target_frame, beam.frame_id, beam.stamp_ns)
 
     def _placed(self, entry: _WaitingBeam) -> PlacedBeam:
         beam = entry.beam
-        stamped = self._buffer.lookup_transform_core(self._target_frame, beam.frame_id, _time(beam))
-        return PlacedBeam(beam, matrix_from_message(stamped.transform), entry.is_moving)
-
-
-def _time(beam: Beam) -> rospy.Time:
-    return rospy.Time(*divmod(beam.stamp_ns, 10**9)) if beam.stamp_ns else genpy.Time(0, 1)
+        T_target_sonar = self._transforms.matrix(self._target_frame, beam.frame_id, beam.stamp_ns)
+        return PlacedBeam(beam, T_target_sonar, entry.is_moving)

@@ -8,7 +8,7 @@ import numpy as np
 
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam, servo_moved
-from sonar_processing.beams.projection import project_beam
+from sonar_processing.beams.projection import kept_bins, project_beam
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.scans.head_turn import HeadTurn
 from sonar_processing.scans.laser_pick import picked_bins
@@ -81,8 +81,7 @@ class ScanAssembler:
         parameters, beam = self.parameters, placed.beam
         sides = 1 if parameters.mode.is_laser else parameters.dispersed_points
         points = project_beam(beam, placed.T_target_sonar, sides, parameters.beam_width)
-        keep = np.tile(beam.ranges >= parameters.min_range, sides)
-        keep &= points[:, 2] <= parameters.height_limit
+        keep = kept_bins(np.tile(beam.ranges, sides), points[:, 2], parameters.min_range, parameters.height_limit)
         if parameters.mode.is_laser:
             points, keep = _picked(points, keep, parameters)
         return _ProjectedBeam(points, keep, placed.signed_stamp)

@@ -1,12 +1,11 @@
-"""How far the head has turned since the first beam of a scan."""
+"""How far the head has turned since the first beam of a scan, and when it has been everywhere."""
 
 import bisect
-import math
 from typing import List, Optional
 
-from sonar_processing.beams.projection import wrapped
+from node_support.geometry.planar import FULL_TURN, wrapped
 
-FULL_TURN = 2.0 * math.pi
+_BOTH_ENDS = 2  # a head that reversed twice has swept its sector from end to end
 
 
 class HeadTurn:
@@ -50,3 +49,25 @@ class HeadTurn:
 
     def _step_to(self, angle: float) -> float:
         return 0.0 if self._last is None else wrapped(angle - self._last)
+
+
+class SweepCounter:
+    """Counts beams until the head has turned full circle, or has reversed at both ends of a sector."""
+
+    def __init__(self, scan_beams: int = 0) -> None:
+        """`scan_beams`: beams that make a scan whatever the head does; 0: the head's angle tells."""
+        self.beams = 0
+        self._scan_beams = scan_beams
+        self._turn = HeadTurn()
+        self._reversals = 0
+
+    def add(self, angle: float) -> bool:
+        """Add a beam at a head angle [rad]; return whether it completes the scan."""
+        self.beams += 1
+        if self._turn.would_reverse(angle):
+            self._reversals += 1
+            self._turn.clear()
+        self._turn.add(angle)
+        if self._scan_beams:
+            return self.beams >= self._scan_beams
+        return self._turn.is_full or self._reversals >= _BOTH_ENDS

@@ -6,16 +6,16 @@ from typing import Tuple
 
 import numpy as np
 
-from sonar_processing.scans.head_turn import FULL_TURN
+from node_support.geometry.planar import FULL_TURN, wrapped
 from sonar_processing.scans.laser_pick import picked_bins
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
-MOST_RAYS = 7200
+MOST_RAYS = 7200  # As many as `laser_scan_rays` allows; smaller steps are rounding of a head that stands still
 
 
 @dataclass(frozen=True)
-class LaserTurn:
+class PlanarLaserScan:
     """Ranges all around the sonar as they are at one moment, that of the newest beam.
 
     ranges: (rays,) float32 m, inf where nothing was measured; ray i points to -pi + i * angle_increment about +z of
@@ -34,7 +34,7 @@ class LaserTurn:
         return FULL_TURN / self.ranges.size
 
 
-def laser_turn(scan: PolarScan, parameters: SonarToCloudParameters) -> LaserTurn:
+def planar_laser_scan(scan: PolarScan, parameters: SonarToCloudParameters) -> PlanarLaserScan:
     """Return the scan as rays around the sonar's pose at its newest beam.
 
     A turn takes seconds and the vehicle moves meanwhile. Each beam's echo is therefore placed by the beam's own pose,
@@ -51,12 +51,12 @@ def laser_turn(scan: PolarScan, parameters: SonarToCloudParameters) -> LaserTurn
     result = np.full(rays, np.inf, dtype=np.float32), np.zeros(rays, dtype=np.float32)
     result[0][ray], result[1][ray] = ranges[farthest_first], strengths[farthest_first]
     seconds = np.abs(scan.time_stamps)
-    return LaserTurn(*result, parameters.min_range, range_max, float(seconds[-1] - seconds[0]))
+    return PlanarLaserScan(*result, parameters.min_range, range_max, float(seconds[-1] - seconds[0]))
 
 
 def usual_rays(angles: np.ndarray) -> int:
     """Return how many steps of the head's usual size make a turn; 1 when the head stands still."""
-    steps = np.abs((np.diff(angles) + math.pi) % FULL_TURN - math.pi)
+    steps = np.abs(wrapped(np.diff(angles)))
     steps = steps[steps > FULL_TURN / MOST_RAYS]
     return round(FULL_TURN / float(np.median(steps))) if steps.size else 1
 

@@ -7,7 +7,7 @@ from node_support.errors import RefusedInput
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 
-class Motion:
+class MovingState:
     """The newest velocity, and how long ago it came in the time of the beams.
 
     Velocities have no stamp of their own (Twist), so a beam takes the newest one that came before it. A velocity that

@@ -3,8 +3,11 @@
 from dataclasses import dataclass
 from enum import Enum
 
+from node_support import topics
+from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.beam_width import beam_width_parameter
 
 
 class ScanMode(Enum):
@@ -57,7 +60,7 @@ class ScanParameters(ParameterSet):
     )
     keep_organized: bool = parameter(False, "rows are beams; removed points become NaN instead of going")
     dispersed_points: int = parameter(1, "points per bin, spread across the width of the beam", low=1, high=15)
-    beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
+    beam_width: float = beam_width_parameter()
     laser_pick: LaserPick = parameter(
         LaserPick.STRONGEST, "the bin that LASER and the laser scan take: the strongest, or the first strong enough"
     )
@@ -72,11 +75,11 @@ class ScanParameters(ParameterSet):
         0, "rays of the laser scan; 0: as many as the head makes steps in a turn", low=0, high=7200
     )
     velocity_topic: str = parameter(
-        "cmd_vel", "tells whether the vehicle moves", tunable=False, thesis_name="velocityTopic"
+        topics.VELOCITY_COMMANDS, "tells whether the vehicle moves", tunable=False, thesis_name="velocityTopic"
     )
     velocity_type: VelocityType = parameter(VelocityType.TWIST, "type of the velocity topic", tunable=False)
     velocity_timeout: float = parameter(
-        2.0, "a moving vehicle not heard of for longer is warned of", unit="s", low=0.0, high=3600.0
+        2.0, "warn when a moving vehicle sends no velocity for longer", unit="s", low=0.0, high=3600.0
     )
     still_speed: float = parameter(0.01, "slower than this counts as still", unit="m/s", low=0.0, high=1.0)
     still_turn_rate: float = parameter(
@@ -85,5 +88,5 @@ class ScanParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class SonarToCloudParameters(BeamCorrection, ScanParameters):
+class SonarToCloudParameters(BeamCorrection, ScanParameters, StampParameters):
     """Parameters of sonar_to_cloud."""

@@ -6,6 +6,7 @@ from typing import List
 import numpy as np
 
 from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.projection import beam_directions, bin_points, kept_bins
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
@@ -49,8 +50,7 @@ class PolarScan:
     @property
     def directions(self) -> np.ndarray:
         """(beams, 3) unit vectors along the beams, in the target frame."""
-        heads = np.column_stack([np.cos(self.angles), np.sin(self.angles)])
-        return np.einsum("nij,nj->ni", self.T_target_sonar[:, :3, :2], heads)
+        return beam_directions(self.angles, self.T_target_sonar)
 
     @property
     def origins(self) -> np.ndarray:
@@ -60,14 +60,12 @@ class PolarScan:
     def kept(self, parameters: SonarToCloudParameters) -> np.ndarray:
         """Return (beams, bins) bool: which bins neither `min_range` nor `height_limit` removes."""
         heights = self.origins[:, 2:] + self.directions[:, 2:] * self.ranges
-        return (self.ranges >= parameters.min_range) & (heights <= parameters.height_limit)
+        return kept_bins(self.ranges, heights, parameters.min_range, parameters.height_limit)
 
     def cloud(self, parameters: SonarToCloudParameters) -> IntensityCloud:
         """Return the organised cloud of all bins in the target frame: rows are beams, removed bins are NaN."""
         beams, bins = self.strengths.shape
-        points = np.empty((beams, bins, 4), dtype=np.float32)
-        points[..., :3] = self.directions[:, np.newaxis] * self.ranges[:, np.newaxis] + self.origins[:, np.newaxis]
-        points[..., 3] = self.strengths
+        points = bin_points(self.origins, self.directions, self.ranges, self.strengths)
         points[~self.kept(parameters)] = np.nan
         return IntensityCloud(
             points=points.reshape(-1, 4),

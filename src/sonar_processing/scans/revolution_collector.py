@@ -7,10 +7,10 @@ from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam, servo_moved
 from sonar_processing.scans.head_turn import HeadTurn
 
-MOST_BEAMS = 3600
+MOST_BEAMS = 3600  # Beams of 0.1 deg, finer than any head steps; a head that stands still must not fill the memory
 
 
-class TurnCollector:
+class RevolutionCollector:
     """Holds the beams of the unfinished turn, whatever a scan is; at most the newest `MOST_BEAMS`."""
 
     def __init__(self) -> None:

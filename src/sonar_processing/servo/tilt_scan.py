@@ -9,9 +9,9 @@ import numpy as np
 
 from node_support.health import Health
 from node_support.parameters import ParameterError, ParameterSet, parameter
-from sonar_processing.scans.turn_counter import TurnCounter
+from sonar_processing.scans.head_turn import SweepCounter
 
-JUMP_BACK = 1.0
+JUMP_BACK = 1.0  # s: messages overtake each other by less; more is a bag that loops
 
 
 class ControlMode(Enum):
@@ -91,10 +91,7 @@ class TiltScan:
         return self._goals[self._step]
 
     def take_joint(self, time: float, angle: float) -> None:
-        """Note where the servo is; one that is no number is as good as none."""
-        if not math.isfinite(angle):
-            self._health.problem("joint states refused", f"{self.parameters.joint} at {angle} rad")
-            return
+        """Note where the servo is, rad; finite."""
         self._see_time(time)
         self._joint_time = time
         if self._angle is None or abs(angle - self._angle) > self._tolerance / 2.0:
@@ -150,7 +147,7 @@ class TiltScan:
     def _look(self, time: float) -> None:
         is_horizontal = self.parameters.mode is ControlMode.HORIZONTAL
         self.state, self._since = (State.HOLDING if is_horizontal else State.SCANNING), time
-        self._counter = TurnCounter(self.parameters.scan_beams)
+        self._counter = SweepCounter(self.parameters.scan_beams)
 
     def _go_on(self, time: float) -> None:
         beyond = not 0 <= self._step + self._direction < len(self._goals)

@@ -7,6 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from node_support.parameters import ParameterError, parameter
+from sonar_processing.beams.beam_width import beam_width_parameter
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.shapes.beam_echoes import beam_echoes
 from sonar_processing.shapes.circle_fit import CircleFit, CircleSight, fitted_circle
@@ -61,7 +62,7 @@ class CircleDetectorParameters(RansacParameters):
         low=0.0,
         high=100.0,
     )
-    beam_width: float = parameter(0.0436, "horizontal width of the beam", unit="rad", low=0.0, high=0.5)
+    beam_width: float = beam_width_parameter()
 
     def check(self) -> None:
         """Refuse radii in the wrong order."""

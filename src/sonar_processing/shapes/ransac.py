@@ -6,7 +6,8 @@ from typing import Optional, Protocol
 
 import numpy as np
 
-from node_support.parameters import ParameterSet, parameter
+from node_support.headers import StampParameters
+from node_support.parameters import parameter
 
 _BATCH = 500
 _FEW_POINTS = 400
@@ -15,7 +16,7 @@ _SHARE_LOOKED_AT_AGAIN = 0.1
 
 
 @dataclass(frozen=True)
-class RansacParameters(ParameterSet):
+class RansacParameters(StampParameters):
     """What the searches for lines and for circles share."""
 
     distance: float = parameter(

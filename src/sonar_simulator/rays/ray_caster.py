@@ -6,32 +6,30 @@ from typing import Tuple
 import numpy as np
 
 from sonar_simulator.rays.nearest_surface import NearestSurface
+from sonar_simulator.world.errors import MissingPackageError
 from sonar_simulator.world.world import World
 
-# Embree answers 1e37 where a ray hits nothing.
+# Embree returns 1e37 where a ray hits nothing.
 _NOTHING = 1e30
 
 
 class RayCaster:
-    """Finds the nearest surface along rays. Raises RuntimeError when embree is not installed."""
+    """Finds the nearest surface along rays. Raises MissingPackageError when embreex is not installed."""
 
     def __init__(self, world: World) -> None:
         try:
             from embreex.mesh_construction import TriangleMesh
             from embreex.rtcore_scene import EmbreeScene
         except ImportError as error:
-            raise RuntimeError(
-                f"the simulator's ray caster cannot be loaded ({error}); run scripts/bootstrap, "
-                "then source scripts/env.bash"
-            ) from error
-        # Robust: rays that meet an edge between two triangles must not slip through it.
+            raise MissingPackageError("casts the simulator's rays", "embreex", error) from error
+        # Robust mode: rays that hit an edge between two triangles must not pass through it.
         self._scene = EmbreeScene(robust=True)
         TriangleMesh(self._scene, world.vertices.astype(np.float32), world.faces.astype(np.int32))
         self.world = world
 
     @cached_property
     def nearest(self) -> NearestSurface:
-        """What finds the nearest surface inside a beam."""
+        """Finds the nearest surface inside a beam."""
         return NearestSurface(self.world)
 
     def distances(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Writes the bag of a whole simulation, without a master."""
+"""Writes the bag of a whole simulation, without a ROS master."""
 
 import math
 from pathlib import Path
@@ -11,6 +11,7 @@ from geometry_msgs.msg import Pose
 from std_msgs.msg import String
 from tf2_msgs.msg import TFMessage
 
+from node_support import topics
 from node_support.files import whole_file
 from node_support.ros.conversions import pose_from_matrix
 from sonar_simulator.ros.simulator_messages import moment_messages, transform_message
@@ -19,14 +20,14 @@ from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME,
 from sonar_simulator.vehicle.robot_description import RobotDescription
 from sonar_simulator.vehicle.servo import tilted
 
-START_TIME = 1000.0
-BEAMS_AT_ONCE = 120
-_TOPICS = {"velocity": "/cmd_vel"}
+START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
+BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head
+_RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
 _SETTINGS_TOPIC = "/sonar_simulator/settings"
 
 
 class _Stamp(rospy.Time):
-    """A time that compares fast: rosbag sorts every message into an index of all that came before it."""
+    """A time that compares fast: rosbag sorts every message into an index of all earlier messages."""
 
     __slots__ = ()
 
@@ -35,7 +36,7 @@ class _Stamp(rospy.Time):
 
 
 class BagWriter:
-    """Puts moments into a bag, at the times and on the topics that the simulator as a node gives them."""
+    """Writes moments into a bag, at the times and on the topics that the simulator node would use."""
 
     def __init__(self, bag: rosbag.Bag, setup: Setup) -> None:
         self._bag = bag
@@ -44,22 +45,22 @@ class BagWriter:
         self._pose = Pose()
 
     def begin(self, robot: RobotDescription, settings: Settings) -> None:
-        """Write what holds for the whole bag: the fixed transforms and the parameters."""
+        """Write what applies to the whole bag: the fixed transforms and the parameters."""
         start = _stamp(0.0)
         transforms = [
             transform_message(pose_from_matrix(joint.T_parent_child), start, joint.parent, joint.child)
             for joint in robot.fixed_joints
         ]
-        self._write("/tf_static", TFMessage(transforms=transforms), start)
+        self._write(topics.STATIC_TRANSFORMS, TFMessage(transforms=transforms), start)
         self._write(_SETTINGS_TOPIC, String(data=_told(settings)), start)
 
     def add(self, moment: Moment) -> None:
         """Write everything that belongs to a moment; its transforms are one message."""
         stamp = _stamp(moment.time)
         for topic, message in moment_messages(moment, stamp, self._setup.sonar.max_range):
-            if topic == "/tf":
+            if topic == topics.TRANSFORMS:
                 message.transforms.append(transform_message(self._mount(moment.tilt), stamp, BASE_FRAME, SONAR_FRAME))
-            self._write(_TOPICS.get(topic, topic), message, stamp)
+            self._write(_RENAMED.get(topic, topic), message, stamp)
 
     def _mount(self, tilt: float) -> Pose:
         if tilt != self._tilt:
@@ -78,9 +79,9 @@ def write_bag(
     compression: str = "none",
     tell: Callable[[float], object] = lambda time: None,
 ) -> int:
-    """Write the bag of a simulation that ends, whole or not at all; return the number of its beams.
+    """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
 
-    `tell` receives the simulated time [s] now and then. Raises OSError.
+    `tell` receives the simulated time [s] from time to time. Raises OSError.
     """
     beams = 0
     with whole_file(path) as temporary, rosbag.Bag(str(temporary), "w", compression=compression) as bag:
@@ -95,7 +96,7 @@ def write_bag(
 
 
 def _told(settings: Settings) -> str:
-    """Return the settings as yaml, files by name alone: the bag must be the same in whatever folder they are."""
+    """Return the settings as yaml, with file names only, so that the bag does not depend on the folder."""
     values = settings.to_mapping()
     files = {key: Path(values[key]).name for key in ("world", "script")}
     return yaml.safe_dump({**values, **files}, sort_keys=False)

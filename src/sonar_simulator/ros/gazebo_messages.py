@@ -1,4 +1,4 @@
-"""What Gazebo's ray sensor plugins publish, to rays: LaserScan, PointCloud and PointCloud2."""
+"""Converts the messages of Gazebo's ray sensor plugins to rays: LaserScan, PointCloud and PointCloud2."""
 
 from typing import Callable, Dict, Optional
 

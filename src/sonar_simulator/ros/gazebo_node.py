@@ -1,10 +1,11 @@
-"""gazebo_sonar: the scans of a ray sensor in Gazebo become sonar beams, so that no plugin has to be built."""
+"""gazebo_sonar: makes sonar beams from the scans of a ray sensor in Gazebo, so that no plugin has to be built."""
 
 from typing import Optional
 
 import rospy
-from sensor_msgs.msg import JointState
 
+from node_support import topics
+from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import guarded, make_health
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.ros.conversions import header
@@ -18,8 +19,9 @@ from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 from underwater_map_construction.msg import SonarScanLine
 
+# A scan of 100,000 rays several times over; rospy reads one that is larger in pieces, slowly.
 _SCAN_BUFFER_BYTES = 2**23
-_ANY_TIME = 1.0
+_ANY_TIME = 1.0  # s: Gazebo says when the next scan comes, so the head's own period does not count
 
 
 class GazeboSonar:
@@ -28,6 +30,7 @@ class GazeboSonar:
     def __init__(self) -> None:
         """Raises ParameterError."""
         self.health = make_health("gazebo_sonar")
+        self.healths = [self.health]
         values = dict(rospy.get_param("~", {}))
         groups = {name: kind.from_group(name, values.pop(name, {})) for name, kind in GROUPS.items()}
         self._parameters = GazeboSonarParameters.from_mapping(values)
@@ -35,13 +38,11 @@ class GazeboSonar:
         self._beams = GazeboBeams(make_echo_model(name, groups[name].to_mapping()), self._parameters.seed)
         self._head = SonarHead(self._parameters.beams_per_turn, _ANY_TIME)
         self._next_beam = 0
-        self._tilt: Optional[float] = None
-        self._publisher = rospy.Publisher("sonar/raw", SonarScanLine, queue_size=100, tcp_nodelay=True)
+        self._publisher = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=100, tcp_nodelay=True)
         self._filter = self._make_filter()
-        if self._parameters.sensor_joint:
-            rospy.Subscriber("joint_states", JointState, guarded(self.health, self._take_joints), queue_size=10)
+        self._tilt = JointAngle(self._parameters.sensor_joint, self.health)
         rospy.Subscriber(
-            "sonar/rays",
+            topics.RAYS,
             rospy.AnyMsg,
             guarded(self.health, self._take_scan),
             queue_size=10,
@@ -52,13 +53,9 @@ class GazeboSonar:
     def _make_filter(self) -> Optional[TransformFilter]:
         if self._parameters.head is HeadMode.SWEEP:
             return None
-        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None)
+        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None, self._parameters.stamp_tolerance)
         made.registerCallback(guarded(self.health, self._turned))
         return made
-
-    def _take_joints(self, joints: JointState) -> None:
-        angles = dict(zip(joints.name, joints.position))
-        self._tilt = angles.get(self._parameters.sensor_joint, self._tilt)
 
     def _take_scan(self, message: rospy.AnyMsg) -> None:
         self.health.count("scans in")
@@ -78,9 +75,6 @@ class GazeboSonar:
         self._publish(ping, scan)
 
     def _publish(self, ping: Ping, scan: RayScan) -> None:
-        if self._parameters.sensor_joint and self._tilt is None:
-            joint = self._parameters.sensor_joint
-            self.health.problem("beams of unknown tilt", f"joint {joint!r} is not in /joint_states; sensorAngle is 0")
         stamped = header(scan.stamp_ns, self._parameters.frame_id)
-        self._publisher.publish(scan_line(ping, self._tilt or 0.0, stamped, self._beams.max_range))
+        self._publisher.publish(scan_line(ping, self._tilt.for_beam(), stamped, self._beams.max_range))
         self.health.count("beams out")

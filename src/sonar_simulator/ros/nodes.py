@@ -1,25 +1,15 @@
 """The executables of this package."""
 
-from node_support.ros.node import DiagnosticsPublisher, run
+from node_support.ros.node import run
 from sonar_simulator.ros.gazebo_node import GazeboSonar
 from sonar_simulator.ros.simulator_node import Simulator
 
 
 def run_simulator() -> None:
     """Run the simulator."""
-
-    def construct() -> tuple:
-        simulator = Simulator()
-        return simulator, DiagnosticsPublisher([simulator.health])
-
-    run("sonar_simulator", construct)
+    run("sonar_simulator", Simulator)
 
 
 def run_gazebo_sonar() -> None:
     """Run gazebo_sonar."""
-
-    def construct() -> tuple:
-        sonar = GazeboSonar()
-        return sonar, DiagnosticsPublisher([sonar.health])
-
-    run("gazebo_sonar", construct)
+    run("gazebo_sonar", GazeboSonar)

@@ -1,4 +1,4 @@
-"""What happens at one moment of a simulation, as messages: for publishers and for bags alike."""
+"""The state at one moment of a simulation as messages, for publishers and for bags."""
 
 from typing import List, Tuple
 
@@ -11,6 +11,7 @@ from sensor_msgs.msg import JointState
 from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
+from node_support import topics
 from node_support.ros.conversions import pose_from_matrix
 from sonar_simulator.simulation.simulation import Moment, Ping
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
@@ -21,20 +22,20 @@ WORLD_FRAME = "map"
 SERVO_JOINT = "sonar_servo_joint"
 
 TOPICS = {
-    "/tf": TFMessage,
-    "joint_states": JointState,
-    "velocity": Twist,
-    "odom": Odometry,
-    "ground_truth": Odometry,
-    "sonar/raw": SonarScanLine,
+    topics.TRANSFORMS: TFMessage,
+    topics.JOINT_STATES: JointState,
+    topics.VELOCITY: Twist,
+    topics.ODOMETRY: Odometry,
+    topics.GROUND_TRUTH: Odometry,
+    topics.BEAMS: SonarScanLine,
 }
-"""Topics, relative to the namespace but for /tf, and their types."""
+"""Topics and their types; relative to the namespace, except /tf."""
 
 
 def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List[Tuple[str, Message]]:
     """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
 
-    Transform and joint come with every moment, so that a beam can be placed at its own stamp; the rest comes with
+    Transform and joint are part of every moment, so that a beam can be placed at its own stamp; the rest is part of
     ticks only, at the steady rate of an instrument.
     """
     messages = placing_messages(moment, stamp)
@@ -43,13 +44,13 @@ def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List
         velocity, true_velocity = _twist(moment.odometry.twist), _twist(moment.truth.twist)
         true_pose = pose_from_matrix(moment.truth.T_world_base)
         messages += [
-            ("velocity", velocity),
-            ("odom", _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
-            ("ground_truth", _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
+            (topics.VELOCITY, velocity),
+            (topics.ODOMETRY, _odometry(odom_pose, velocity, stamp, ODOM_FRAME)),
+            (topics.GROUND_TRUTH, _odometry(true_pose, true_velocity, stamp, WORLD_FRAME)),
         ]
     if moment.ping is not None:
         header = Header(stamp=stamp, frame_id=SONAR_FRAME)
-        messages.append(("sonar/raw", scan_line(moment.ping, moment.tilt, header, max_range)))
+        messages.append((topics.BEAMS, scan_line(moment.ping, moment.tilt, header, max_range)))
     return messages
 
 
@@ -57,8 +58,8 @@ def placing_messages(moment: Moment, stamp: rospy.Time) -> List[Tuple[str, Messa
     """Return the (topic, message) pairs that place vehicle and sonar, the transform first."""
     odom_pose = pose_from_matrix(moment.odometry.T_odom_base)
     return [
-        ("/tf", TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
-        ("joint_states", joint_state(moment.tilt, stamp)),
+        (topics.TRANSFORMS, TFMessage(transforms=[transform_message(odom_pose, stamp, ODOM_FRAME, BASE_FRAME)])),
+        (topics.JOINT_STATES, joint_state(moment.tilt, stamp)),
     ]
 
 
@@ -74,7 +75,7 @@ def transform_message(pose: Pose, stamp: rospy.Time, parent: str, child: str) ->
 
 
 def joint_state(tilt: float, stamp: rospy.Time) -> JointState:
-    """Return where the sonar's servo stands, rad."""
+    """Return the position of the sonar's servo, rad."""
     message = JointState(name=[SERVO_JOINT], position=[tilt])
     message.header.stamp = stamp
     return message

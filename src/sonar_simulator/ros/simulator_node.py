@@ -1,4 +1,4 @@
-"""The simulator as a node: it is the clock, the odometry, tf and the sonar."""
+"""The simulator as a node: publishes /clock, odometry, tf and the beams of the sonar."""
 
 import itertools
 import math
@@ -12,6 +12,7 @@ import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64
 
+from node_support import topics
 from node_support.parameters import ParameterError
 from node_support.ros.node import guarded, make_health
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
@@ -20,17 +21,18 @@ from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.simulation.simulation_setup import PACKAGE, Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
-START_TIME = 1000.0
-_WAIT_STEP = 0.05
-_LISTENER_TIME = 0.5
+START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
+_WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
+_LISTENER_TIME = 0.5  # s: a subscriber that has one topic has the others within this time
 
 
 class Simulator:
     """Runs a simulation against the wall clock, `real_time_factor` times as fast."""
 
     def __init__(self) -> None:
-        """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
+        """Raises ParameterError if a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
+        self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
         folder = Path(rospkg.RosPack().get_path(PACKAGE))
         self._parameters = settings.simulator
@@ -46,9 +48,9 @@ class Simulator:
         threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
 
     def _subscribe(self) -> None:
-        commands = {"sonar_servo/command": (Float64, self._take_servo_command)}
+        commands = {topics.SERVO_COMMANDS: (Float64, self._take_servo_command)}
         if self._parameters.drive is Drive.COMMANDS:
-            commands["cmd_vel"] = (Twist, self._take_velocity_command)
+            commands[topics.VELOCITY_COMMANDS] = (Twist, self._take_velocity_command)
         for topic, (kind, take) in commands.items():
             rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=10, tcp_nodelay=True)
 
@@ -78,7 +80,7 @@ class Simulator:
             pass
 
     def _play(self, moments: Iterator[Moment], pace: Pace) -> bool:
-        """Publish the next moment when its time has come; return False when there is none or the node ends."""
+        """Publish the next moment when its time has come; return False if there is none or the node ends."""
         with self._lock, self.health.timed():
             moment = next(moments, None)
         if moment is None or self._ended.is_set():
@@ -101,7 +103,7 @@ class Simulator:
             self.health.problem("delays", detail)
 
     def _wait_for_listener(self) -> None:
-        """Let the clock run until somebody takes the beams, and until he has had time to learn of tf as well."""
+        """Let the clock run until somebody subscribes to the beams and has had time to connect to tf as well."""
         start, waited = self._setup.simulation.moment(0.0), 0.0
         while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
             waited += _WAIT_STEP if self._publisher.has_listener else 0.0

@@ -1,65 +1,66 @@
-"""Publishes what happens at one moment of a simulation."""
+"""Publishes the state at one moment of a simulation."""
 
 import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker
 
+from node_support import topics
 from sonar_simulator.ros.simulator_messages import TOPICS, WORLD_FRAME, moment_messages, placing_messages
 from sonar_simulator.ros.world_marker import world_marker
 from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.world.world import World
 
-_QUEUE_SIZE = 100
-_VELOCITY = "velocity"
-_COMMANDS = "cmd_vel"
+_QUEUE_SIZE = 100  # A second of every topic at the usual rates
 
 
 class SimulatorPublisher:
-    """The simulator's topics. Its world is the frame `map`, which the odometry's error moves away from `odom`.
+    """The simulator's topics. Its world is the frame `map`, from which `odom` drifts away by the odometry's error.
 
-    A vehicle that follows a script gets its commands from nobody: then the velocity is on cmd_vel as well, where the
-    rest of the graph expects it.
+    If the vehicle follows a script, nobody sends commands; the velocity is then also published on cmd_vel, where other
+    nodes expect it.
     """
 
     def __init__(self, max_range: float, drive: Drive) -> None:
         """`max_range`: of the sonar, m."""
         self._max_range = max_range
-        self._clock = rospy.Publisher("/clock", Clock, queue_size=_QUEUE_SIZE)
+        self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
         self._world = rospy.Publisher("~world", Marker, queue_size=1, latch=True)
         self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS.items()}
-        self._commands = _publisher(_COMMANDS, TOPICS[_VELOCITY]) if drive is Drive.SCRIPT else None
+        self._commands = (
+            _publisher(topics.VELOCITY_COMMANDS, TOPICS[topics.VELOCITY]) if drive is Drive.SCRIPT else None
+        )
 
     @property
     def has_listener(self) -> bool:
-        """Whether anybody takes the beams."""
-        return self._publishers["sonar/raw"].get_num_connections() > 0
+        """Whether anybody subscribes to the beams."""
+        return self._publishers[topics.BEAMS].get_num_connections() > 0
 
     def publish_clock(self, stamp: rospy.Time) -> None:
-        """Set everybody's time."""
+        """Publish the simulated time."""
         self._clock.publish(Clock(clock=stamp))
 
     def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
-        """Send what places a sonar that waits: the time, the vehicle where it stands at a moment, and its servo."""
+        """Publish what places a waiting sonar: the time, and the vehicle and its servo at a moment."""
         self.publish_clock(stamp)
         for topic, message in placing_messages(moment, stamp):
             self._publishers[topic].publish(message)
 
     def publish_world(self, world: World) -> None:
-        """Show the world, once for all who come."""
+        """Publish the world once; latched."""
         self._world.publish(world_marker(world, WORLD_FRAME))
 
     def publish_progress(self, share: float) -> None:
-        """Tell which share of the script is done; 1 at its end."""
+        """Publish the completed share of the script; 1 at its end."""
         self._progress.publish(Float32(data=share))
 
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
-        """Send everything that belongs to a moment."""
+        """Publish everything that belongs to a moment."""
         self.publish_clock(stamp)
         for topic, message in moment_messages(moment, stamp, self._max_range):
             self._publishers[topic].publish(message)
-            if topic == _VELOCITY and self._commands is not None:
+            if topic == topics.VELOCITY and self._commands is not None:
                 self._commands.publish(message)
 
 

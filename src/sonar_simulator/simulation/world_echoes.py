@@ -1,4 +1,4 @@
-"""Echoes of a world file for an emulated head, which asks for one ping at a time (thesis 6.4)."""
+"""Echoes from a world file for an emulated head, which needs one ping at a time (thesis 6.4)."""
 
 import math
 from typing import Protocol
@@ -15,11 +15,11 @@ from sonar_simulator.world.errors import WorldError
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 
-_FULL_STRENGTH_DB = 20.0
+_FULL_STRENGTH_DB = 20.0  # Start gain at which an echo has the strength that the model gives it
 
 
 class PingCommand(Protocol):
-    """What of a head's command changes its echoes: reach in m, gain in dB."""
+    """The settings in a head's command that change its echoes: range in m, gain in dB."""
 
     max_range: int
     start_gain_db: int
@@ -34,7 +34,7 @@ class PingRequest(Protocol):
 
 
 class HeadInWorld(Protocol):
-    """Which world, and where the head stands in it: m, degrees counter-clockwise."""
+    """The world, and the position and heading of the head in it: m, degrees counter-clockwise."""
 
     world_file: str
     x: float
@@ -45,10 +45,10 @@ class HeadInWorld(Protocol):
 
 
 class WorldEchoes:
-    """Answers pings with what a head that stands still hears of a world; the gain scales the strengths."""
+    """Answers pings with what a head at rest hears in a world; the gain scales the strengths."""
 
     def __init__(self, world: World, T_world_sonar: np.ndarray, seed: int) -> None:
-        """Raises RuntimeError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
+        """Raises MissingPackageError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
         self._caster = RayCaster(world)
         self._pose = T_world_sonar
         self._pattern: BeamPattern = SonarParameters().pattern()
@@ -65,10 +65,9 @@ class WorldEchoes:
 
 def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
     """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
-    try:
-        world = load_world(parameters.world_file).world
-    except WorldError as error:
-        raise ParameterError(f"world_file: {error}") from error
     position = parameters.x, parameters.y, parameters.z
     pose = pose_matrix(position, (0.0, 0.0, math.radians(parameters.yaw_deg)))
-    return WorldEchoes(world, pose, parameters.seed)
+    try:
+        return WorldEchoes(load_world(parameters.world_file).world, pose, parameters.seed)
+    except WorldError as error:
+        raise ParameterError(f"world_file: {error}") from error

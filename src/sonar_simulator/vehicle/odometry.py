@@ -1,4 +1,4 @@
-"""What the vehicle believes of its own motion (thesis 7.4)."""
+"""The vehicle's own estimate of its motion (thesis 7.4)."""
 
 import math
 from dataclasses import dataclass
@@ -7,21 +7,22 @@ from typing import NamedTuple
 import numpy as np
 
 from node_support.geometry.matrices import pose_matrix, yaw_of
+from node_support.geometry.planar import rotated, unwrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 
-_NOISE_TIME = 1.0
+_NOISE_TIME = 1.0  # s: correlation time, about that of a vehicle's own dynamics
 
 
 @dataclass(frozen=True)
 class OdometryParameters(ParameterSet):
-    """The error of the odometry. Depth is right: it comes from a pressure sensor (thesis 4.3.2)."""
+    """The errors of the odometry. Depth has none, because it comes from a pressure sensor (thesis 4.3.2)."""
 
     scale_error: float = parameter(
-        0.3, "the vehicle really moves 1 + scale_error times what odometry says", low=-0.9, high=10.0
+        0.3, "true distances are 1 + scale_error times those of the odometry", low=-0.9, high=10.0
     )
     heading_drift_deg_per_minute: float = parameter(
-        0.0, "the believed heading turns away from the true one at this rate", unit="deg/min", low=-360.0, high=360.0
+        0.0, "the odometry's heading drifts from the true one at this rate", unit="deg/min", low=-360.0, high=360.0
     )
     speed_noise: float = parameter(
         0.0, "standard deviation of the measured speed along each axis, as a share of the speed", low=0.0, high=10.0
@@ -32,21 +33,21 @@ class OdometryParameters(ParameterSet):
 
 
 class Estimate(NamedTuple):
-    """What odometry says: (4, 4) T_odom_base and the (6,) body twist, m/s and rad/s."""
+    """The odometry's estimate: (4, 4) T_odom_base and the (6,) body twist, m/s and rad/s."""
 
     T_odom_base: np.ndarray
     twist: np.ndarray
 
 
 class Odometry:
-    """Dead reckoning from a speed and a turn rate that are measured wrongly. The odom frame begins as the world frame.
+    """Dead reckoning from a speed and a turn rate measured with errors. At the start, odom is the world frame.
 
-    Noise is a Gauss-Markov process with a correlation time of 1 s, so that what it does to the pose does not depend
-    on how often odometry is asked. A vehicle that rests is measured to rest, but for the drift of its heading.
+    Noise is a Gauss-Markov process with a correlation time of 1 s, so that its effect on the pose does not depend
+    on how often the odometry is evaluated. A vehicle at rest is measured to be at rest, except for its heading drift.
     """
 
     def __init__(self, parameters: OdometryParameters, start: np.ndarray, rng: np.random.Generator) -> None:
-        """`start`: (4, 4) T_world_base at time 0, when odometry is right."""
+        """`start`: (4, 4) T_world_base at time 0, when the odometry is exact."""
         self._parameters = parameters
         self._rng = rng
         self._time = 0.0
@@ -56,7 +57,7 @@ class Odometry:
         self._noise = rng.standard_normal(3)
 
     def estimate(self, time: float, state: VehicleState) -> Estimate:
-        """Return what odometry says at `time` s, never before that of the last call, of the true `state`."""
+        """Return the estimate at `time` s, which must not be before that of the last call, for the true `state`."""
         duration = max(time - self._time, 0.0)
         self._advance(duration, state)
         self._time = max(time, self._time)
@@ -70,10 +71,10 @@ class Odometry:
         self._noise = keep * self._noise + math.sqrt(1.0 - keep**2) * self._rng.standard_normal(3)
         turned = self._turn_rate_error(state) * duration
         yaw = yaw_of(state.T_world_base)
-        middle = 0.5 * (yaw_of(self._true) + _unwrapped(yaw, yaw_of(self._true)))
-        moved = _turned(state.T_world_base[:2, 3] - self._true[:2, 3], -middle)
+        middle = 0.5 * (yaw_of(self._true) + unwrapped(yaw, yaw_of(self._true)))
+        moved = rotated(state.T_world_base[:2, 3] - self._true[:2, 3], -middle)
         measured = moved * self._scale * (1.0 + self._parameters.speed_noise * self._noise[:2])
-        self._position = self._position + _turned(measured, middle + self._heading_error + 0.5 * turned)
+        self._position = self._position + rotated(measured, middle + self._heading_error + 0.5 * turned)
         self._heading_error += turned
         self._true = state.T_world_base
 
@@ -92,13 +93,3 @@ class Odometry:
     @property
     def _scale(self) -> float:
         return 1.0 / (1.0 + self._parameters.scale_error)
-
-
-def _turned(vector: np.ndarray, angle: float) -> np.ndarray:
-    cos_angle, sin_angle = math.cos(angle), math.sin(angle)
-    x, y = vector
-    return np.array([cos_angle * x - sin_angle * y, sin_angle * x + cos_angle * y])
-
-
-def _unwrapped(angle: float, near: float) -> float:
-    return near + math.remainder(angle - near, 2.0 * math.pi)

@@ -11,7 +11,7 @@ from node_support.parameters import ParameterError
         ({"train_angle_deg": 60}, "the sector would end at 240 deg"),
         ({"max_range": 25}, "max_range = 25: must be one of 5, 10"),
         ({"back_off_first": 0.9, "back_off_longest": 0.5}, "longer than back_off_longest"),
-        ({"frame_id": ""}, "frame_id = '': must be a text that is not empty"),
+        ({"frame_id": ""}, "frame_id = '': must be a non-empty string"),
         ({"tilt": 1.0}, "tilt = 1.0: no such parameter"),
     ],
 )

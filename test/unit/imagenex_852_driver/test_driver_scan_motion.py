@@ -1,11 +1,11 @@
 import pytest
 
-from imagenex_852_driver.emulator.head_rotation import ScanMotion
+from imagenex_852_driver.emulator.head_rotation import HeadRotation
 from imagenex_852_driver.protocol import SwitchCommand
 
 
 def positions(command, count, motion=None):
-    motion = motion or ScanMotion()
+    motion = motion or HeadRotation()
     found = []
     for _ in range(count):
         motion.obey(command)
@@ -35,7 +35,7 @@ def test_a_head_outside_of_its_sector_steps_towards_it_and_then_scans_it():
 
 
 def test_reverse_turns_a_sector_scan_around_at_once():
-    motion = ScanMotion()
+    motion = HeadRotation()
     positions(SwitchCommand(max_range=20, sector_width_deg=60), 2, motion)
     reverse = SwitchCommand(max_range=20, sector_width_deg=60, reverse=True)
     assert positions(reverse, 3, motion) == [6, 3, 0]

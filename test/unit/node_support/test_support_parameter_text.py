@@ -22,7 +22,7 @@ def test_every_key_comes_after_its_meaning_what_is_allowed_and_its_thesis_name(t
 
 
 def test_keys_that_only_the_start_can_set_have_no_star(text):
-    assert '# which frame\n#   a text that is not empty\nframe: "odom"\n' in text
+    assert '# which frame\n#   a non-empty string\nframe: "odom"\n' in text
 
 
 def test_choices_are_named(text):

@@ -12,11 +12,11 @@ from geometry_msgs.msg import Quaternion, Transform, Vector3
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as numpy_st
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
+from node_support.geometry.matrices import pose_matrix, quaternion_of
 from node_support.ros.conversions import matrix_from_message
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import (
@@ -29,12 +29,13 @@ from sonar_processing.ros.conversions import (
     point_cloud,
     points_from_message,
 )
-from sonar_processing.scans.laser_scan import LaserTurn
+from sonar_processing.scans.laser_scan import PlanarLaserScan
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 # The generated message code of Noetic writes arrays with the old name of tobytes.
 pytestmark = pytest.mark.filterwarnings("ignore:tostring:DeprecationWarning")
 
+HOUR = 3600.0
 STAMP_NS = 1_400_000_000 * SECOND + 123456789
 ANY_BITS = numpy_st.arrays(np.uint32, st.tuples(st.integers(0, 20), st.just(4))).map(lambda bits: bits.view(np.float32))
 
@@ -115,7 +116,9 @@ def test_a_beam_with_an_angle_that_is_not_a_number_is_refused(name):
 
 @given(ANY_BITS, st.data())
 def test_a_cloud_comes_back_from_its_message_bit_by_bit(points, data):
-    stamps = data.draw(numpy_st.arrays(np.uint64, len(points))).view(np.float64)
+    seconds = STAMP_NS * 1e-9
+    times = st.floats(seconds - HOUR, seconds + HOUR) | st.floats(-seconds - HOUR, -seconds + HOUR) | st.just(np.nan)
+    stamps = data.draw(numpy_st.arrays(np.float64, len(points), elements=times))
     cloud = IntensityCloud(points, stamps, STAMP_NS, "odom")
     received = cloud_from_message(_sent(cloud_to_message(cloud), StampedIntensityCloudArrays))
     assert received.points.tobytes() == points.tobytes()
@@ -149,7 +152,9 @@ def test_a_cloud_that_says_it_is_finite_and_is_not_is_broken():
 
 
 def test_a_laser_scan_holds_at_one_moment_and_its_angles_grow():
-    turn = LaserTurn(np.array([1.0, np.inf, 3.0, 4.0], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0)
+    turn = PlanarLaserScan(
+        np.array([1.0, np.inf, 3.0, 4.0], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0
+    )
     scan = _sent(laser_scan_message(turn, STAMP_NS, "sonar"), LaserScan)
     assert (scan.header.frame_id, scan.header.stamp.to_nsec()) == ("sonar", STAMP_NS)
     assert (scan.angle_min, scan.angle_increment) == (pytest.approx(-math.pi), pytest.approx(math.pi / 2))
@@ -255,11 +260,18 @@ def test_big_endian_data_are_refused():
 
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3), st.tuples(*[st.floats(-100.0, 100.0)] * 3))
 def test_a_transform_is_its_matrix(rotation, shift):
-    expected = Rotation.from_euler("xyz", rotation)
-    matrix = matrix_from_message(Transform(Vector3(*shift), Quaternion(*expected.as_quat())))
-    np.testing.assert_allclose(matrix[:3, :3], expected.as_matrix(), atol=1e-12)
+    expected = pose_matrix(shift, rotation)
+    matrix = matrix_from_message(Transform(Vector3(*shift), Quaternion(*quaternion_of(expected))))
+    np.testing.assert_allclose(matrix[:3, :3], expected[:3, :3], atol=1e-12)
     assert matrix[:3, 3].tolist() == list(shift)
     assert matrix[3].tolist() == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_half_a_turn_has_a_quaternion(axis):
+    turned = -np.eye(3)
+    turned[axis, axis] = 1.0
+    np.testing.assert_allclose(np.abs(quaternion_of(turned)), np.eye(4)[axis])
 
 
 @pytest.mark.parametrize(

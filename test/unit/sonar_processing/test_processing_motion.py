@@ -5,7 +5,7 @@ import math
 import pytest
 
 from node_support.errors import RefusedInput
-from sonar_processing.scans.moving_state import Motion
+from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 PARAMETERS = SonarToCloudParameters(still_speed=0.05, still_turn_rate=0.01)
@@ -13,13 +13,13 @@ SECOND = 10**9
 
 
 def _motion(linear=(0.0, 0.0, 0.0), angular=(0.0, 0.0, 0.0)):
-    motion = Motion()
+    motion = MovingState()
     motion.take(linear, angular)
     return motion
 
 
 def test_a_vehicle_never_heard_of_is_still():
-    motion = Motion()
+    motion = MovingState()
     assert (motion.was_heard, motion.is_moving(PARAMETERS)) == (False, False)
 
 

@@ -10,14 +10,14 @@ from hypothesis import strategies as st
 
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.scans.head_turn import HeadTurn
-from sonar_processing.scans.revolution_collector import MOST_BEAMS, TurnCollector
+from sonar_processing.scans.revolution_collector import MOST_BEAMS, RevolutionCollector
 
 STEP = math.radians(3.0)
 
 
 def _turns(beams):
     """Return the seconds of the beams of every turn; beams are dictionaries for `beam_of`."""
-    collector = TurnCollector()
+    collector = RevolutionCollector()
     turns = [collector.add(PlacedBeam(beam_of(**beam), np.eye(4), is_moving=False)) for beam in beams]
     return [[placed.beam.stamp_ns // 10**9 for placed in turn] for turn in turns if turn is not None]
 
@@ -52,7 +52,7 @@ def test_a_head_that_trembles_does_not_go_back():
 
 
 def test_a_head_that_stands_still_gives_nothing_and_holds_only_the_newest():
-    collector = TurnCollector()
+    collector = RevolutionCollector()
     placed = PlacedBeam(beam_of(angle=1.0), np.eye(4), is_moving=False)
     assert [collector.add(placed) for _ in range(MOST_BEAMS + 10)] == [None] * (MOST_BEAMS + 10)
     assert len(collector) == MOST_BEAMS
@@ -65,7 +65,7 @@ def test_a_turn_in_which_the_servo_or_the_range_changed_is_forgotten(change):
 
 
 def test_clear_forgets_the_beams():
-    collector = TurnCollector()
+    collector = RevolutionCollector()
     collector.add(PlacedBeam(beam_of(), np.eye(4), is_moving=False))
     collector.clear()
     assert len(collector) == 0

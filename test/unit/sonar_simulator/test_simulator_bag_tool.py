@@ -1,3 +1,4 @@
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -102,7 +103,7 @@ def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):
     [
         (["--set", "odometry.scale_eror=1"], "odometry: scale_eror = 1: no such parameter"),
         (["--set", "seed"], "--set seed: must be key=value or group.key=value"),
-        (["--set", "drive=CMD_VEL"], "drive = 'CMD_VEL': a bag has nobody who sends commands"),
+        (["--set", "drive=CMD_VEL"], "drive = 'CMD_VEL': nobody sends commands to a bag"),
         (["--world", "none.sdf"], "none.sdf"),
         (["--robot", "none.urdf"], "none.urdf: No such file or directory"),
         (["--parameters", "none.yaml"], "none.yaml: No such file or directory"),
@@ -114,6 +115,16 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path, script, caps
     assert status == 1
     assert line in error
     assert error.count("\n") == 1
+    assert not out.exists()
+
+
+def test_without_the_ray_caster_one_line_says_what_to_install(tmp_path, script, capsys, monkeypatch):
+    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    status, out = _write(tmp_path, script)
+    error = capsys.readouterr().err
+    assert status == 1
+    assert error.count("\n") == 1
+    assert error.endswith("-m pip install embreex\n")
     assert not out.exists()
 
 

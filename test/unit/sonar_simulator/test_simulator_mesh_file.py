@@ -1,7 +1,9 @@
+import sys
+
 import numpy as np
 import pytest
 
-from sonar_simulator.world.errors import WorldError
+from sonar_simulator.world.errors import MissingPackageError, WorldError
 from sonar_simulator.world.mesh_file import load_mesh
 from sonar_simulator.world.world_file import load_world
 
@@ -88,6 +90,13 @@ def test_a_file_that_is_no_mesh_is_refused_with_its_path(tmp_path, suffix, conte
 def test_a_missing_mesh_is_refused_with_its_path(tmp_path):
     with pytest.raises(WorldError, match=r"gone\.stl"):
         load_mesh(tmp_path / "gone.stl")
+
+
+@pytest.mark.parametrize(("suffix", "package"), [("stl", "trimesh"), ("dae", "trimesh"), ("dae", "collada")])
+def test_without_the_reader_the_error_says_what_to_install(tmp_path, monkeypatch, suffix, package):
+    monkeypatch.setitem(sys.modules, package, None)
+    with pytest.raises(MissingPackageError, match=r"install it: \S+ -m pip install trimesh pycollada$"):
+        load_mesh(tmp_path / f"box.{suffix}")
 
 
 def test_a_vertex_that_is_not_finite_is_refused(tmp_path):

@@ -7,6 +7,7 @@ from hypothesis import strategies as st
 
 from node_support.geometry.matrices import pose_matrix
 from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.world.errors import MissingPackageError
 from sonar_simulator.world.world import Shape, World
 
 HALF = np.array([60.0, 25.0, 5.0])
@@ -55,7 +56,8 @@ def test_no_rays_have_no_distances():
     assert ROOM.distances(np.empty((0, 3)), np.empty((0, 3))).shape == (0,)
 
 
-def test_without_embree_the_error_says_what_to_run(monkeypatch):
+def test_without_embreex_the_error_says_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
-    with pytest.raises(RuntimeError, match="scripts/bootstrap"):
+    expected = r"it casts the simulator's rays; install it: \S+ -m pip install embreex$"
+    with pytest.raises(MissingPackageError, match=expected):
         RayCaster(World.from_shapes("w", [Shape("b", "sphere", np.eye(4), (1.0,))]))

@@ -1,4 +1,6 @@
 import math
+import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -57,3 +59,10 @@ def test_a_world_that_cannot_be_read_is_a_bad_parameter():
     parameters = SimpleNamespace(world_file="none.sdf", x=0.0, y=0.0, z=0.0, yaw_deg=0.0, seed=0)
     with pytest.raises(ParameterError, match=r"world_file.*none\.sdf"):
         world_echoes(parameters)
+
+
+def test_without_the_ray_caster_the_head_is_refused_with_what_to_install(monkeypatch):
+    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
+    basin = str(Path(__file__).resolve().parents[3] / "worlds" / "basin.sdf")
+    with pytest.raises(ParameterError, match="-m pip install embreex"):
+        world_echoes(SimpleNamespace(world_file=basin, x=0.0, y=0.0, z=-2.0, yaw_deg=0.0, seed=1))

@@ -1,12 +1,16 @@
-"""Publishes a stage's result, and serialises it only while somebody reads it."""
+"""Publish what a stage makes, and serialise it only while somebody reads it."""
+
+from typing import Optional
 
 import rospy
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float32
 
+from node_support.health import Health
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_to_message, points_to_message
 
-QUEUE_SIZE = 10
+QUEUE_SIZE = 10  # a reader that is ten scans late should not get them all
 
 
 class CloudPublisher:
@@ -43,3 +47,27 @@ class PointsPublisher:
         """Send the points to those who listen."""
         if self.is_read:
             self._publisher.publish(points_to_message(cloud))
+
+
+class FigurePublisher:
+    """A Float32 on ~name, and the same number in /diagnostics."""
+
+    def __init__(self, name: str, namespace: str, health: Health) -> None:
+        """`namespace` is "~" or the stage's resolved name."""
+        self.name = name
+        self._health = health
+        prefix = namespace if namespace == "~" else f"{namespace}/"
+        self._publisher = rospy.Publisher(f"{prefix}{name}", Float32, queue_size=QUEUE_SIZE)
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody listens."""
+        return self._publisher.get_num_connections() > 0
+
+    def publish(self, value: Optional[float]) -> None:
+        """Send the number to those who listen; None is not sent."""
+        if value is None:
+            return
+        self._health.show(self.name, f"{value:.2f}")
+        if self.is_read:
+            self._publisher.publish(Float32(data=value))

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.scans.laser_scan import laser_turn, usual_rays
+from sonar_processing.scans.laser_scan import planar_laser_scan, usual_rays
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
@@ -43,7 +43,7 @@ def _scan(distances, numbers=None, poses=None):
 
 
 def _laser(scan, **values):
-    return laser_turn(scan, SonarToCloudParameters(**values))
+    return planar_laser_scan(scan, SonarToCloudParameters(**values))
 
 
 def _angles(turn):

@@ -1,0 +1,119 @@
+"""What a node answers to --help: its purpose, topics, services and parameters, without a ROS master."""
+
+import dataclasses
+import re
+import sys
+import textwrap
+from enum import Enum
+from typing import List, Mapping, Type
+
+from node_support.node_table import DIAGNOSTICS, HOSTS, NODES, Interface, Role
+from node_support.parameters import ParameterSet, describe
+
+PACKAGE = "underwater_map_construction"
+# What the narrowest common terminal shows.
+WIDTH = 80
+_QUESTIONS = ("-h", "--help")
+_LINK = re.compile(r"\[([^]]*)\]\(([^)]*)\)")
+_NOTHING: Mapping[str, Type[ParameterSet]] = {}
+
+
+def answer_help(
+    node: str,
+    parameters: Type[ParameterSet],
+    groups: Mapping[str, Type[ParameterSet]] = _NOTHING,
+    tunable: bool = True,
+) -> None:
+    """Print the help of a node and end the process, if its command line asks for help; otherwise do nothing.
+
+    parameters: those in the node's own namespace. groups: those in namespaces below it, by their names.
+    tunable: whether dynamic_reconfigure can change parameters while the node runs.
+    """
+    if _is_asked():
+        print(node_help(node, {"": parameters, **groups}, tunable))
+        sys.exit(0)
+
+
+def answer_pipeline_help(host: str) -> None:
+    """Do as `answer_help` for a node that hosts several nodes in one process."""
+    if _is_asked():
+        print(host_help(host))
+        sys.exit(0)
+
+
+def _is_asked() -> bool:
+    return any(argument in _QUESTIONS for argument in sys.argv[1:])
+
+
+def node_help(node: str, groups: Mapping[str, Type[ParameterSet]], tunable: bool) -> str:
+    """Return the help of a node; `groups` are its parameters by namespace, "" is its own. Raises KeyError."""
+    description = NODES[node]
+    lines = [_usage(node), "", *_wrapped(_plain(description.summary), "")]
+    for role in Role:
+        lines += _interfaces(role, [one for one in (*description.interfaces, DIAGNOSTICS) if one.role is role])
+    for group, parameters in groups.items():
+        lines += _parameters(group, parameters, tunable)
+    lines += ["", *_wrapped(f"yaml/{node}_default.yaml holds all parameters with their defaults.", "")]
+    return "\n".join(lines)
+
+
+def host_help(host: str) -> str:
+    """Return the help of a node that hosts others. Raises KeyError."""
+    description = HOSTS[host]
+    hosted = ", ".join(description.hosted)
+    lines = [_usage(host), "", *_wrapped(_plain(description.summary), "")]
+    lines += ["", "hosts:", *_wrapped(hosted, "  ")]
+    lines += [
+        "",
+        *_wrapped(
+            "Topics, services and parameters are those of the hosted nodes, in the same namespaces as if each ran "
+            "alone (/thresholder/mode). They are listed by:",
+            "",
+        ),
+        *(f"  rosrun {PACKAGE} {node} --help" for node in description.hosted),
+        "",
+        "parameters:",
+        "  chain: a list of node names",
+        *_wrapped("the stages that are hosted; default [thresholder, outlier_remover, echo_extractor]", "      "),
+    ]
+    return "\n".join(lines)
+
+
+def _usage(node: str) -> str:
+    return (
+        f"usage: rosrun {PACKAGE} {node} [_PARAMETER:=VALUE ...] [TOPIC:=OTHER_TOPIC ...]\n"
+        f"   or: roslaunch {PACKAGE} {node}.launch [ARGUMENT:=VALUE ...]"
+    )
+
+
+def _interfaces(role: Role, interfaces: List[Interface]) -> List[str]:
+    if not interfaces:
+        return []
+    lines = ["", f"{role.value}:"]
+    for one in interfaces:
+        lines.append(f"  {one.name}" + (f" ({one.type})" if one.type else ""))
+        lines += _wrapped(_plain(one.text), "      ")
+    return lines
+
+
+def _parameters(group: str, parameters: Type[ParameterSet], tunable: bool) -> List[str]:
+    title = f"parameters in the group {group}" if group else "parameters"
+    note = " (*: can be changed while the node runs, through dynamic_reconfigure)" if tunable else ""
+    lines = ["", *_wrapped(f"{title}{note}:", "")]
+    prefix = f"{group}/" if group else ""
+    for field in dataclasses.fields(parameters):
+        described = describe(field)
+        star = " *" if tunable and described.tunable else ""
+        default = field.default.value if isinstance(field.default, Enum) else field.default
+        lines.append(f"  {prefix}{field.name}{star}")
+        lines += _wrapped(f"{described.text}; {described.allowed(field.type)}; default {default!r}", "      ")
+    return lines
+
+
+def _plain(markdown: str) -> str:
+    """Return a text of the table without the marks of Markdown; links become the page's path."""
+    return _LINK.sub(lambda link: f"{link[1]} (docs/{link[2].partition('#')[0]})", markdown).replace("`", "")
+
+
+def _wrapped(text: str, indent: str) -> List[str]:
+    return textwrap.wrap(text, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)

@@ -1,0 +1,251 @@
+"""What docs/nodes.md and --help say of every node besides its parameters: its purpose, topics and services."""
+
+from dataclasses import dataclass
+from enum import Enum
+from typing import Dict, Tuple
+
+
+class Role(Enum):
+    """What a node does with a topic, a transform or a service."""
+
+    INPUT = "subscribes"
+    OUTPUT = "publishes"
+    SERVICE = "serves"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """One topic, transform or service; names are relative to the node's namespace unless they begin with / or ~."""
+
+    role: Role
+    name: str
+    type: str
+    text: str
+
+
+@dataclass(frozen=True)
+class NodeDescription:
+    """A node's purpose in Markdown and its interfaces, in the order in which they are listed."""
+
+    summary: str
+    interfaces: Tuple[Interface, ...]
+
+
+@dataclass(frozen=True)
+class HostDescription:
+    """A node that runs other nodes in its process: its purpose in Markdown and the names of those nodes."""
+
+    summary: str
+    hosted: Tuple[str, ...]
+
+
+def _subscribes(name: str, kind: str, text: str) -> Interface:
+    return Interface(Role.INPUT, name, kind, text)
+
+
+def _publishes(name: str, kind: str, text: str) -> Interface:
+    return Interface(Role.OUTPUT, name, kind, text)
+
+
+def _serves(name: str, kind: str, text: str) -> Interface:
+    return Interface(Role.SERVICE, name, kind, text)
+
+
+_BEAMS_IN = _subscribes("sonar/raw", "SonarScanLine", "beams")
+_JOINTS_IN = _subscribes("joint_states", "sensor_msgs/JointState", "position of the tilt servo")
+_DRIVER_JOINTS_IN = _subscribes(
+    "joint_states", "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
+)
+_AS_POINTS = "also as PointCloud2 on `.../cloud`"
+
+DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second")
+"""What every node publishes."""
+
+NODES: Dict[str, NodeDescription] = {
+    "imagenex_852_driver": NodeDescription(
+        "Driver of the Imagenex 852 sonar (thesis 4.1.3, 4.5.1). See [the driver](imagenex_852_driver.md), also for "
+        "the log tools `play_852`, `record_852` and `convert_852`.",
+        (
+            _DRIVER_JOINTS_IN,
+            _publishes("sonar/raw", "SonarScanLine", "one beam for every valid reply"),
+        ),
+    ),
+    "imagenex_852_emulator": NodeDescription(
+        "An emulated Imagenex 852 on a pseudo-terminal, with faults at random or on request. "
+        "See [the emulated head](imagenex_852_driver.md#the-emulated-head).",
+        (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
+    ),
+    "sonar_to_cloud": NodeDescription(
+        "Assembles beams into scans (thesis 6.5.2). A beam waits until tf can place it at its own stamp. "
+        "See [sonar_processing](sonar_processing.md#sonar_to_cloud).",
+        (
+            _BEAMS_IN,
+            _subscribes(
+                "cmd_vel",
+                "geometry_msgs/Twist, TwistStamped or nav_msgs/Odometry",
+                "velocity of the vehicle; `velocity_topic` sets the name, `velocity_type` the type",
+            ),
+            _publishes("sonar/scan/sonarCloud", "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
+            _publishes("sonar/scan/laserCloud", "sensor_msgs/PointCloud2", "scans of the LASER modes"),
+            _publishes("sonar/scan/laserScan", "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
+            _publishes(
+                "sonar/scan/polar",
+                "StampedIntensityCloud",
+                f"every revolution with all its bins, organised; {_AS_POINTS}",
+            ),
+            _publishes("sonar/beam", "sensor_msgs/PointCloud2", "the newest beam"),
+        ),
+    ),
+    "thresholder": NodeDescription(
+        "Removes weak echoes (thesis 6.5.3). See [sonar_processing](sonar_processing.md#thresholder).",
+        (
+            _subscribes("sonar/scan/sonarCloud", "StampedIntensityCloud", "scans"),
+            _publishes("sonar/scan/thresholded", "StampedIntensityCloud", f"strong points; {_AS_POINTS}"),
+            _publishes("~threshold", "std_msgs/Float32", "the threshold of each cloud, for plotting"),
+        ),
+    ),
+    "outlier_remover": NodeDescription(
+        "Removes isolated points, exactly as PCL does (thesis 6.5.4). "
+        "See [sonar_processing](sonar_processing.md#outlier_remover).",
+        (
+            _subscribes("sonar/scan/thresholded", "StampedIntensityCloud", "strong points"),
+            _publishes("sonar/scan/cleaned", "StampedIntensityCloud", f"strong points without outliers; {_AS_POINTS}"),
+        ),
+    ),
+    "echo_extractor": NodeDescription(
+        "Finds the echoes of a whole revolution for matching, and removes the ring of floor echoes. "
+        "See [sonar_processing](sonar_processing.md#echo_extractor).",
+        (
+            _subscribes("sonar/scan/polar", "StampedIntensityCloud", "revolutions with all bins"),
+            _publishes("sonar/scan/echoes", "StampedIntensityCloud", f"echoes; {_AS_POINTS}"),
+            _publishes("~threshold", "std_msgs/Float32", "the smallest accepted echo height of each revolution"),
+        ),
+    ),
+    "sonar_image": NodeDescription(
+        "Draws the beams as an image, each as it arrives. Does nothing while nobody subscribes. "
+        "See [sonar_processing](sonar_processing.md#sonar_image).",
+        (
+            _BEAMS_IN,
+            _publishes("sonar/image", "sensor_msgs/Image", "mono8"),
+            _publishes("sonar/camera_info", "sensor_msgs/CameraInfo", "scale: `K[0]` is in pixels per metre"),
+        ),
+    ),
+    "line_detector": NodeDescription(
+        "Detects walls by RANSAC (thesis 6.5.5). See [shapes](shapes.md).",
+        (
+            _subscribes(
+                "sonar/scan/cleaned", "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"
+            ),
+            _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam"),
+            _publishes("sonar/scan/line/coefficients", "Walls", "all walls of a scan, the most certain first"),
+            _publishes("sonar/scan/line", "sensor_msgs/PointCloud2", "the inliers of all walls"),
+            _publishes("sonar/scan/line/markers", "visualization_msgs/MarkerArray", "the walls for rviz"),
+        ),
+    ),
+    "circle_detector": NodeDescription(
+        "Detects buoys and pipes by RANSAC (thesis 6.5.5). See [shapes](shapes.md).",
+        (
+            _subscribes(
+                "sonar/scan/thresholded", "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"
+            ),
+            _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam"),
+            _publishes("sonar/scan/circle/coefficients", "Circles", "all circles of a scan, the most certain first"),
+            _publishes("sonar/scan/circle", "sensor_msgs/PointCloud2", "the inliers of all circles"),
+            _publishes("sonar/scan/circle/markers", "visualization_msgs/MarkerArray", "the circles for rviz"),
+        ),
+    ),
+    "sonar_control": NodeDescription(
+        "Tilts the sonar through its range, one full scan per step. See [sonar_control](sonar_control.md).",
+        (
+            _JOINTS_IN,
+            _BEAMS_IN,
+            _publishes(
+                "sonar_servo/command",
+                "std_msgs/Float64",
+                "goal of the servo, rad; latched; the launch argument `command` sets the topic",
+            ),
+            _publishes("~sweeps", "std_msgs/UInt32", "number of completed sweeps; latched"),
+            _serves("~set_mode", "SetScanMode", "sets STATIC_MAPPING or HORIZONTAL"),
+        ),
+    ),
+    "mlsm_core": NodeDescription(
+        "Builds the map (thesis 6.2), matches every scan with it (6.3, 6.5.6) and publishes `map -> odom`. While "
+        "matching is on, an accepted scan is undistorted, inserted into the map, and corrects `map -> odom`; a "
+        "rejected scan changes nothing, and `/diagnostics` says why it was rejected. See [matching](matching.md).",
+        (
+            _subscribes("sonar/scan/cleaned", "StampedIntensityCloud", "points of the map that is shown"),
+            _subscribes(
+                "sonar/scan/echoes", "StampedIntensityCloud", "points to match, unless `match_input` is CLEANED"
+            ),
+            _subscribes("startMatching", "std_msgs/Bool", "switches matching on or off"),
+            _subscribes("tf", "", "`odom -> base_link`: dead reckoning"),
+            _publishes("MLSM/Markers", "visualization_msgs/MarkerArray", "every block at its true size; latched"),
+            _publishes(
+                "MLSM/cloud",
+                "sensor_msgs/PointCloud2",
+                "mean, height, depth and number of points of every block; latched",
+            ),
+            _publishes(
+                "MLSM/pose",
+                "geometry_msgs/PoseWithCovarianceStamped",
+                "the fix of each matched scan, at the stamp of its newest beam",
+            ),
+            _publishes("MLSM/odometry", "nav_msgs/Odometry", "the fix with the velocity, for robot_localization"),
+            _publishes("MLSM/path", "nav_msgs/Path", "all fixes; latched"),
+            _publishes(
+                "tf", "", "`map -> odom` at `transform_rate`; it changes smoothly to a new fix within `blend_time`"
+            ),
+            _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scan"),
+            _serves("~save_map", "SaveMap", "writes `<save_folder>/<name>.ply`"),
+            _serves("~reset", "std_srvs/Trigger", "discards the map, the position in it and the path"),
+        ),
+    ),
+    "sonar_simulator": NodeDescription(
+        "Simulates the vehicle Charl-e with a scanning sonar on a tilt servo, in a world from a file (thesis 6.4). It "
+        "publishes `/clock`. The vehicle follows a script or `cmd_vel`; the odometry error is configurable. See "
+        "[the simulated vehicle](simulator_vehicle.md), also for `simulate_bag`, "
+        "and [the simulated sonar](simulation.md).",
+        (
+            _subscribes("cmd_vel", "geometry_msgs/Twist", "commands, if `drive` is CMD_VEL"),
+            _subscribes("sonar_servo/command", "std_msgs/Float64", "goal of the servo, rad, positive down"),
+            _publishes("sonar/raw", "SonarScanLine", "beams"),
+            _publishes("odom", "nav_msgs/Odometry", "dead reckoning with the configured errors; also as tf"),
+            _publishes("ground_truth", "nav_msgs/Odometry", "the true pose and velocity"),
+            _publishes(
+                "joint_states",
+                "sensor_msgs/JointState",
+                "position of the servo; robot_state_publisher makes tf `base_link -> sonar` of it",
+            ),
+            _publishes("velocity", "geometry_msgs/Twist", "velocity as the odometry measures it"),
+            _publishes("cmd_vel", "geometry_msgs/Twist", "the same, if `drive` is SCRIPT"),
+            _publishes("/clock", "rosgraph_msgs/Clock", "simulated time"),
+            _publishes("~world", "visualization_msgs/Marker", "triangles of the world; latched"),
+            _publishes("~progress", "std_msgs/Float32", "completed share of the script, 0 to 1; latched"),
+        ),
+    ),
+    "gazebo_sonar": NodeDescription(
+        "Makes sonar beams from the output of Gazebo's ray sensor plugins, with the same echo models and parameter "
+        "groups as `sonar_simulator`; no plugin has to be built. See [a sonar in Gazebo](gazebo.md).",
+        (
+            _subscribes("sonar/rays", "sensor_msgs/LaserScan, PointCloud or PointCloud2", "rays of the sensor plugin"),
+            _DRIVER_JOINTS_IN,
+            _publishes("sonar/raw", "SonarScanLine", "beams"),
+        ),
+    ),
+}
+
+_PROCESSING = ("sonar_to_cloud", "thresholder", "outlier_remover", "echo_extractor", "sonar_image")
+
+HOSTS: Dict[str, HostDescription] = {
+    "sonar_processing": HostDescription(
+        "Turns beams into clean clouds, with all stages in one process: clouds are handed on without being copied, and "
+        "a topic is serialised only while somebody subscribes to it. See [sonar_processing](sonar_processing.md).",
+        _PROCESSING,
+    ),
+    "mapping": HostDescription(
+        "Turns beams into a map, with all stages in one process: clouds are handed on without being copied, and "
+        "a topic is serialised only while somebody subscribes to it. See [sonar_processing](sonar_processing.md) "
+        "and [matching](matching.md).",
+        (*_PROCESSING, "mlsm_core"),
+    ),
+}

@@ -1,0 +1,172 @@
+"""tf as one stage knows it: the only place that talks to tf2."""
+
+import math
+import threading
+import time
+from collections import deque
+from typing import Callable, Deque, Dict, Iterator, Optional, Tuple
+
+import genpy
+import numpy as np
+import rospy
+import tf2_ros
+from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from tf2_msgs.msg import TFMessage
+
+from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.headers import DAY, check_frame, check_stamp
+from node_support.health import Health
+from node_support.ros.conversions import matrix_from_message
+from node_support.ros.node import guarded
+
+JUMP_BACK = 1.0
+"""Stamps that go back by more than this [s] mean that time jumped; messages overtake each other by less."""
+
+_KIND = "transforms refused"
+_QUEUE_SIZE = 1000  # some seconds of a busy /tf, while a slow callback holds the others up
+_REMEMBERED = 64  # stamps: about a second of /tf, with each of its publishers among them
+_MOST_FRAMES = 1000  # tf2 never forgets a frame; no vehicle has as many
+_ROUNDING = 1e-6  # s: more than a float64 loses of the seconds since 1970
+_SQUARED_NORM_ERROR = 0.01  # tf2 refuses quaternions that are farther from a unit, and tells of each on stderr
+
+
+class TfBuffer:
+    """Remembers transforms, answers at stamps and waits for transforms to come.
+
+    Transforms that tf2 cannot take are refused and counted. When the stamps of a frame go back by more than
+    `JUMP_BACK`, as when a bag loops, all transforms that change are forgotten.
+    """
+
+    def __init__(
+        self, health: Health, cache: float = 10.0, tolerance: float = DAY, on_news: Callable[[], None] = lambda: None
+    ) -> None:
+        """`cache`: how long transforms are remembered, s. `tolerance`: stamp_tolerance, s. `on_news`: called with each
+        message of tf.
+        """
+        self._health = health
+        self._tolerance = tolerance
+        self._on_news = on_news
+        self._buffer = tf2_ros.BufferCore(genpy.Duration.from_sec(cache))
+        self._condition = threading.Condition()
+        self._recent_ns: Deque[int] = deque(maxlen=_REMEMBERED)
+        self._newest_ns: Dict[str, int] = {}
+        for topic, add in ((topics.TRANSFORMS, self._add), (topics.STATIC_TRANSFORMS, self._add_static)):
+            rospy.Subscriber(topic, TFMessage, guarded(health, self._taker(add)), queue_size=_QUEUE_SIZE)
+
+    def check_stamp(self, stamp_ns: int) -> None:
+        """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
+        check_stamp(stamp_ns, self._references_ns(), self._tolerance)
+
+    def obstacle(self, target: str, source: str, stamp_ns: int) -> str:
+        """Return why `source` cannot be placed in `target` at a stamp [ns]; empty when it can."""
+        check_stamp(stamp_ns)
+        can, reason = self._buffer.can_transform_core(target, source, _time(stamp_ns))
+        return "" if can else reason or "unknown to tf"
+
+    def matrix(self, target: str, source: str, stamp_ns: int) -> np.ndarray:
+        """Return (4, 4) T_target_source at a stamp [ns]; raises RefusedInput when tf does not know it."""
+        check_stamp(stamp_ns)
+        return self._looked_up(target, source, _time(stamp_ns))[1]
+
+    def newest(self, target: str, source: str) -> Optional[Tuple[int, np.ndarray]]:
+        """Return the newest stamp [ns] and (4, 4) T_target_source; None when tf knows none.
+
+        The stamp is 0 where nothing between the frames changes.
+        """
+        try:
+            return self._looked_up(target, source, genpy.Time(0))
+        except RefusedInput:
+            return None
+
+    def wait_for(self, target: str, source: str, stamp_ns: int, patience: float) -> str:
+        """Wait up to `patience` seconds of wall time until tf knows a transform; return what is in the way, or ""."""
+        deadline = time.monotonic() + patience
+        with self._condition:
+            while True:
+                obstacle = self.obstacle(target, source, stamp_ns)
+                left = deadline - time.monotonic()
+                if not obstacle or left <= 0.0 or rospy.core.is_shutdown_requested():
+                    return obstacle
+                self._condition.wait(left)
+
+    def clear(self) -> None:
+        """Forget the transforms that change."""
+        with self._condition:
+            self._buffer.clear()
+            self._newest_ns.clear()
+
+    def _looked_up(self, target: str, source: str, stamp: genpy.Time) -> Tuple[int, np.ndarray]:
+        try:
+            found = self._buffer.lookup_transform_core(target, source, stamp)
+        except tf2_ros.TransformException as error:
+            raise RefusedInput("transforms missing", f"from {source} to {target}: {error}") from error
+        return found.header.stamp.to_nsec(), matrix_from_message(found.transform)
+
+    def _references_ns(self) -> Iterator[int]:
+        yield from list(self._recent_ns)
+        clock = rospy.get_rostime().to_nsec()
+        if clock:
+            yield clock
+
+    def _taker(self, add: Callable[[TransformStamped, str], None]) -> Callable[[TFMessage], None]:
+        def take(message: TFMessage) -> None:
+            publisher = message._connection_header.get("callerid", "unknown")
+            with self._condition:
+                for transform in message.transforms:
+                    try:
+                        add(transform, publisher)
+                    except RefusedInput as refused:
+                        self._health.problem(refused.kind, f"{publisher}: {refused}")
+                self._condition.notify_all()
+            self._on_news()
+
+        return take
+
+    def _add(self, transform: TransformStamped, publisher: str) -> None:
+        stamp_ns, child = transform.header.stamp.to_nsec(), transform.child_frame_id
+        check_stamp(stamp_ns)
+        references = list(self._references_ns()) if self._recent_ns else ()
+        self._recent_ns.append(stamp_ns)
+        check_stamp(stamp_ns, references, self._tolerance)
+        self._check(transform)
+        if stamp_ns < self._newest_ns.get(child, 0) - JUMP_BACK * 1e9:
+            self.clear()
+        self._buffer.set_transform(transform, publisher)
+        self._newest_ns[child] = max(stamp_ns, self._newest_ns.get(child, 0))
+
+    def _add_static(self, transform: TransformStamped, publisher: str) -> None:
+        self._check(transform)
+        # tf2 does not use the stamp, but reads it.
+        transform.header.stamp = genpy.Time(0)
+        self._buffer.set_transform_static(transform, publisher)
+        self._newest_ns.setdefault(transform.child_frame_id, 0)
+
+    def _check(self, transform: TransformStamped) -> None:
+        parent, child = transform.header.frame_id.lstrip("/"), transform.child_frame_id.lstrip("/")
+        for frame in (parent, child):
+            check_frame(frame, _KIND)
+        if parent == child:
+            raise RefusedInput(_KIND, f"{child!r} in itself")
+        if child not in self._newest_ns and len(self._newest_ns) >= _MOST_FRAMES:
+            raise RefusedInput(_KIND, f"{child!r} after {_MOST_FRAMES} other frames; check who publishes so many")
+        _check_pose(transform.transform.translation, transform.transform.rotation)
+
+
+def stamp_of(time: float) -> int:
+    """Return the stamp [ns] at which to ask for a time [s].
+
+    Seconds in a float are rounded; a microsecond earlier, tf's newest pose can be asked for at its own time.
+    """
+    return max(round((time - _ROUNDING) * 1e9), 1)
+
+
+def _check_pose(shift: Vector3, turn: Quaternion) -> None:
+    squared_norm = turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2
+    if not (math.isfinite(shift.x + shift.y + shift.z) and abs(squared_norm - 1.0) < _SQUARED_NORM_ERROR):
+        shown = f"translation {shift.x} {shift.y} {shift.z}, quaternion {turn.x} {turn.y} {turn.z} {turn.w}"
+        raise RefusedInput(_KIND, f"{shown}, must be finite and of length 1")
+
+
+def _time(stamp_ns: int) -> genpy.Time:
+    return genpy.Time(*divmod(stamp_ns, 10**9))

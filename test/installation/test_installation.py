@@ -1,0 +1,93 @@
+"""The package works from where `catkin_make install` put it, without the checkout and its development space."""
+
+import os
+import re
+import shutil
+import signal
+import socket
+import subprocess
+import threading
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+WORKSPACE = ROOT / "build/workspace"
+PACKAGE = "underwater_map_construction"
+RAYS = ["sonar.ray_rows=5", "sonar.ray_columns=2"]
+with socket.socket() as probe:
+    probe.bind(("localhost", 0))
+    PORT = probe.getsockname()[1]
+
+
+@pytest.fixture(scope="module")
+def prefix(tmp_path_factory):
+    """Return the folder of an installation that holds nothing of this checkout."""
+    staged, prefix = tmp_path_factory.mktemp("staged"), tmp_path_factory.mktemp("prefix") / "install"
+    make = ["make", "-C", str(WORKSPACE / "build"), "install"]
+    done = subprocess.run(make, env={**os.environ, "DESTDIR": str(staged)}, stdout=subprocess.PIPE, text=True)
+    assert done.returncode == 0, done.stdout
+    # The workspace of scripts/bootstrap consists of links, which make installs as links: copy what they point to.
+    shutil.copytree(str(staged / str(WORKSPACE / "install").lstrip("/")), str(prefix))
+    return prefix
+
+
+def _environment():
+    """Return what a new shell has, with the virtual environment that holds the ray caster."""
+    path = os.pathsep.join([str(ROOT / "build/venv/bin"), "/usr/bin", "/bin"])
+    master = f"http://localhost:{PORT}"
+    return {"HOME": os.environ.get("HOME", "/"), "PATH": path, "ROS_MASTER_URI": master, "OMP_NUM_THREADS": "1"}
+
+
+def _shell(prefix, command):
+    noetic = "[ ! -f /opt/ros/noetic/setup.bash ] || source /opt/ros/noetic/setup.bash; "
+    return ["bash", "-c", f'{noetic}source "{prefix}/setup.bash" && exec {command}']
+
+
+def _run(prefix, command):
+    done = subprocess.run(
+        _shell(prefix, command), env=_environment(), cwd=str(prefix), stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True, timeout=60,
+    )  # fmt: skip
+    assert done.returncode == 0, done.stdout
+    return done.stdout
+
+
+def test_the_package_is_found_in_the_installation(prefix):
+    assert _run(prefix, f"rospack find {PACKAGE}").strip() == str(prefix / "share" / PACKAGE)
+
+
+def test_modules_come_from_the_installation(prefix):
+    modules = "node_support, sonar_processing, mlsm_manager, sonar_simulator, imagenex_852_driver"
+    found = _run(prefix, f"python3 -c 'import {modules}; print([m.__file__ for m in ({modules})])'")
+    assert found.count(str(prefix)) == 5
+
+
+def test_a_simulated_bag_becomes_a_map(prefix, tmp_path):
+    script = tmp_path / "script.yaml"
+    script.write_text("moves: [{wait: 20}, {x: 2, seconds: 20}, {wait: 20}]")
+    sets = " ".join(f"--set {value}" for value in RAYS)
+    bag, out = tmp_path / "basin.bag", tmp_path / "map"
+    _run(prefix, f"rosrun {PACKAGE} simulate_bag --world basin --script {script} --out {bag} --quiet {sets}")
+    told = _run(prefix, f"rosrun {PACKAGE} map_bag {bag} --out {out} --no-calibrate")
+    assert "3 scans" in told
+    assert (out / "map.ply").stat().st_size > 10000
+
+
+def test_the_demo_maps_until_it_is_interrupted(prefix):
+    command = f"roslaunch -p {PORT} {PACKAGE} demo.launch rviz:=false real_time_factor:=20"
+    demo = subprocess.Popen(
+        _shell(prefix, command), env=_environment(), cwd=str(prefix), stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT, text=True,
+    )  # fmt: skip
+    output = []
+    reader = threading.Thread(target=lambda: output.extend(demo.stdout), daemon=True)
+    reader.start()
+    try:
+        listen = "timeout 40 rostopic echo -n 1 /MLSM/cloud/width"
+        told = _run(prefix, f"bash -c 'until rostopic list >/dev/null 2>&1; do sleep 0.2; done; {listen}'")
+        width = int(re.search(r"^\d+$", told, re.MULTILINE)[0])
+    finally:
+        demo.send_signal(signal.SIGINT)
+        demo.wait(timeout=20)
+    assert width > 100, "".join(output)

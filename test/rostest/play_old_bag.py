@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""play_bag.launch and map_bag map a bag of avora_msgs types as it is, without `rosbag fix`."""
+
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+import rospy
+import rostest
+from graph import TEST_DATA, Inbox, rows
+from old_bag import with_old_types
+from sensor_msgs.msg import PointCloud2
+
+PACKAGE = "underwater_map_construction"
+
+
+class PlayOldBag(unittest.TestCase):
+    """A recording of today under the names of 2015."""
+
+    def setUp(self) -> None:
+        """Write the bag into a folder of the test's own."""
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.folder = Path(folder.name)
+        self.bag = self.folder / "old.bag"
+        with_old_types(TEST_DATA / "basin.bag", self.bag)
+
+    def test_play_bag_maps_it(self) -> None:
+        """The definitions of the messages have stayed, and ROS connects publishers and subscribers by them."""
+        maps = Inbox("/MLSM/cloud", PointCloud2)
+        command = ["roslaunch", PACKAGE, "play_bag.launch", f"bag:={self.bag}", "rate:=20", "rviz:=false"]
+        player = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+        try:
+            found = maps.wait_for(lambda cloud: len(rows(cloud)) > 300, timeout=60.0)
+        finally:
+            player.terminate()
+            player.wait(timeout=20)
+        self.assertEqual(found.header.frame_id, "map")
+
+    def test_map_bag_maps_it(self) -> None:
+        """Without a master."""
+        command = ["rosrun", PACKAGE, "map_bag", str(self.bag), "--out", str(self.folder / "map"), "--no-calibrate"]
+        done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=60, check=True)
+        self.assertIn("10 scans, 9 matched", done.stdout)
+
+
+if __name__ == "__main__":
+    rospy.init_node("play_old_bag_test")
+    rostest.rosrun(PACKAGE, "play_old_bag", PlayOldBag, sys.argv)

@@ -1,0 +1,145 @@
+"""The one holder of tf, on tf2 itself. No ROS master is needed: messages are handed to its callbacks."""
+
+import math
+
+import numpy as np
+import pytest
+import rospy
+from geometry_msgs.msg import TransformStamped
+from tf2_msgs.msg import TFMessage
+
+from node_support.errors import RefusedInput
+from node_support.health import Health
+from node_support.ros.tf_buffer import TfBuffer
+
+SECOND = 10**9
+CLOCK = 1_700_000_000.0
+
+
+def transform(seconds, x=0.0, child="base_link", parent="odom", w=1.0):
+    message = TransformStamped(child_frame_id=child)
+    message.header.frame_id = parent
+    message.header.stamp = rospy.Time(*divmod(int(seconds * SECOND), SECOND))
+    message.transform.translation.x = x
+    message.transform.rotation.w = w
+    return message
+
+
+class Tf:
+    """A buffer, what it warns of, and a way to send it transforms."""
+
+    def __init__(self, monkeypatch):
+        self.topics = {}
+        monkeypatch.setattr(rospy, "Subscriber", lambda topic, _, take, **__: self.topics.update({topic: take}))
+        monkeypatch.setattr(rospy.rostime, "_rostime_initialized", True)
+        monkeypatch.setattr(rospy.rostime, "_rostime_current", rospy.Time(int(CLOCK)))
+        self.health = Health("test", lambda line: None)
+        self.buffer = TfBuffer(self.health)
+
+    def send(self, *transforms, topic="/tf"):
+        message = TFMessage(transforms=list(transforms))
+        message._connection_header = {"callerid": "/test"}
+        self.topics[topic](message)
+
+    def x(self, seconds, source="base_link"):
+        return self.buffer.matrix("odom", source, int(seconds * SECOND))[0, 3]
+
+    @property
+    def refused(self):
+        values = self.health.report().values
+        return int(values.get("transforms refused", 0)) + int(values.get("stamps refused", 0))
+
+
+@pytest.fixture
+def tf(monkeypatch):
+    return Tf(monkeypatch)
+
+
+def test_a_transform_is_interpolated_at_its_stamp(tf):
+    tf.send(transform(CLOCK, x=1.0), transform(CLOCK + 1.0, x=3.0))
+    assert tf.x(CLOCK + 0.5) == pytest.approx(2.0)
+    assert tf.refused == 0
+
+
+def test_what_tf_does_not_know_is_told_with_its_reason(tf):
+    tf.send(transform(CLOCK))
+    assert "nowhere" in tf.buffer.obstacle("odom", "nowhere", int(CLOCK * SECOND))
+    with pytest.raises(RefusedInput, match="nowhere"):
+        tf.x(CLOCK, source="nowhere")
+
+
+@pytest.mark.parametrize("seconds", [0.0, 2.0**31, 4294967295.9])
+def test_a_stamp_that_would_end_the_process_reaches_tf2_neither_as_question_nor_as_transform(tf, seconds):
+    tf.send(transform(CLOCK, x=1.0))
+    tf.send(transform(seconds))
+    assert tf.refused == 1
+    with pytest.raises(RefusedInput, match="must be above 0 and below"):
+        tf.x(seconds)
+    with pytest.raises(RefusedInput, match="must be above 0 and below"):
+        tf.buffer.check_stamp(int(seconds * SECOND))
+    assert tf.x(CLOCK) == 1.0
+
+
+def test_a_single_transform_of_another_year_is_refused(tf):
+    tf.send(transform(CLOCK, x=1.0), transform(CLOCK + 1e7), transform(CLOCK + 1.0, x=2.0))
+    assert tf.refused == 1
+    assert tf.x(CLOCK + 1.0) == 2.0
+
+
+def test_a_recording_of_another_year_is_believed_with_its_odometry(tf):
+    recorded = CLOCK - 3e8
+    with pytest.raises(RefusedInput, match="stamp_tolerance"):
+        tf.buffer.check_stamp(int(recorded * SECOND))
+    tf.send(transform(recorded), transform(recorded + 0.1))
+    tf.buffer.check_stamp(int(recorded * SECOND))
+    assert tf.refused == 0
+
+
+def test_a_jump_back_forgets_what_was_later(tf):
+    tf.send(transform(CLOCK + 100.0, x=5.0))
+    tf.send(transform(CLOCK, x=1.0), transform(CLOCK + 1.0, x=2.0))
+    assert tf.x(CLOCK + 1.0) == 2.0
+    assert tf.buffer.obstacle("odom", "base_link", int((CLOCK + 100.0) * SECOND))
+
+
+def test_a_transform_that_was_overtaken_forgets_nothing(tf):
+    tf.send(transform(CLOCK + 0.5, x=5.0), transform(CLOCK, x=1.0))
+    assert (tf.x(CLOCK + 0.5), tf.x(CLOCK)) == (5.0, 1.0)
+
+
+@pytest.mark.parametrize(
+    "bad",
+    [
+        transform(CLOCK, x=math.nan),
+        transform(CLOCK, x=math.inf),
+        transform(CLOCK, w=0.0),
+        transform(CLOCK, w=math.nan),
+        transform(CLOCK, child=""),
+        transform(CLOCK, child="odom"),
+        transform(CLOCK, child="base\0link"),
+        transform(CLOCK, parent=""),
+    ],
+)
+def test_a_transform_that_tf2_cannot_take_is_counted_and_the_next_of_its_message_is_taken(tf, bad):
+    tf.send(bad, transform(CLOCK, x=2.0))
+    assert tf.refused == 1
+    assert tf.x(CLOCK) == 2.0
+
+
+def test_a_static_transform_holds_at_any_time_whatever_its_stamp(tf):
+    tf.send(transform(4294967295.0, x=4.0, child="sonar"), topic="/tf_static")
+    assert tf.x(CLOCK, source="sonar") == 4.0
+    stamp_ns, T_odom_sonar = tf.buffer.newest("odom", "sonar")
+    assert stamp_ns == 0
+    assert np.allclose(T_odom_sonar[:3, 3], [4.0, 0.0, 0.0])
+
+
+def test_frames_without_end_do_not_fill_the_memory(tf):
+    tf.send(*(transform(CLOCK, child=f"frame{number}") for number in range(1001)))
+    assert tf.refused == 1
+
+
+def test_waiting_ends_with_what_is_in_the_way(tf):
+    assert "base_link" in tf.buffer.wait_for("odom", "base_link", int(CLOCK * SECOND), patience=0.01)
+    tf.send(transform(CLOCK))
+    assert tf.buffer.wait_for("odom", "base_link", int(CLOCK * SECOND), patience=60.0) == ""

@@ -1,0 +1,101 @@
+"""The documentation names only files, folders, headings and messages that exist."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = sorted((ROOT / "docs").glob("*.md"))
+PAGES = [ROOT / "README.md", ROOT / "migration" / "README.md", *DOCS]
+PAGES_BY_NAME = {path.relative_to(ROOT).as_posix(): path for path in PAGES}
+CODE_BLOCK = re.compile(r"^(?: {4}[^\n]*|```.*?^```)$", re.MULTILINE | re.DOTALL)
+LINK = re.compile(r"\]\(([^)\s]+)\)")
+HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+MOST_README_LINES = 250
+
+
+def _paths_in(text):
+    """Return what looks like a path from the top of the repository; placeholders such as <node> are left out."""
+    folders = "|".join(sorted(path.name for path in ROOT.iterdir() if path.is_dir() and path.name != "build"))
+    found = re.findall(rf"(?<![\w/.:$)~-])((?:{folders})/[\w./*-]*)(?![\w<])", text)
+    return {path.rstrip("./") for path in found}
+
+
+def _anchors(text):
+    """Return the anchors that GitHub makes of the headings."""
+    headings = [re.sub(r"[^\w\- ]", "", heading.lower()) for heading in HEADING.findall(CODE_BLOCK.sub("", text))]
+    return {heading.replace(" ", "-") for heading in headings}
+
+
+@pytest.mark.parametrize("page", PAGES_BY_NAME)
+def test_every_path_that_a_page_names_exists(page):
+    missing = [path for path in _paths_in(PAGES_BY_NAME[page].read_text()) if not list(ROOT.glob(path))]
+    assert missing == []
+
+
+@pytest.mark.parametrize("page", PAGES_BY_NAME)
+def test_every_link_of_a_page_leads_somewhere(page):
+    path = PAGES_BY_NAME[page]
+    broken = []
+    for link in LINK.findall(CODE_BLOCK.sub("", path.read_text())):
+        file, _, anchor = link.partition("#")
+        target = (path.parent / file).resolve() if file else path
+        if link.startswith(("http://", "https://")):
+            continue
+        if not target.exists() or (anchor and anchor not in _anchors(target.read_text())):
+            broken.append(link)
+    assert broken == []
+
+
+def test_the_readme_links_to_every_page():
+    linked = set(LINK.findall((ROOT / "README.md").read_text()))
+    assert {path.relative_to(ROOT).as_posix() for path in DOCS} - linked == set()
+
+
+def test_the_readme_stays_short():
+    assert len((ROOT / "README.md").read_text().splitlines()) <= MOST_README_LINES
+
+
+def test_every_picture_is_shown():
+    shown = {Path(link).name for path in PAGES for link in LINK.findall(path.read_text())}
+    assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} - shown == set()
+
+
+@pytest.mark.parametrize(
+    "folder",
+    sorted(
+        path.parent.relative_to(ROOT).as_posix()
+        for path in (ROOT / "src").glob("*/**/__init__.py")
+        if path.parent.parent != ROOT / "src"
+    ),
+)
+def test_the_architecture_page_describes_every_folder(folder):
+    package, name = folder.split("/")[1], folder.split("/")[-1]
+    tree = (ROOT / "docs" / "architecture.md").read_text().partition(f"src/{package}/")[2].partition("\n\n")[0]
+    assert f"{name}/ " in tree
+
+
+def test_the_architecture_page_names_only_what_stands_in_the_code():
+    files = [path for folder in ("src", "scripts", "test") for path in (ROOT / folder).rglob("*.py")]
+    code = "\n".join(path.read_text() for path in files)
+    # Words with a capital letter, and functions such as beam_from_message; the others are topics, parameters and tools.
+    page = (ROOT / "docs" / "architecture.md").read_text()
+    names = re.findall(r"`([A-Z]\w+)(?:\.(?!txt)\w+)?`", page) + re.findall(r"`(\w+_from_\w+)`", page)
+    assert [name for name in names if not re.search(rf"\b{name}\b", code)] == []
+
+
+@pytest.mark.parametrize("page", PAGES_BY_NAME)
+def test_every_message_that_a_page_explains_stands_in_the_code(page):
+    code = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
+    parts = [part.strip() for message in _explained_messages(PAGES_BY_NAME[page].read_text()) for part in message]
+    assert [part for part in parts if part not in code] == []
+
+
+def _explained_messages(text):
+    """Return the parts, around "...", of the messages in the first column of tables that explain messages."""
+    tables = re.findall(
+        r"^\| (?:message|warning|value|status|you see) \|.*?(?=^[^|]|\Z)", text, re.MULTILINE | re.DOTALL
+    )
+    cells = [row.split(" | ")[0] for table in tables for row in table.splitlines()[2:]]
+    return [message.split("...") for cell in cells for message in re.findall(r"[`\"]([^`\"]+)[`\"]", cell)]

@@ -1,0 +1,74 @@
+"""Every node tells with --help what it is, without a ROS master."""
+
+import dataclasses
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from document import LIVE_NODES, START_UP_NODES
+
+from node_support.node_help import WIDTH
+from node_support.node_table import HOSTS, NODES
+from sonar_simulator.simulation.simulation_setup import GROUPS
+
+ROOT = Path(__file__).resolve().parents[2]
+EXECUTABLES = sorted(path.name for path in (ROOT / "nodes").iterdir())
+PARAMETERS = {**{name: node.parameters for name, node in LIVE_NODES.items()}, **START_UP_NODES}
+
+
+def _help(node, *arguments):
+    environment = {**os.environ, "ROS_MASTER_URI": "http://localhost:1"}
+    command = [sys.executable, str(ROOT / "nodes" / node), *arguments]
+    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30)
+
+
+@pytest.fixture(scope="module", params=EXECUTABLES)
+def answer(request):
+    """Return the name of a node and what it prints when it is asked for help and there is no master."""
+    return request.param, _help(request.param, "--help")
+
+
+def test_help_needs_no_master_and_ends_well(answer):
+    _, done = answer
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("usage: ")
+
+
+def test_help_names_every_topic_and_service_of_the_table(answer):
+    node, done = answer
+    expected = [one.name for one in NODES[node].interfaces] if node in NODES else []
+    assert [name for name in expected if f"\n  {name}" not in done.stdout] == []
+
+
+def test_help_names_every_parameter(answer):
+    node, done = answer
+    fields = dataclasses.fields(PARAMETERS[node]) if node in PARAMETERS else []
+    assert [field.name for field in fields if f"\n  {field.name}" not in done.stdout] == []
+
+
+def test_help_fits_a_narrow_terminal(answer):
+    node, done = answer
+    told = [line for line in done.stdout.splitlines() if not line.lstrip().startswith(("usage:", "or:", "rosrun"))]
+    assert [line for line in told if len(line) > WIDTH and node in PARAMETERS] == []
+
+
+def test_help_names_the_parameters_in_groups():
+    told = _help("sonar_simulator", "--help").stdout
+    fields = [f"{name}/{field.name}" for name, group in GROUPS.items() for field in dataclasses.fields(group)]
+    assert [field for field in fields if f"\n  {field}\n" not in told] == []
+
+
+def test_a_host_names_the_nodes_that_it_hosts():
+    told = _help("mapping", "-h").stdout
+    assert [name for name in HOSTS["mapping"].hosted if f"{name} --help" not in told] == []
+
+
+def test_the_arguments_that_roslaunch_adds_do_not_hide_the_question():
+    assert _help("thresholder", "__name:=other", "--help").returncode == 0
+
+
+def test_every_node_is_described():
+    programs = {"convert_852", "map_bag", "map_tool", "play_852", "record_852", "simulate_bag"}
+    assert {*NODES, *HOSTS, *programs} == set(EXECUTABLES)
