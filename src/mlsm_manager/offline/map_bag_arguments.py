@@ -35,6 +35,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     parser.add_argument("--beams", default=f"/{topics.BEAMS}", help="topic of the beams (default: %(default)s)")
     parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
     parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: %(default)s)")
+    parser.add_argument("--ned", action="store_true", help="the odometry counts x north, y east, z down")
     options = parser.parse_args(arguments)
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(_pair(text, parser) for text in options.set)

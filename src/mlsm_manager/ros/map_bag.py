@@ -5,6 +5,7 @@ import time
 from argparse import Namespace
 from typing import Any, Dict, List, Optional
 
+import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
@@ -12,6 +13,7 @@ from mlsm_manager.offline.calibration import calibrated
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
+from mlsm_manager.offline.north_east_down import suspicions
 from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
@@ -39,11 +41,13 @@ def run_map_bag() -> None:
 def map_bag(options: Namespace) -> Dict[str, Any]:
     """Map the bag and write the files; return what summary.json holds. Raises RecordingError and OSError."""
     start = time.monotonic()
-    names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
+    names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth, options.ned)
     recording = read_recording(options.bag, names)
     options.out.mkdir(parents=True, exist_ok=True)
     parameters = _fitted_to_echoes(recording, options)
-    parameters = _calibrated(_scans(recording, parameters, options), parameters, options)
+    scans = _scans(recording, parameters, options)
+    _warn_of_z_down(recording, scans, options)
+    parameters = _calibrated(scans, parameters, options)
     recording = recording.corrected(parameters.part(BeamCorrection))
     replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
     run = _run(replayed, _refined(recording, replayed, parameters) if options.refine else None)
@@ -61,6 +65,13 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     }
     write_summary(options.out, summary)
     return summary
+
+
+def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
+    heights = np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])
+    advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
+    for sign in suspicions(heights, scans):
+        print(f"map_bag: {options.bag}: {sign}; {advice}", file=sys.stderr)
 
 
 def _fitted_to_echoes(recording: Recording, options: Namespace) -> ReplayParameters:
