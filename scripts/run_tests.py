@@ -35,7 +35,7 @@ class Step:
 def steps() -> List[Step]:
     """Return all steps, quick ones first."""
     unit_report, recordings_report = RESULTS / "unit.xml", RESULTS / "recordings.xml"
-    installation_report = RESULTS / "installation.xml"
+    installation_report, stopping_report = RESULTS / "installation.xml", RESULTS / "stopping.xml"
     pytest = ["python3", "-m", "pytest"]
     found = [
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
@@ -44,6 +44,7 @@ def steps() -> List[Step]:
         Step("unit tests", [*pytest, "-n", "auto", "--dist", "loadfile", f"--junitxml={unit_report}"], unit_report),
         Step("recordings", [*pytest, "test/recordings", f"--junitxml={recordings_report}"], recordings_report),
         Step("installation", [*pytest, "test/installation", f"--junitxml={installation_report}"], installation_report),
+        Step("stopping", [*pytest, "test/stopping", f"--junitxml={stopping_report}"], stopping_report),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):
         folder = RESULTS / test.stem
