@@ -19,7 +19,7 @@ from node_support.ros.conversions import matrix_from_message
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.ros.conversions import beam_from_message
-from sonar_processing.scans.moving_state import Motion
+from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 _FOR_EVER = 1_000_000_000
@@ -106,7 +106,7 @@ def _track(buffer: tf2_py.BufferCore, stamps: np.ndarray, path: Path, names: Bag
 
 
 def _beams(bag: rosbag.Bag, buffer: tf2_py.BufferCore, path: Path, names: BagNames) -> Tuple[List[PlacedBeam], int]:
-    motion, parameters = Motion(), SonarToCloudParameters()
+    motion, parameters = MovingState(), SonarToCloudParameters()
     velocities = iter(_messages(bag, _VELOCITY_TOPIC))
     velocity = next(velocities, None)
     placed, unplaced, reason = [], 0, ""
@@ -134,7 +134,7 @@ def _beam(message: Any) -> Optional[Beam]:
         return None
 
 
-def _take_velocity(motion: Motion, message: Any) -> None:
+def _take_velocity(motion: MovingState, message: Any) -> None:
     twist = message if isinstance(message, Twist) or hasattr(message, "linear") else message.twist
     linear, angular = twist.linear, twist.angular
     with suppress(RefusedInput):
