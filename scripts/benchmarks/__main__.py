@@ -5,6 +5,7 @@ from functools import partial
 from typing import Callable, Dict, List
 
 from benchmarks import (
+    large_map_figures,
     map_figures,
     marina_figures,
     matching_figures,
@@ -12,12 +13,14 @@ from benchmarks import (
     shape_figures,
     simulation_figures,
     survey_figures,
+    tour_figures,
     vehicle_figures,
 )
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map": map_figures.rows,
+    "large-map": large_map_figures.rows,
     "marina": marina_figures.rows,
     "matching": matching_figures.rows,
     "processing": processing_figures.rows,
@@ -25,6 +28,7 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "vehicle": vehicle_figures.rows,
     "shapes": shape_figures.rows,
     "survey": survey_figures.rows,
+    "tours": tour_figures.rows,
 }
 
 

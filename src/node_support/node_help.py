@@ -34,7 +34,7 @@ def answer_help(
         sys.exit(0)
 
 
-def answer_host_help(host: str) -> None:
+def answer_pipeline_help(host: str) -> None:
     """Do as `answer_help` for a node that hosts several nodes in one process."""
     if _is_asked():
         print(host_help(host))

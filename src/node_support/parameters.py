@@ -1,4 +1,4 @@
-"""Parameters as frozen dataclasses that validate themselves, the one place where a value is judged.
+"""Parameters as frozen dataclasses that validate themselves; no value is checked anywhere else.
 
 A stage declares its parameters once::
 
@@ -12,7 +12,7 @@ From that declaration come the start-up check, the refusal at run time and the d
 import dataclasses
 import math
 from enum import Enum
-from typing import Any, Dict, Mapping, Optional, Tuple, Type, TypeVar
+from typing import Any, Callable, Dict, Mapping, Optional, Tuple, Type, TypeVar
 
 _METADATA_KEY = "parameter"
 Self = TypeVar("Self", bound="ParameterSet")
@@ -102,7 +102,7 @@ class ParameterSet:
 
     @classmethod
     def from_group(cls: Type[Self], name: str, values: Any) -> Self:
-        """Build as `from_mapping` does from the keys of one group; what is wrong is told with the group's name."""
+        """Build as `from_mapping` does from the keys of one group; errors name the group."""
         if not isinstance(values, Mapping):
             raise ParameterError(f"{name} = {values!r}: must be keys and values")
         try:
@@ -123,6 +123,32 @@ class ParameterSet:
     def tunable_fields(cls) -> Tuple[dataclasses.Field, ...]:
         """Return the fields that may change while the node runs."""
         return tuple(field for field in dataclasses.fields(cls) if describe(field).tunable)
+
+
+def with_defaults(**defaults: Any) -> Callable[[type], type]:
+    """Give a `ParameterSet` other defaults for parameters that it inherits; texts, units and ranges stay::
+
+        @dataclass(frozen=True)
+        @with_defaults(radius=2.0)
+        class WideRadiusParameters(RadiusParameters):
+            ...
+
+    Raises ParameterError for a name that is not inherited or a default that is not allowed.
+    """
+
+    def changed(derived: type) -> type:
+        inherited = {field.name: field for base in derived.__bases__ for field in dataclasses.fields(base)}
+        annotations = dict(vars(derived).get("__annotations__", {}))
+        for name, value in defaults.items():
+            if name not in inherited:
+                raise ParameterError(f"{name} = {value!r}: {derived.__name__} inherits no such parameter")
+            field = inherited[name]
+            annotations[name] = field.type
+            setattr(derived, name, dataclasses.field(default=_validated(field, value), metadata=field.metadata))
+        derived.__annotations__ = annotations
+        return derived
+
+    return changed
 
 
 def _validated(field: dataclasses.Field, value: Any) -> Any:

@@ -1,4 +1,4 @@
-"""The text of the default yaml of nodes whose parameters come in groups: own keys, then one group for each part."""
+"""Writes the default yaml of nodes whose parameters are in groups: the node's own keys, then one group per part."""
 
 from typing import Dict, Type
 
@@ -11,17 +11,17 @@ from sonar_simulator.simulation.simulation import SimulatorParameters
 
 
 def simulator_yaml() -> str:
-    """Return the commented defaults of the simulator, all read at start-up only."""
+    """Return the commented defaults of the simulator; all are read only at start-up."""
     return _text("sonar_simulator", SimulatorParameters, simulation_setup.GROUPS)
 
 
 def gazebo_sonar_yaml() -> str:
-    """Return the commented defaults of gazebo_sonar, all read at start-up only."""
+    """Return the commented defaults of gazebo_sonar; all are read only at start-up."""
     return _text("gazebo_sonar", GazeboSonarParameters, gazebo_parameters.GROUPS)
 
 
 def _text(node: str, own: Type[ParameterSet], groups: Dict[str, Type[ParameterSet]]) -> str:
-    lines = [f"# Defaults of {node}, read when it starts.", *yaml_keys(own, live=False)]
+    lines = [f"# Defaults of {node}, read only at start-up.", *yaml_keys(own, live=False)]
     for name, parameters in groups.items():
         lines += ["", f"{name}:"]
         lines += [f"  {line}" if line else "" for line in yaml_keys(parameters, live=False)[1:]]

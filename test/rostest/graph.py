@@ -98,6 +98,11 @@ class Diagnostics:
             known = self._values.get(stage)
         raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {known}")
 
+    def values(self, stage: str) -> Dict[str, str]:
+        """Return what is known of a stage now."""
+        with self._condition:
+            return dict(self._values.get(stage, {}))
+
     def _number(self, stage: str, counter: str) -> int:
         return int(self._values.get(stage, {}).get(counter, -1))
 

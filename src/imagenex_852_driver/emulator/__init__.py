@@ -1,4 +1,4 @@
-"""An emulated Imagenex 852: a head without hardware, for the desk and for tests of the bytes."""
+"""An emulated Imagenex 852, for use and tests without hardware."""
 
 from imagenex_852_driver.emulator.echo_source import EchoSource, FixedPattern, PingRequest
 from imagenex_852_driver.emulator.faults import Fault, FaultInjector, FaultRates

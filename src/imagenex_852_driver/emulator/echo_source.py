@@ -22,7 +22,7 @@ class PingRequest:
 
 
 class EchoSource(ABC):
-    """Answers pings with echo strengths; the simulator's ray caster is one."""
+    """Answers pings with echo strengths, as the simulator's ray caster does."""
 
     @abstractmethod
     def echoes(self, ping: PingRequest) -> bytes:
@@ -30,18 +30,18 @@ class EchoSource(ABC):
 
 
 class FixedPattern(EchoSource):
-    """The four walls of a square basin with the head in its middle, each a blurred peak over weak ringing."""
+    """The four walls of a square basin with the head at its centre: each wall is a blurred peak above weak ringing."""
 
     WALL_BLUR = 0.1
     RINGING_REACH = 0.3
     FULL_STRENGTH_DB = 20.0
 
     def __init__(self, wall_distance: float = 4.0) -> None:
-        """`wall_distance` is the shortest way from the head to each wall, in metres."""
+        """`wall_distance` is the shortest distance from the head to each wall, in metres."""
         self._wall_distance = wall_distance
 
     def echoes(self, ping: PingRequest) -> bytes:
-        """Return the echoes of the wall in the direction of the ping; the gain scales them."""
+        """Return the echoes of the wall in the direction of the ping, scaled by the gain."""
         wall = self._wall_distance / max(abs(math.cos(ping.angle)), abs(math.sin(ping.angle)))
         strength = 127 * 10 ** ((ping.command.start_gain_db - self.FULL_STRENGTH_DB) / 20)
         resolution = ping.command.max_range / ping.bin_count

@@ -1,4 +1,4 @@
-"""Faults of the emulated head and its cable, by rate or to order."""
+"""Faults of the emulated head and its cable, at random or on request."""
 
 import random
 from collections import Counter, deque
@@ -26,7 +26,7 @@ class Fault(Enum):
 
 @dataclass(frozen=True)
 class FaultRates(ParameterSet):
-    """How often each fault happens, as shares of the commands, and how long the lasting ones last."""
+    """How often each fault happens, as a share of the commands, and how long silence and absence last."""
 
     dropped: float = parameter(0.0, "share of replies lost", low=0.0, high=1.0)
     garbled: float = parameter(0.0, "share of replies with broken bytes", low=0.0, high=1.0)
@@ -35,20 +35,20 @@ class FaultRates(ParameterSet):
     doubled: float = parameter(0.0, "share of replies sent twice", low=0.0, high=1.0)
     overrun: float = parameter(0.0, "share of replies that report a character overrun", low=0.0, high=1.0)
     silence: float = parameter(0.0, "share of commands after which the head falls silent", low=0.0, high=1.0)
-    disappearance: float = parameter(0.0, "share of commands after which the port goes away", low=0.0, high=1.0)
+    disappearance: float = parameter(0.0, "share of commands after which the port disappears", low=0.0, high=1.0)
     lateness: float = parameter(0.4, "delay of a late reply", unit="s", low=0.0, high=60.0)
     silence_duration: float = parameter(2.0, "length of a silence", unit="s", low=0.0, high=600.0)
     absence_duration: float = parameter(2.0, "time until the port is back", unit="s", low=0.0, high=600.0)
 
     def check(self) -> None:
-        """Raise ParameterError when the shares add up to more than all commands."""
+        """Raise ParameterError when the shares add up to more than 1."""
         total = sum(self.rate(fault) for fault in Fault)
         if total > 1.0 + 1e-9:
             shares = ", ".join(f"{field.name} = {getattr(self, field.name)}" for field in fields(self)[:8])
             raise ParameterError(f"{shares}: more than 1 in all")
 
     def rate(self, fault: Fault) -> float:
-        """Return the share of one fault; NONE has what is left and counts as 0 here."""
+        """Return the share of one fault; 0 for NONE, which gets the remaining share."""
         return 0.0 if fault is Fault.NONE else getattr(self, fault.value)
 
 
@@ -62,7 +62,7 @@ class FaultInjector:
         self._random = random.Random(seed)
 
     def order(self, fault: Fault, count: int = 1) -> None:
-        """Let the next `count` commands that nothing else is ordered for meet `fault`."""
+        """Apply `fault` to the next `count` commands for which no other fault has been ordered."""
         self._ordered.extend([fault] * count)
 
     def next(self) -> Fault:
@@ -72,10 +72,10 @@ class FaultInjector:
         return fault
 
     def garble(self, frame: bytes) -> bytes:
-        """Return the frame with a tenth of its bytes changed, one of them where it shows.
+        """Return the frame with a tenth of its bytes changed, one of them where a driver can detect it.
 
-        The protocol has no checksum: no driver can tell a garbled echo from a true one, so the header or the
-        terminator is always hit.
+        The protocol has no checksum, so no driver can tell a garbled echo from a true one: the header or the
+        terminator is always changed.
         """
         result = bytearray(frame)
         for index in self._random.sample(range(HEADER_LENGTH, len(frame)), len(frame) // 10):
@@ -85,7 +85,7 @@ class FaultInjector:
         return bytes(result)
 
     def truncate(self, frame: bytes) -> bytes:
-        """Return the beginning of the frame, at least one byte, never all of it."""
+        """Return the beginning of the frame: at least one byte, but not the whole frame."""
         return frame[: self._random.randint(1, len(frame) - 1)]
 
     def _drawn(self) -> Fault:

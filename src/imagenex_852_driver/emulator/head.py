@@ -1,4 +1,4 @@
-"""The emulated head: a state machine from commands to replies with the delays of sound and wire."""
+"""The emulated head: a state machine from commands to replies with the delays of sound and line."""
 
 from typing import List, NamedTuple, Optional
 
@@ -11,8 +11,8 @@ from imagenex_852_driver.protocol.angles import head_angle
 from imagenex_852_driver.protocol.errors import SONAR_HEAD_ID
 from imagenex_852_driver.protocol.reply import OVERRUN, SWITCHES_ACCEPTED
 
-_SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (maker's specification)
-# A serial adapter hands on the bytes of a reply in pieces of about this size.
+_SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (manufacturer's specification)
+# A serial adapter passes on the bytes of a reply in pieces of about this size.
 _PIECE = 64
 
 
@@ -24,11 +24,10 @@ class Transmission(NamedTuple):
 
 
 class EmulatedHead:
-    """An Imagenex 852 in software: bytes and times in, bytes and times out; no clock and no line of its own.
+    """An Imagenex 852 in software: bytes and times in, bytes and times out, without its own clock or port.
 
-    It answers commands for its identification only, with the range, the points, the gain and the delay that
-    were commanded, and turns as commanded. While `absent_until` lies ahead, whoever serves it takes the port
-    away.
+    It answers only commands that carry its identification, with the commanded range, number of points, gain and
+    delay, and turns as commanded. Until the time `absent_until`, whoever serves it removes the port.
     """
 
     def __init__(
@@ -48,12 +47,12 @@ class EmulatedHead:
         self.reboot()
 
     def reboot(self) -> None:
-        """Forget half a command, the position and the direction, as after a loss of power."""
+        """Discard an unfinished command, the position and the direction, as after a loss of power."""
         self._reader = CommandReader()
         self._motion = HeadRotation()
 
     def receive(self, data: bytes, time: float) -> List[Transmission]:
-        """Take bytes that arrived at `time`; return what the head sends in answer, in order of time."""
+        """Take bytes that arrived at `time`; return what the head sends in reply, in order of time."""
         answers = []
         for command in self._reader.feed(data):
             if command.head_id == self._head_id:
@@ -73,7 +72,7 @@ class EmulatedHead:
             return []
         frame = self._ping(command, time, overrun=fault is Fault.OVERRUN).encode()
         lateness = rates.lateness if fault is Fault.LATE else 0.0
-        # The caller gets a command when its last byte has come.
+        # A command is complete when its last byte has arrived.
         begin = time + self._timing.reply_begins(command) - self._timing.ping_leaves() + lateness
         return self._paced(self._spoilt(fault, frame), begin)
 

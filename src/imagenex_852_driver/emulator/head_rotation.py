@@ -1,16 +1,16 @@
-"""How the emulated transducer turns: sectors, full turns, step size and direction."""
+"""How the emulated transducer turns: sectors, full revolutions, step size and direction."""
 
 from imagenex_852_driver.protocol import SwitchCommand
 from imagenex_852_driver.protocol.angles import AHEAD
 
-_TURN = 2400  # Head positions in a full turn, 0.15 deg each (maker's specification)
+_TURN = 2400  # Head positions in a full turn, 0.15 deg each (manufacturer's specification)
 
 
 class HeadRotation:
     """The transducer's position, in the head's units (0.15 deg, clockwise, 1400 ahead).
 
-    In a sector the head goes to and fro, with 360 deg it goes round for ever. A change of the command's
-    reverse bit turns it around. A head that stands outside of the sector steps towards it.
+    In a sector the head goes back and forth; with 360 deg it turns without end. A change of the command's
+    reverse bit reverses it. A head that is outside the sector steps towards it.
     """
 
     def __init__(self) -> None:
@@ -19,7 +19,7 @@ class HeadRotation:
         self._reverse = False
 
     def obey(self, command: SwitchCommand) -> None:
-        """Take the direction of a command, before the ping."""
+        """Adopt the direction of a command, before the ping."""
         if command.reverse != self._reverse:
             self._reverse = command.reverse
             self.clockwise = not self.clockwise

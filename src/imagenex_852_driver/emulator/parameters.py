@@ -30,12 +30,14 @@ class EmulatorParameters(FaultRates):
     echo_source: EchoSourceKind = parameter(
         EchoSourceKind.PATTERN, "four walls of a square basin, or the simulator's ray caster", tunable=False
     )
-    wall_distance: float = parameter(4.0, "pattern: way to each wall", unit="m", low=0.1, high=100.0, tunable=False)
+    wall_distance: float = parameter(
+        4.0, "pattern: distance to each wall", unit="m", low=0.1, high=100.0, tunable=False
+    )
     world_file: str = parameter("worlds/basin.sdf", "world: SDF file; relative to the package's folder", tunable=False)
-    x: float = parameter(0.0, "world: where the head is", unit="m", tunable=False)
-    y: float = parameter(0.0, "world: where the head is", unit="m", tunable=False)
-    z: float = parameter(-2.0, "world: where the head is", unit="m", tunable=False)
-    yaw_deg: float = parameter(0.0, "world: where the head looks, counter-clockwise", unit="deg", tunable=False)
+    x: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
+    y: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
+    z: float = parameter(-2.0, "world: position of the head", unit="m", tunable=False)
+    yaw_deg: float = parameter(0.0, "world: heading of the head, counter-clockwise", unit="deg", tunable=False)
 
     def timing(self) -> LineTiming:
         """Return the timing of pings on this line."""

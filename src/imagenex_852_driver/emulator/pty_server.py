@@ -1,4 +1,4 @@
-"""Serves an emulated head on a pseudo-terminal, at a path that stays the same."""
+"""Serves an emulated head on a pseudo-terminal, always at the same path."""
 
 import contextlib
 import os
@@ -16,10 +16,10 @@ _PATIENCE = 1.0  # s: a thread that has not changed its state by now has failed
 
 
 class PtyServer:
-    """A serial port that is not there: `link` is a symbolic link to the terminal the driver opens.
+    """A serial port without hardware: `link` is a symbolic link to the terminal that the driver opens.
 
-    Use it as a context manager, which serves from a thread, or call `serve` from one's own. While the port
-    has disappeared there is no link, and whoever had it open sees the line hang up.
+    Use it as a context manager, which serves from a new thread, or call `serve` from your own thread. While the
+    port has disappeared there is no link, and whoever has it open sees the line hang up.
     """
 
     def __init__(self, head: EmulatedHead, link: str) -> None:
@@ -56,12 +56,12 @@ class PtyServer:
             self._vanish()
 
     def stop(self) -> None:
-        """Let `serve` end; safe from any thread and from signal handlers."""
+        """Make `serve` return; safe from any thread and from signal handlers."""
         self._stop.set()
         self._wake()
 
     def disappear(self, duration: float = float("inf")) -> None:
-        """Take the port away for `duration` seconds, or until `reappear`; it is gone when this returns."""
+        """Remove the port for `duration` seconds, or until `reappear`; it is gone when this returns."""
         self._hide_until(time.monotonic() + duration)
         self._await(lambda: self._master is None)
 
@@ -76,7 +76,7 @@ class PtyServer:
         self._wake()
 
     def _await(self, condition: Callable[[], bool]) -> None:
-        # The port is opened and closed by the serving thread only: it may be waiting on it right now.
+        # Only the serving thread opens and closes the port, because it may be waiting on it at this moment.
         with self._changed:
             self._changed.wait_for(condition, timeout=_PATIENCE)
 
@@ -111,7 +111,7 @@ class PtyServer:
 
     def _send_due(self, master: int, now: float) -> None:
         while self._outgoing and self._outgoing[0].time <= now:
-            # A full terminal loses bytes like a line that nobody listens to.
+            # A full terminal loses bytes, like a line that nobody reads.
             with contextlib.suppress(BlockingIOError):
                 os.write(master, self._outgoing.popleft().data)
 

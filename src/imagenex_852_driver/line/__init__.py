@@ -1,1 +1,1 @@
-"""The serial line: port, device, waiting for replies, the loop of pings."""
+"""The serial line: port, device, waiting for replies, and the ping loop."""

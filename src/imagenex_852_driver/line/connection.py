@@ -1,4 +1,4 @@
-"""Parameters of the serial line and of the patience with it."""
+"""Parameters of the serial line and its timeouts."""
 
 from dataclasses import dataclass
 
@@ -12,10 +12,12 @@ class ConnectionParameters(ParameterSet):
 
     port: str = parameter("/dev/ttyUSB0", "device or pyserial URL (socket://, rfc2217://, loop://)", tunable=False)
     baud_rate: int = parameter(115200, "speed of the line, 8N1", unit="bit/s", low=1200, tunable=False)
-    speed_of_sound: float = parameter(1500.0, "what the head assumes", unit="m/s", low=1000.0, tunable=False)
+    speed_of_sound: float = parameter(
+        1500.0, "speed of sound that the head assumes", unit="m/s", low=1000.0, tunable=False
+    )
     reply_margin: float = parameter(
         0.25,
-        "wait for a reply beyond sound and delay",
+        "time to wait for a reply, in addition to the travel time of sound and the switch delay",
         unit="s",
         low=0.01,
         high=1.0,
@@ -23,19 +25,26 @@ class ConnectionParameters(ParameterSet):
     )
     late_window: float = parameter(
         0.25,
-        "wait after a timeout for a late reply, which the next ping must not get",
+        "time to wait after a timeout for a late reply, so that it is not taken for the reply to the next ping",
         unit="s",
         low=0.0,
         high=1.0,
         tunable=False,
     )
-    byte_gap: float = parameter(0.1, "silence within a reply that ends it", unit="s", low=0.01, high=1.0, tunable=False)
+    byte_gap: float = parameter(
+        0.1,
+        "pause within a reply after which the rest is no longer expected",
+        unit="s",
+        low=0.01,
+        high=1.0,
+        tunable=False,
+    )
     back_off_first: float = parameter(
         0.1, "wait before the first attempt to reopen the port", unit="s", low=0.01, high=1.0, tunable=False
     )
     back_off_longest: float = parameter(
         1.0,
-        "longest wait between attempts; each is twice the one before",
+        "longest wait between attempts; each wait is twice the previous one",
         unit="s",
         low=0.01,
         high=1.5,
@@ -46,7 +55,7 @@ class ConnectionParameters(ParameterSet):
     )
 
     def check(self) -> None:
-        """Raise ParameterError when the waits would shrink instead of grow."""
+        """Raise ParameterError if the first wait is longer than the longest."""
         if self.back_off_first > self.back_off_longest:
             raise ParameterError(
                 f"back_off_first = {self.back_off_first}: longer than back_off_longest = {self.back_off_longest}"

@@ -1,4 +1,4 @@
-"""The head on its serial line: one command, one reply, and an account of everything else."""
+"""The head on its serial line: sends one command, returns its reply, and counts everything else."""
 
 import threading
 import time
@@ -13,7 +13,7 @@ from imagenex_852_driver.line.reply_wait import ReplyWait
 from imagenex_852_driver.line.stats import DeviceStats, StatsRecorder
 from imagenex_852_driver.protocol import Reply, ReplyKind, ReplyParser, SwitchCommand
 
-# Pause that tells whether a line that was busy has become quiet, and the longest wait for that.
+# A busy line counts as quiet after a pause of _QUIET; _LONGEST_DRAIN is the longest wait for that. Both in seconds.
 _QUIET = 0.005
 _LONGEST_DRAIN = 0.2
 _UNEXPECTED = "a reply came late or twice"
@@ -21,7 +21,7 @@ _UNEXPECTED = "a reply came late or twice"
 
 @dataclass(frozen=True)
 class Ping:
-    """A good reply, the command it answers and the time the ping left, in seconds of the device's clock."""
+    """A valid reply, the command it answers, and the time at which the ping left, in seconds of the device's clock."""
 
     stamp: float
     command: SwitchCommand
@@ -79,8 +79,8 @@ class SonarDevice:
     def ping(self, command: SwitchCommand) -> Optional[Ping]:
         """Command one ping and wait for its reply.
 
-        Returns None when there was no good one: counted in `stats`. Raises PortUnavailableError when the port
-        is lost or not open; it is closed then.
+        Returns None if there was no valid reply, which is counted in `stats`. Raises PortUnavailableError if the port
+        is lost or not open, and closes it.
         """
         if self._port is None:
             raise PortUnavailableError(f"port {self.connection.port} is not open")
@@ -111,7 +111,7 @@ class SonarDevice:
 
     def _collect(self, wait: ReplyWait) -> None:
         while wait.reply is None and not self.stop.is_set():
-            # Taken before the read: what came during a stall of this process is read before it is given up.
+            # Taken before the read, so that bytes that arrived while this process stalled are read before it gives up.
             now = time.monotonic()
             data = self._port.read(self._bytes_to_read(wait, now))
             wait.take(data, self._parser.feed(data), time.monotonic())
@@ -119,7 +119,7 @@ class SonarDevice:
                 break
 
     def _bytes_to_read(self, wait: ReplyWait, now: float) -> int:
-        """Return how many bytes to wait for: the first alone, so that it is known in time when it came early."""
+        """Return how many bytes to wait for: first a single one, to notice in time whether it arrived too early."""
         if wait.answered:
             return max(1, wait.missing_bytes)
         return self._port.in_waiting if wait.expired(now) else max(1, self._port.in_waiting)
@@ -160,7 +160,7 @@ class SonarDevice:
                 return
 
     def _drain(self) -> None:
-        """Empty the line before a command; wait until a head that still talks has finished."""
+        """Empty the line before a command; wait until a head that is still sending has finished."""
         deadline = time.monotonic() + _LONGEST_DRAIN
         for data in self._waiting():
             self._unexpected(data)

@@ -7,7 +7,7 @@ from typing import Callable
 from imagenex_852_driver.line.stats import DeviceStats
 from node_support.health import Health, HealthReport, Level
 
-# Counts of `DeviceStats` that are problems: what they are called and what the user should look at.
+# Counts of `DeviceStats` that are problems: their names and what the user should check.
 _PROBLEMS = {
     "timeouts": ("timeouts", "no reply; check the head's power, the cable, baud_rate and head_id"),
     "bad_frames": ("bad frames", "a broken reply; check the cable"),

@@ -9,7 +9,7 @@ from node_support.parameters import parameter
 
 @dataclass(frozen=True)
 class DriverParameters(HeadSettings, ConnectionParameters):
-    """Parameters of imagenex_852_driver; usable wherever a `HeadSettings` or `ConnectionParameters` is wanted."""
+    """Parameters of imagenex_852_driver; usable wherever a `HeadSettings` or `ConnectionParameters` is expected."""
 
     frame_id: str = parameter("sonar", "frame of the head, in which it tilts but does not turn", tunable=False)
     inverted: bool = parameter(False, "the head is mounted upside down")

@@ -1,4 +1,4 @@
-"""Opening a serial port and saying in one line what is wrong with it."""
+"""Opens a serial port, and says in one line why one cannot be opened."""
 
 import errno
 import grp
@@ -9,7 +9,7 @@ from typing import Iterator
 
 import serial
 
-# A read returns after this time at the latest, so that a stop is noticed.
+# Seconds. A read returns after this time at the latest, so that a request to stop is noticed.
 READ_TIMEOUT = 0.05
 WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is lost
 
@@ -22,7 +22,7 @@ class PortError(Exception):
 
 
 class PortUnavailableError(PortError):
-    """The port is not there or was lost; it may come back."""
+    """The port does not exist or was lost; it may come back."""
 
 
 class PortBusyError(PortError):
@@ -34,11 +34,11 @@ class PortPermissionError(PortError):
 
 
 class PortNameError(PortError):
-    """Nothing can be opened by that name, now or later."""
+    """No port can have that name."""
 
 
 def open_port(name: str, baud_rate: int) -> serial.SerialBase:
-    """Open a device or pyserial URL, 8N1; a local device exclusively.
+    """Open a device or pyserial URL with 8N1; a local device is opened exclusively.
 
     Raises PortUnavailableError, PortBusyError, PortPermissionError or PortNameError.
     """
@@ -71,7 +71,7 @@ def _explained(name: str, error: Exception) -> PortError:
         return PortPermissionError(
             f"no permission to open port {name}: join the group {group} (sudo adduser $USER {group}) and log in again"
         )
-    # pyserial's own text names the port, and the reason, twice.
+    # pyserial's own text names the port and the reason twice.
     return PortUnavailableError(f"port {name} cannot be opened: {os.strerror(number) if number else error}")
 
 

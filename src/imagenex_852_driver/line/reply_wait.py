@@ -1,20 +1,20 @@
-"""The wait for one reply: deadlines, and which of the replies that come is the answer."""
+"""The wait for one reply: deadlines, and which of the received replies is the answer."""
 
 from typing import List, Optional
 
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.protocol import ParsedReply, Reply, SwitchCommand
 
-# Share of the time until the reply within which bytes surely come too early, whatever the true speed of sound is.
+# Bytes that arrive within this share of the expected time are too early for any realistic speed of sound.
 _SURELY_TOO_EARLY = 0.9
 
 
 class ReplyWait:
-    """Judges what comes after one command, without reading or waiting itself.
+    """Classifies the bytes that arrive after one command; it neither reads nor waits itself.
 
     All times are of one monotonic clock. The protocol has no sequence numbers: a reply that began before
-    sound can have come back answers an earlier command. A byte counts as early only when it was read early,
-    so that a stall of the driver never costs a good reply.
+    sound can have returned answers an earlier command. A byte counts as early only if it was read early,
+    so that a stall of the driver never loses a valid reply.
     """
 
     def __init__(self, command: SwitchCommand, connection: ConnectionParameters, start: float) -> None:
@@ -36,21 +36,21 @@ class ReplyWait:
 
     @property
     def answer_bytes(self) -> int:
-        """Number of bytes that came and belong to no earlier command's reply."""
+        """Number of received bytes that do not belong to the reply to an earlier command."""
         return max(0, self._received - max(self._early_bytes, self._unexpected_bytes))
 
     @property
     def answered(self) -> bool:
-        """Whether anything came that may be an answer."""
+        """Whether anything was received that may be the answer."""
         return self.answer_bytes > 0
 
     @property
     def missing_bytes(self) -> int:
-        """Number of bytes that a whole answer still needs; 0 when enough came to make one."""
+        """Number of bytes missing from a complete answer; 0 when enough were received."""
         return max(0, self._length - self.answer_bytes)
 
     def take(self, data: bytes, replies: List[ParsedReply], now: float) -> None:
-        """Take note of bytes, possibly none, that had been read by `now`, and of replies they completed."""
+        """Record the bytes, possibly none, that were read by `now`, and the replies that they completed."""
         self._received += len(data)
         if now < self._earliest:
             self._early_bytes = self._received
@@ -59,11 +59,11 @@ class ReplyWait:
         self._sort(replies)
 
     def expired(self, now: float) -> bool:
-        """Tell whether the answer should have begun by now."""
+        """Return whether the answer should have begun by now."""
         return not self.answered and now >= self._deadline
 
     def over(self, now: float, pending: bool) -> bool:
-        """Tell whether waiting is useless; `pending` is whether a reply may have begun."""
+        """Return whether waiting any longer is useless; `pending`: whether a reply may have begun."""
         if self.reply is not None or self.expired(now):
             return True
         if not self.answered:
@@ -72,7 +72,7 @@ class ReplyWait:
         return complete or now - self._last_byte >= self._byte_gap or now >= self._last_deadline
 
     def mismatch(self) -> str:
-        """Say what the reply and the command disagree about; empty when they agree."""
+        """Return in words how the reply contradicts the command; empty if it does not."""
         asked = (self.command.head_id, self.command.reply_kind, self.command.max_range)
         came = (self.reply.head_id, self.reply.kind, self.reply.max_range)
         names = ("head identification", "reply", "range")
@@ -89,6 +89,6 @@ class ReplyWait:
                 self.unexpected_replies += 1
                 self._unexpected_bytes = max(self._unexpected_bytes, offset + reply.kind.length)
             else:
-                # Two at once were read after a stall; the earlier one is an old reply that the head sent twice.
+                # Two replies at once were read after a stall; the earlier one is an old reply that the head sent twice.
                 self.unexpected_replies += int(self.reply is not None)
                 self.reply = reply

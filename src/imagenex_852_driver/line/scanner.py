@@ -1,4 +1,4 @@
-"""The loop of the driver: ping after ping, through every loss of the port, until it is stopped."""
+"""The driver's loop: sends pings until it is stopped, and reconnects whenever the port is lost."""
 
 import contextlib
 import time
@@ -10,14 +10,14 @@ from imagenex_852_driver.protocol.settings import HeadSettings
 
 
 class Scanner:
-    """Pings with the current settings. Assign `settings` from any thread: the next ping obeys.
+    """Pings with the current settings. `settings` may be assigned from any thread and applies to the next ping.
 
-    Every command carries all settings, so after a reconnection, or a reboot of the head, the scan goes on
-    where it was configured.
+    Every command carries all settings, so the scan continues as configured after a reconnection or a reboot of
+    the head.
     """
 
     def __init__(self, device: SonarDevice, settings: HeadSettings, on_ping: Callable[[Ping], None]) -> None:
-        """`on_ping` is called in the thread of `run`, once per good reply, in order; it must not raise."""
+        """`on_ping` is called in the thread of `run`, once per valid reply, in order; it must not raise."""
         self.settings = settings
         self._device = device
         self._on_ping = on_ping
@@ -25,9 +25,9 @@ class Scanner:
         self._last_reply = time.monotonic()
 
     def connect(self) -> None:
-        """Open the port for the first time; a port that is not there yet is left to `run`.
+        """Open the port for the first time; `run` waits for a port that does not exist yet.
 
-        Raises PortBusyError, PortPermissionError or PortNameError, which the user must cure.
+        Raises PortBusyError, PortPermissionError or PortNameError, which the user must correct.
         """
         with contextlib.suppress(PortUnavailableError):
             self._device.open()
@@ -52,7 +52,7 @@ class Scanner:
             self._back_off = self._device.connection.back_off_first
             self._on_ping(ping)
         elif now - self._last_reply > self._device.connection.reopen_after:
-            # An adapter can hang, and a network connection die, without the port ever reporting it.
+            # An adapter can hang, or a network connection die, without the port ever reporting it.
             self._last_reply = now
             self._device.close()
 

@@ -7,12 +7,12 @@ from imagenex_852_driver.protocol import ParserCounts
 
 @dataclass(frozen=True)
 class DeviceStats:
-    """Counts since the start; every ping ends in exactly one of the first four after `pings`.
+    """Counts since the start; every ping is counted in exactly one of the four fields after `pings`.
 
-    `timeouts`: nothing came. `bad_frames`: something came that was no valid answer. `interrupted`: the port
-    was lost or the driver stopped before the answer. `unexpected_replies`: whole replies that answered no
-    outstanding command, late or doubled; they are dropped. `overruns` and `rejected_switches` are reported by
-    the head in replies that are otherwise good. `parser` holds the parser's own counts.
+    `timeouts`: nothing was received. `bad_frames`: something was received, but no valid answer. `interrupted`: the
+    port was lost or the driver stopped before the answer. `unexpected_replies`: whole replies that answered no
+    outstanding command, late or sent twice; they are dropped. `overruns` and `rejected_switches` are reported by
+    the head in replies that are otherwise valid. `parser` holds the parser's own counts.
     """
 
     connected: bool = False
@@ -36,7 +36,7 @@ class StatsRecorder:
         self.current = DeviceStats()
 
     def count(self, name: str, error: str = "", number: int = 1) -> None:
-        """Add to the count `name` and remember the error, if there is one."""
+        """Increase the count `name`, and store the error if there is one."""
         changes = {name: getattr(self.current, name) + number}
         if error:
             changes["last_error"] = error

@@ -1,4 +1,4 @@
-"""How long a ping takes on the wire and in the water; driver and emulated head must agree on it."""
+"""How long a ping takes on the line and in the water; used by both driver and emulated head."""
 
 from dataclasses import dataclass
 
@@ -24,10 +24,10 @@ class LineTiming:
         return self.transmission(COMMAND_LENGTH)
 
     def reply_begins(self, command: SwitchCommand) -> float:
-        """Return when the reply can leave the head: after the farthest echo and the switch delay."""
+        """Return when the reply can leave the head at the earliest: after the farthest echo and the switch delay."""
         travel = 2 * command.max_range / self.speed_of_sound
         return self.ping_leaves() + travel + command.switch_delay_ms / 1000
 
     def reply_ends(self, command: SwitchCommand) -> float:
-        """Return when the last byte of the reply can have come."""
+        """Return when the last byte of the reply can have arrived at the earliest."""
         return self.reply_begins(command) + self.transmission(command.reply_kind.length)

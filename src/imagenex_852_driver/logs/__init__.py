@@ -1,1 +1,1 @@
-"""The maker's `.852` logs."""
+"""The manufacturer's `.852` logs."""

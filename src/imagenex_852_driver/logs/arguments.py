@@ -12,8 +12,8 @@ def play_arguments(arguments: List[str]) -> argparse.Namespace:
     parser = argparse.ArgumentParser("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
     _add_rate(parser)
-    parser.add_argument("--loop", action="store_true", help="begin again at the end")
-    parser.add_argument("--wait-for-subscribers", action="store_true", help="begin when somebody subscribes")
+    parser.add_argument("--loop", action="store_true", help="start again at the end")
+    parser.add_argument("--wait-for-subscribers", action="store_true", help="start when somebody subscribes")
     _add_mount(parser)
     return parser.parse_args(arguments)
 

@@ -1,4 +1,4 @@
-"""Reads and writes the maker's `.852` logs."""
+"""Reads and writes the manufacturer's `.852` logs."""
 
 import mmap
 import os
@@ -18,17 +18,17 @@ from imagenex_852_driver.protocol import FrameError
 
 __all__ = ["DamagedPart", "LogReader", "LogWriteError", "LogWriter", "LoggedPing", "read"]
 
-# Damage beyond this many places is counted only.
+# Damaged parts beyond this number are only counted.
 _REMEMBERED_DAMAGES = 100
 
 
 class LogWriteError(OSError):
-    """A ping could not be written; the file still ends with a whole ping."""
+    """A ping could not be written; the file still ends with a complete ping."""
 
 
 @dataclass(frozen=True)
 class DamagedPart:
-    """A part of a log that is no ping: where it begins, how many bytes, and what is wrong."""
+    """A part of a log that is not a ping: where it begins, its number of bytes, and what is wrong with it."""
 
     offset: int
     length: int
@@ -44,9 +44,9 @@ def read(path: Union[str, Path]) -> "LogReader":
 
 
 class LogReader:
-    """Iterates over the pings of a log, skipping to the next whole one over every damage.
+    """Iterates over the pings of a log; skips every damaged part up to the next complete ping.
 
-    `ping_count`, `damage_count` and `damages` (the first 100 `DamagedPart`s) are complete after the last one.
+    `ping_count`, `damage_count` and `damages` (the first 100 `DamagedPart`s) are final after the last ping.
     """
 
     def __init__(self, path: Union[str, Path]) -> None:
@@ -79,7 +79,7 @@ class LogReader:
         self._note_damage(damage_start, len(self._data), reason)
 
     def _record_at(self, position: int) -> Tuple[Optional[LoggedPing], int, str]:
-        """Return the ping at `position`, where to go on, and what is wrong there."""
+        """Return the ping at `position`, where to continue, and what is wrong there."""
         header = self._data[position : position + HEADER_LENGTH]
         try:
             kind = check_record_header(header)
@@ -93,7 +93,7 @@ class LogReader:
         return self._after_fill(ping, reply_end, position + record_length(kind))
 
     def _after_fill(self, ping: LoggedPing, start: int, end: int) -> Tuple[LoggedPing, int, str]:
-        """Skip the zero fill behind a ping; where the file was cut it ends early."""
+        """Skip the zero fill after a ping; it ends early where the file was cut off."""
         fill = self._data[start:end]
         zeros = len(fill) - len(fill.lstrip(b"\0"))
         if start + zeros < end:
@@ -101,7 +101,7 @@ class LogReader:
         return ping, end, ""
 
     def _next_header(self, start: int, end: int) -> int:
-        """Return where the next whole record header begins before `end`, or `end`."""
+        """Return where the next complete record header before `end` begins, or `end`."""
         while True:
             found = self._data.find(MAGIC, start, min(end + len(MAGIC), len(self._data)))
             if found < 0 or found >= end:
@@ -121,10 +121,10 @@ class LogReader:
 
 
 class LogWriter:
-    """Appends pings to a log, each with one write, so that the file holds whole pings whatever happens."""
+    """Appends pings to a log with one write each, so that the file always holds complete pings."""
 
     def __init__(self, path: Union[str, Path]) -> None:
-        """Raises OSError when the file cannot be opened; what it holds already is kept."""
+        """Raises OSError if the file cannot be opened; its existing content is kept."""
         self._file = os.open(str(path), os.O_WRONLY | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o644)
         self._path = path
 
@@ -137,7 +137,7 @@ class LogWriter:
     def write(self, ping: LoggedPing) -> None:
         """Append one ping.
 
-        Raises FrameError for a ping that a record cannot hold and LogWriteError when the disk takes no more.
+        Raises FrameError for a ping that a record cannot hold and LogWriteError if it cannot be written completely.
         """
         record = ping.encode()
         length = os.fstat(self._file).st_size
@@ -151,7 +151,7 @@ class LogWriter:
             raise LogWriteError(f"{self._path}: only {written} of {len(record)} bytes could be written")
 
     def close(self) -> None:
-        """Bring everything to the disk and close the file; closing twice is fine."""
+        """Flush everything to the disk and close the file; closing twice is allowed."""
         if self._file < 0:
             return
         file, self._file = self._file, -1

@@ -1,4 +1,4 @@
-"""One ping of the maker's `.852` log, bytes to dataclass and back (Data storage file format, 16SEP15)."""
+"""One ping of the manufacturer's `.852` log, bytes to dataclass and back (Data storage file format, 16SEP15)."""
 
 import calendar
 import re
@@ -10,17 +10,17 @@ from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind, SwitchCom
 from imagenex_852_driver.protocol.errors import require
 
 MAGIC = b"852"
-HEADER_LENGTH = 100  # Bytes before the reply in each record (maker's log format)
+HEADER_LENGTH = 100  # Bytes before the reply in each record (manufacturer's log format)
 
 _INDICES = {ReplyKind.IPX: 0, ReplyKind.IMX: 2, ReplyKind.IGX: 3}
 _RECORD_LENGTHS = {ReplyKind.IPX: 128, ReplyKind.IMX: 384, ReplyKind.IGX: 640}
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _STAMP = re.compile(rb"(\d\d)-([A-Za-z]{3})-(\d{4})\0(\d\d):(\d\d):(\d\d)\0\.(\d\d)\0")
-_ZERO_TRAIN = 70  # Codes of the maker's log format: train angle 0, and what is added to the number of turns
+_ZERO_TRAIN = 70  # Codes of the manufacturer's log format: train angle 0, and what is added to the number of turns
 _TURNS_OFFSET = 100
-_DEFAULT_SPEED_OF_SOUND = 1500.0  # m/s: what the head takes for its ranges
+_DEFAULT_SPEED_OF_SOUND = 1500.0  # m/s: the speed that the head uses for its ranges
 _FEET = 0.3048  # m
-# What the maker calls reserved but always writes.
+# Bytes that the manufacturer calls reserved but always writes.
 _RESERVED = {42: 20, 43: 9}
 
 
@@ -28,9 +28,9 @@ _RESERVED = {42: 20, 43: 9}
 class LoggedPing:
     """One ping of a log.
 
-    `stamp` is seconds since 1970 (the log's date and time taken as UTC, hundredths), None where they cannot
-    be read; degrees are the head's own, clockwise; `depth` in metres, `heading_deg` and `turns` are None
-    where the logger had none; `text` is the user's, 31 characters at most. Sector, train angle, step and
+    `stamp` is seconds since 1970 (the log's date and time taken as UTC, hundredths), None if they cannot
+    be read; degrees are clockwise, as the head counts them; `depth` in metres, `heading_deg` and `turns` are None
+    if the logger had none; `text` is the user's, 31 characters at most. Sector, train angle, step and
     direction of an echo sounder mean nothing.
     """
 
@@ -53,7 +53,7 @@ class LoggedPing:
 
     @classmethod
     def of(cls, stamp: float, command: SwitchCommand, reply: Reply) -> "LoggedPing":
-        """Return what a log holds of a ping that the driver made."""
+        """Return the log's form of a ping of the driver."""
         return cls(
             reply=reply,
             stamp=stamp,
@@ -104,9 +104,9 @@ class LoggedPing:
 
 
 def decode_record(record: bytes) -> LoggedPing:
-    """Read one record, zero fill or not; raise FrameError when header or reply do not hold together.
+    """Read one record, with or without zero fill; raise FrameError if its header or reply is inconsistent.
 
-    Texts, times and the logger's own sensors are never a reason to refuse a ping.
+    Texts, times and values of the logger's own sensors never cause a ping to be refused.
     """
     kind = check_record_header(record)
     return LoggedPing(

@@ -1,4 +1,4 @@
-"""When the pings of a log were made, as far as it can be known. Free of ROS."""
+"""When the pings of a log were recorded, as far as that can be known. Free of ROS."""
 
 from typing import Iterable, Iterator, Optional, Tuple
 
@@ -10,8 +10,8 @@ USUAL_RATE = 10.0  # 1/s: pings of a head at 30 m, for logs whose stamps do not 
 def timed(pings: Iterable[LoggedPing], rate: Optional[float] = None) -> Iterator[Tuple[float, LoggedPing]]:
     """Yield every ping with its time in seconds after the first one; times never go back.
 
-    They follow each other at `rate` (1/s). Without one they keep the intervals of the log's stamps, and
-    `USUAL_RATE` where those cannot be read.
+    They follow each other at `rate` (1/s). Without a rate they keep the intervals of the log's stamps, or follow
+    at `USUAL_RATE` where the stamps cannot be read.
     """
     step = 1.0 / (rate or USUAL_RATE)
     time, last_stamp = 0.0, None

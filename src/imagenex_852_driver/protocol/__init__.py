@@ -1,4 +1,4 @@
-"""The wire of the Imagenex 852, bytes to frozen dataclasses and back, without any input or output."""
+"""The protocol of the Imagenex 852: bytes to frozen dataclasses and back, without any input or output."""
 
 from imagenex_852_driver.protocol.command import SwitchCommand
 from imagenex_852_driver.protocol.command_reader import CommandReader

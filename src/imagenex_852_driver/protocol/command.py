@@ -1,4 +1,4 @@
-"""The switch command, 27 bytes to the head (thesis 4.1.4, maker's serial interface specification)."""
+"""The switch command, 27 bytes to the head (thesis 4.1.4, manufacturer's serial interface specification)."""
 
 from dataclasses import dataclass, fields
 
@@ -6,7 +6,7 @@ from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID,
 from imagenex_852_driver.protocol.reply import ReplyKind
 
 HEADER = b"\xfe\x44"
-TERMINATOR = 0xFD  # Bytes and codes of the maker's serial interface specification
+TERMINATOR = 0xFD  # Bytes and codes of the manufacturer's serial interface specification
 LENGTH = 27
 
 _REVERSE_BIT = 0x40
@@ -67,7 +67,7 @@ class SwitchCommand:
         return ReplyKind.IGX if self.data_points == 500 else ReplyKind.IMX
 
     def encode(self) -> bytes:
-        """Return the 27 bytes of the command; raise FrameError where one of them would end it early."""
+        """Return the 27 bytes of the command; raise FrameError if one of them would end it early."""
         frame = bytearray(LENGTH)
         frame[0:2] = HEADER
         for index, value in self._switches().items():
@@ -96,7 +96,7 @@ class SwitchCommand:
 
     @classmethod
     def decode(cls, frame: bytes) -> "SwitchCommand":
-        """Read the 27 bytes of a command; raise FrameError for anything a head would not accept."""
+        """Read the 27 bytes of a command; raise FrameError for a command that a head would not accept."""
         require("length of the switch command", len(frame), (LENGTH,))
         require("header of the switch command", bytes(frame[:2]), (HEADER,))
         require("position of the terminator", bytes(frame).find(TERMINATOR), (LENGTH - 1,))

@@ -7,7 +7,7 @@ from imagenex_852_driver.protocol.errors import FrameError
 
 
 class CommandReader:
-    """Incremental reader of switch commands; `rejected` counts commands that began and did not hold."""
+    """Incremental reader of switch commands; `rejected` counts commands that began but turned out to be invalid."""
 
     def __init__(self) -> None:
         self.rejected = 0

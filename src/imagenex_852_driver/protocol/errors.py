@@ -2,8 +2,8 @@
 
 from typing import Any, Container
 
-RANGES = (5, 10, 20, 30, 40, 50)  # m: the only ranges that the head takes (maker's specification)
-SONAR_HEAD_ID = 0x10  # As delivered (maker's specification)
+RANGES = (5, 10, 20, 30, 40, 50)  # m: the only ranges that the head takes (manufacturer's specification)
+SONAR_HEAD_ID = 0x10  # As delivered (manufacturer's specification)
 HEAD_IDS = range(0x10, 0x16)
 
 

@@ -5,7 +5,7 @@ from enum import Enum
 
 from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID, require
 
-HEADER_LENGTH = 12  # Lengths, bytes and bits of the maker's serial interface specification
+HEADER_LENGTH = 12  # Lengths, bytes and bits of the manufacturer's serial interface specification
 TERMINATOR = 0xFC
 SWITCHES_ACCEPTED = 0x40
 OVERRUN = 0x80
@@ -14,7 +14,7 @@ _CLOCKWISE_BIT = 0x40
 
 
 class ReplyKind(Enum):
-    """The three replies by their leading letters."""
+    """The three kinds of reply, by their leading letters."""
 
     IMX = b"IMX"
     IGX = b"IGX"
@@ -63,7 +63,7 @@ class Reply:
 
     @property
     def switches_accepted(self) -> bool:
-        """Whether the head took the settings of the command it answers."""
+        """Whether the head accepted the settings of the command that it answers."""
         return bool(self.status & SWITCHES_ACCEPTED)
 
     @property
@@ -96,7 +96,7 @@ class Reply:
 
     @classmethod
     def decode(cls, frame: bytes) -> "Reply":
-        """Read one whole reply; raise FrameError when it is not exactly that."""
+        """Read exactly one complete reply; raise FrameError for anything else."""
         kind = check_header(frame)
         require("length of the reply", len(frame), (kind.length,))
         require("terminator of the reply", frame[-1], (TERMINATOR,))
@@ -116,8 +116,8 @@ class Reply:
 def check_header(data: bytes) -> ReplyKind:
     """Return the kind of reply that the first 12 bytes of `data` announce.
 
-    Raises FrameError when they contradict themselves, so that chance bytes practically never pass: letters,
-    head identification, range and data count must all hold.
+    Raises FrameError if they are inconsistent. Letters, head identification, range and data count must all be
+    valid, so that random bytes practically never pass.
     """
     require("length of the reply header", len(data) >= HEADER_LENGTH, (True,))
     require("letters of the reply", bytes(data[:3]), tuple(kind.value for kind in ReplyKind))
@@ -129,7 +129,7 @@ def check_header(data: bytes) -> ReplyKind:
 
 
 def _packed(value: int) -> bytes:
-    """Split 14 bits into two bytes of which the low one has 7 bits, so that no bit 7 is ever set."""
+    """Split 14 bits into two bytes of which the low one has 7 bits, so that bit 7 is never set."""
     return bytes([value & 0x7F, (value >> 8) << 1 | (value >> 7) & 1])
 
 

@@ -1,4 +1,4 @@
-"""Finds replies in a stream of bytes, however it is cut up and whatever lies between them."""
+"""Finds replies in a stream of bytes, however the stream is split and whatever is between the replies."""
 
 import re
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class ParsedReply(NamedTuple):
 
 @dataclass(frozen=True)
 class ParserCounts:
-    """What the parser met so far: whole replies, broken ones and bytes that belonged to no reply."""
+    """What the parser has found so far: complete replies, broken ones, and bytes that belong to no reply."""
 
     replies: int = 0
     corrupt: int = 0
@@ -32,10 +32,10 @@ class ParserCounts:
 class ReplyParser:
     """Incremental parser of replies.
 
-    *Corrupt* is a reply of which all bytes came and do not hold together; *incomplete* one that ended early:
-    the next one began inside it, or `reset` was called. Every skipped byte is looked at again, so a whole
-    reply is never lost to the garbage before it. The price: a reply whose echoes spell a whole reply header
-    counts as incomplete.
+    A reply is *corrupt* if all its bytes arrived but are inconsistent, and *incomplete* if it ended early: the next
+    reply began inside it, or `reset` was called. Every skipped byte is examined again, so a complete reply is
+    never lost because of garbage before it. In return, a reply whose echoes form a complete reply header counts
+    as incomplete.
     """
 
     def __init__(self) -> None:
@@ -48,12 +48,12 @@ class ReplyParser:
 
     @property
     def counts(self) -> ParserCounts:
-        """The counts so far, not touched by `reset`."""
+        """The counts so far; `reset` does not change them."""
         return ParserCounts(self._replies, self._corrupt, self._incomplete, self._skipped_bytes)
 
     @property
     def pending(self) -> bool:
-        """Whether the bytes held back may be the beginning of a reply."""
+        """Whether the buffered bytes may be the beginning of a reply."""
         return bool(self._buffer)
 
     def feed(self, data: bytes) -> List[ParsedReply]:
@@ -101,7 +101,7 @@ class ReplyParser:
         return [parsed]
 
     def _inner_header(self, length: int) -> Optional[int]:
-        """Return where another reply begins inside the one at the front: its own end was lost then."""
+        """Return where another reply begins inside the one at the front, whose own end was then lost."""
         for match in _LETTERS.finditer(self._buffer, 1, length):
             header = self._buffer[match.start() : min(match.start() + HEADER_LENGTH, length)]
             if _is_header(header) or self._is_cut_header(header, length):
@@ -109,9 +109,9 @@ class ReplyParser:
         return None
 
     def _is_cut_header(self, header: bytes, length: int) -> bool:
-        """Tell whether the last bytes of a whole reply look like a header that goes on behind it.
+        """Return whether the last bytes of a complete reply look like a header that continues after it.
 
-        The status byte of the next reply can pass for the terminator of this one.
+        The status byte of the next reply can look like the terminator of this one.
         """
         return len(self._buffer) >= length and _STATUS < len(header) < HEADER_LENGTH and header[3] in HEAD_IDS
 

@@ -1,4 +1,4 @@
-"""The settings of the head (thesis 4.1.3), checked before anything of them reaches the wire."""
+"""The settings of the head (thesis 4.1.3), validated before any of them is sent."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -7,12 +7,12 @@ from imagenex_852_driver.protocol.command import SwitchCommand
 from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
-# The head's own stops, to either side of straight ahead.
+# Mechanical stops of the head, degrees to either side of straight ahead.
 MECHANICAL_LIMIT_DEG = 210
 
 
 class Direction(Enum):
-    """Which way the head turns, seen from above a head that is mounted upright."""
+    """Which way the head turns, seen from above, if it is mounted upright."""
 
     CLOCKWISE = "clockwise"
     COUNTERCLOCKWISE = "counterclockwise"
@@ -20,13 +20,13 @@ class Direction(Enum):
 
 @dataclass(frozen=True)
 class HeadSettings(ParameterSet):
-    """Every setting of the head; angles are the head's own, degrees and clockwise.
+    """Every setting of the head; angles are degrees, clockwise, as the head counts them.
 
     Raises ParameterError for a value out of range and for values that do not fit together.
     """
 
     max_range: int = parameter(
-        20, "reach of a beam: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range"
+        20, "range of a beam: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range"
     )
     direction: Direction = parameter(
         Direction.CLOCKWISE, "direction the head turns, seen from above", thesis_name="Direction"
@@ -36,21 +36,21 @@ class HeadSettings(ParameterSet):
         0.2, "absorption of the water", unit="dB/m", low=0.0, high=2.55, thesis_name="Absorption"
     )
     train_angle_deg: int = parameter(
-        0, "centre of the sector, steps of 3", unit="deg", low=-210, high=210, thesis_name="Train angle"
+        0, "centre of the sector, in steps of 3", unit="deg", low=-210, high=210, thesis_name="Train angle"
     )
     sector_width_deg: int = parameter(
-        360, "width of the sector, steps of 3", unit="deg", low=0, high=360, thesis_name="Sector width"
+        360, "width of the sector, in steps of 3", unit="deg", low=0, high=360, thesis_name="Sector width"
     )
     step_size_deg: int = parameter(
         3, "turn between pings: 0, 3 or 6", unit="deg", low=0, high=6, thesis_name="Step size"
     )
     pulse_length_us: int = parameter(
-        100, "length of the pulse, not 253", unit="us", low=1, high=255, thesis_name="Pulse length"
+        100, "length of the pulse; 253 is not possible", unit="us", low=1, high=255, thesis_name="Pulse length"
     )
     data_points: int = parameter(500, "echoes per beam: 250 or 500", low=250, high=500, thesis_name="Data points")
     switch_delay_ms: int = parameter(
         0,
-        "pause before the reply, steps of 2, not 506",
+        "pause before the reply, in steps of 2; 506 is not possible",
         unit="ms",
         low=0,
         high=510,

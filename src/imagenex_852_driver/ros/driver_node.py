@@ -23,10 +23,10 @@ _PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 
 
 class DriverNode:
-    """Keeps the head pinging and publishes every good reply once, in order."""
+    """Keeps the head pinging, and publishes every valid reply once, in order."""
 
     def __init__(self, namespace: str = "~") -> None:
-        """Raises ParameterError for a bad parameter in `namespace` and StartError for a port to be cured first."""
+        """Raises ParameterError for a bad parameter in `namespace` and StartError for an unusable port."""
         self._device: Optional[SonarDevice] = None
         self._scanner: Optional[Scanner] = None
         self._stop = threading.Event()
@@ -44,7 +44,7 @@ class DriverNode:
         rospy.on_shutdown(self._end)
 
     def _stats(self) -> DeviceStats:
-        # A port that is closed because the node ends is no loss.
+        # A port that is closed because the node ends does not count as lost.
         if self._device is not None and not self._stop.is_set():
             self._last_stats = self._device.stats
         return self._last_stats

@@ -1,4 +1,4 @@
-"""The ROS side of the emulated head: parameters and orders of faults in; a serial port out."""
+"""The ROS side of the emulated head: parameters and requests for faults in; a serial port out."""
 
 import os
 from contextlib import ExitStack
@@ -16,7 +16,7 @@ from underwater_map_construction.srv import OrderFault, OrderFaultRequest, Order
 PACKAGE = "underwater_map_construction"
 _MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
 
-# Builds the echoes of the simulator; handed in, because the driver knows nothing of simulators.
+# Builds the simulator's echoes; passed in, because the driver must not depend on the simulator.
 WorldEchoes = Callable[[EmulatorParameters], EchoSource]
 
 

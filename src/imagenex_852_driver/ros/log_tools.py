@@ -1,5 +1,6 @@
-"""The ROS side of .852 logs: play them, record them, convert them to bags."""
+"""The ROS side of .852 logs: plays them, records them, and converts them to bags."""
 
+import math
 import os
 import time
 from argparse import Namespace
@@ -17,17 +18,19 @@ from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
 from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.headers import check_stamp
 from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
 
 _LONGEST_SLEEP = 0.1  # s: an end is noticed within this time
-# rospy sends from a queue, which dies with the process.
+# rospy sends from a queue, which is lost when the process ends.
 _LAST_MESSAGES_LEAVE = 0.5
 
 
 class LogPlayer:
-    """Publishes a log on sonar/raw, stamped with the present time."""
+    """Publishes a log on sonar/raw, stamped with the current time."""
 
     def __init__(self, options: Namespace) -> None:
         """Raises StartError when the log cannot be read."""
@@ -37,7 +40,7 @@ class LogPlayer:
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=1000)
 
     def run(self) -> None:
-        """Play to the end, or for ever with `loop`; ends early at shutdown."""
+        """Play to the end, or without end with `loop`; stops early at shutdown."""
         while self._options.wait_for_subscribers and not self._beams.get_num_connections():
             if rospy.is_shutdown():
                 return
@@ -60,7 +63,7 @@ class LogPlayer:
 
 
 def convert(options: Namespace) -> str:
-    """Write the bag of a log; return in words what was written. Raises StartError when that cannot be done."""
+    """Write the bag of a log; return in words what was written. Raises StartError if it cannot be written."""
     reader = opened(options.file)
     count, start = 0, options.start
     try:
@@ -109,9 +112,13 @@ class LogRecorder:
         self._inverted = bool(values.get("inverted", False))
 
     def _record(self, message: SonarScanLine) -> None:
+        check_stamp(message.header.stamp.to_nsec())
+        if not (math.isfinite(message.angle) and math.isfinite(message.maxrange_meters)):
+            detail = f"angle {message.angle} rad, maxrange_meters {message.maxrange_meters}, must be finite"
+            raise RefusedInput("beams refused", detail)
         position = head_position(message.angle, self._inverted)
         if self._last_position not in (None, position):
-            # The head may have passed the seam behind it, where positions start again.
+            # The head may have passed straight astern, where positions wrap around.
             self._clockwise = 0 < (position - self._last_position) % 2400 < 1200
         self._last_position = position
         self._writer.write(logged_ping(message, self._settings, self._inverted, self._clockwise))
@@ -123,7 +130,7 @@ class LogRecorder:
 
 
 def opened(path: str) -> log_file.LogReader:
-    """Return the reader of a log; raises StartError when there is none."""
+    """Return the reader of a log; raises StartError if it cannot be read."""
     try:
         return log_file.read(path)
     except OSError as error:
@@ -131,7 +138,7 @@ def opened(path: str) -> log_file.LogReader:
 
 
 def summary(reader: log_file.LogReader) -> str:
-    """Return in words what a log held, as far as it was read."""
+    """Return in words what the part of a log that was read contains."""
     damages = "; ".join(str(damage) for damage in reader.damages[:3])
     skipped = f", skipped {reader.damage_count} damaged parts: {damages}" if reader.damage_count else ""
     return f"{reader.ping_count} pings in the log{skipped}"

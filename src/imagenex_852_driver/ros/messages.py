@@ -1,4 +1,4 @@
-"""Replies of the head to sonar messages and back."""
+"""Converts replies of the head to sonar messages and back."""
 
 from dataclasses import replace
 from typing import Optional
@@ -18,7 +18,7 @@ _KINDS = {kind.echo_count: kind for kind in ReplyKind if kind.echo_count}
 def scan_line(
     stamp: float, reply: Reply, gain_db: int, frame_id: str, inverted: bool = False, sensor_angle: float = 0.0
 ) -> Optional[SonarScanLine]:
-    """Return the message of a reply that came to the ping of `stamp` (s); None when it holds no echoes."""
+    """Return the message of the reply to the ping at `stamp` (s); None if it holds no echoes."""
     if not reply.echoes:
         return None
     message = SonarScanLine()
@@ -36,9 +36,9 @@ def scan_line(
 def logged_ping(
     message: SonarScanLine, settings: HeadSettings, inverted: bool = False, clockwise: bool = True
 ) -> LoggedPing:
-    """Return what a log holds of a message, with the settings that it does not carry.
+    """Return the log's form of a message, with the settings that the message does not contain.
 
-    Raises RefusedInput for a message that no head of this kind can have sent.
+    Raises RefusedInput for a message that a head of this kind cannot have sent.
     """
     kind = _KINDS.get(len(message.intensities))
     if kind is None:

@@ -22,7 +22,7 @@ def run_emulator(world_echoes: WorldEchoes) -> None:
 
 
 def run_player() -> None:
-    """Publish a log and end."""
+    """Publish a log, then end."""
     options = play_arguments(rospy.myargv()[1:])
     rospy.init_node("play_852", anonymous=True)
     try:

@@ -6,9 +6,11 @@ from typing import Deque, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.problem.scan import Track
 from node_support.geometry.planar import composed, inverse, transformed
 
+# A cloud comes within a scan or two of its own; eight turns of a head are two minutes.
 _MOST_STRETCHES = 8
 
 
@@ -37,18 +39,18 @@ class CorrectionHistory:
         corrections = composed(poses, inverse(track.at(times)))
         self._stretches.append(_Stretch(times, corrections, holds))
 
-    def placed(self, scan: Scan) -> Tuple[np.ndarray, int]:
-        """Return the points (k, 4) of `scan` in map, and how many were left out because their time has no place.
+    def placed(self, cloud: TimedPoints) -> Tuple[np.ndarray, int]:
+        """Return the points (k, 4) of `cloud` in map, and how many were left out because their time has no place.
 
         Between two stretches the nearer one's end counts.
         """
         if not self._stretches:
-            return np.empty((0, 4)), len(scan)
+            return np.empty((0, 4)), len(cloud)
         times = np.concatenate([stretch.times for stretch in self._stretches])
         corrections = np.concatenate([stretch.corrections for stretch in self._stretches])
         holds = np.concatenate([np.full(len(stretch.times), stretch.holds) for stretch in self._stretches])
-        nearest = np.clip(np.searchsorted(times, scan.times), 0, len(times) - 1)
+        nearest = np.clip(np.searchsorted(times, cloud.times), 0, len(times) - 1)
         keep = holds[nearest]
-        chosen = scan.times[keep]
+        chosen = cloud.times[keep]
         path = np.column_stack([np.interp(chosen, times, corrections[:, axis]) for axis in range(3)])
-        return transformed(path, scan.points[keep]), int(np.count_nonzero(~keep))
+        return transformed(path, cloud.points[keep]), int(np.count_nonzero(~keep))

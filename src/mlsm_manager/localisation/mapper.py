@@ -1,4 +1,4 @@
-"""Scans in, a map and the vehicle's place in it out: the orchestration without ROS (thesis 6.5.6)."""
+"""Matches scan by scan with the map of the scans before, and keeps that map and the pose in it (thesis 6.5.6)."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -7,22 +7,28 @@ from typing import Deque, Optional
 import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
-from mlsm_manager.matching.matchers.matcher import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
-from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.matchers.matcher_table import Matcher
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
+from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.scan_path import ERRORS
-from mlsm_manager.matching.problem.undistort import corrected_points
+from mlsm_manager.matching.problem.state import ERRORS
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
+# Clouds: with one per scan, more than a matcher is ever behind.
 _MOST_WAITING = 8
 _NOTHING = InsertReport(0, 0, 0)
 
 
 @dataclass(frozen=True)
 class MapSettings:
-    """The grids: side of a cell [m] of the map that is shown and of the one that is matched with, limit and reserve."""
+    """The grids of the map that is shown and of the map that is matched with.
+
+    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
+    of blocks to reserve memory for. fewest_blocks: of a map that can be matched with.
+    """
 
     resolution: float
     match_resolution: float
@@ -33,7 +39,10 @@ class MapSettings:
 
 @dataclass(frozen=True)
 class ScanUpdate:
-    """What became of a scan. result: None when it was not matched. accepted: whether it is in the map now."""
+    """What was done with a scan.
+
+    result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
+    """
 
     scan: Scan
     result: Optional[MatchResult]
@@ -43,7 +52,11 @@ class ScanUpdate:
 
 @dataclass(frozen=True)
 class CloudUpdate:
-    """What became of a cloud. waiting: until the scan of its time is matched. unplaced: points without a place."""
+    """What was done with a cloud.
+
+    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
+    not inserted because the scan of their time was rejected.
+    """
 
     report: InsertReport
     waiting: bool
@@ -53,9 +66,9 @@ class CloudUpdate:
 class Mapper:
     """Keeps the map, what is known of the pose, and the errors of the odometry.
 
-    Scans of echoes are matched and make the map that is matched with; clouds make the map that is shown. Where both are
-    the same points, give them to both. A scan that is not matched because `matching` is off, or because there is no
-    map yet, is placed by the odometry as corrected so far, and makes the map: its pose is then certain in it.
+    Scans of echoes are matched and inserted into the map that is matched with; clouds are inserted into the map that is
+    shown. A scan that is not matched, because `matching` is off or because there is no map yet, is placed by the
+    odometry as corrected so far and inserted; its pose is then certain.
     """
 
     def __init__(self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher) -> None:
@@ -63,27 +76,39 @@ class Mapper:
         self.errors = errors
         self.matcher = matcher
         self.matching = False
-        self.newest: Optional[Scan] = None
         self.clear()
 
     def clear(self) -> None:
-        """Forget the map and the place in it."""
+        """Delete the map, and forget the pose in it."""
         settings = self.settings
         self.shown = MultiLevelSurfaceMap(settings.resolution, settings.limit, settings.expected_blocks)
         self.matched = MultiLevelSurfaceMap(settings.match_resolution, settings.limit)
         self.forget_place()
 
     def forget_place(self) -> None:
-        """Keep the map but forget where the vehicle is, because time jumped."""
+        """Keep the map but forget the pose, because time jumped."""
         self.belief: Optional[Belief] = None
         self.correction = np.zeros(3)
-        self.newest = None
         self._history = CorrectionHistory()
-        self._waiting: Deque[Scan] = deque(maxlen=_MOST_WAITING)
+        self._waiting: Deque[TimedPoints] = deque(maxlen=_MOST_WAITING)
+
+    @property
+    def blocks(self) -> Blocks:
+        """The map that is shown."""
+        return self.shown.blocks
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks of the map that is shown."""
+        return len(self.shown)
+
+    @property
+    def target(self) -> Blocks:
+        """The map that is matched with."""
+        return self.matched.blocks
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
-        self.newest = scan
         belief = self._belief_at(scan)
         if not self.matching or len(self.matched) < self.settings.fewest_blocks:
             return self._place(scan, belief)
@@ -91,7 +116,7 @@ class Mapper:
         return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
-        """Take a match as the truth: the scan goes into the map, its pose into the belief."""
+        """Accept a match: insert the scan into the map, and take its pose over into the belief."""
         theta = np.concatenate([result.pose, result.rate, result.motion])
         self.belief = Belief(scan.reference_time, theta, result.state_covariance)
         self.correction = result.correction(scan)
@@ -99,31 +124,35 @@ class Mapper:
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
         return ScanUpdate(scan, result, True, self.belief)
 
-    def take_cloud(self, cloud: Scan) -> CloudUpdate:
+    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
         """Insert a cloud into the map that is shown, or let it wait for the match of its time."""
         if not self.matching:
-            return CloudUpdate(self.shown.insert(transformed(self.correction, cloud.points)), False, 0)
-        if cloud.reference_time > self._history.end:
+            return self.take_placed(transformed(self.correction, cloud.points))
+        if cloud.end > self._history.end:
             self._waiting.append(cloud)
             return CloudUpdate(_NOTHING, True, 0)
         points, unplaced = self._history.placed(cloud)
         return CloudUpdate(self.shown.insert(points), False, unplaced)
 
+    def take_placed(self, points: np.ndarray) -> CloudUpdate:
+        """Insert points (n, 4) that are in map already into the map that is shown."""
+        return CloudUpdate(self.shown.insert(points), False, 0)
+
     def take_waiting(self) -> Optional[CloudUpdate]:
         """Insert the next cloud that waited, if its time is known now; None when there is none."""
-        if not self._waiting or (self.matching and self._waiting[0].reference_time > self._history.end):
+        if not self._waiting or (self.matching and self._waiting[0].end > self._history.end):
             return None
         return self.take_cloud(self._waiting.popleft())
 
     def follow(self, track: Track, time: float) -> None:
-        """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
+        """Predict the belief at a later `time` by the odometry, after a long time without scans."""
         if self.belief is not None and time > self.belief.time:
             self.belief = predicted(self.belief, track, time, self.errors)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)
         self._history.add(times, poses, scan.track, holds=True)
-        self.matched.insert(self._history.placed(scan)[0])
+        self.matched.insert(self._history.placed(TimedPoints.of_scan(scan))[0])
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
         # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
         if belief.theta[ERRORS].any():
@@ -143,7 +172,7 @@ class Mapper:
         if scan.reference_time <= self.belief.time:
             return self.belief
         belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
-        return held_to_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
+        return updated_by_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""

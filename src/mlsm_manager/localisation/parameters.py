@@ -1,14 +1,18 @@
-"""Parameters of mlsm_core."""
+"""Parameters of the localiser, live and on recordings, and of mlsm_core."""
 
 from dataclasses import dataclass
 from enum import Enum
 
-from mlsm_manager.localisation.mapper import MapSettings
+from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
+from mlsm_manager.localisation.mapper import Mapper, MapSettings
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
+from mlsm_manager.localisation.relocalisation import relocaliser
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
+# A block takes 112 bytes with its part of the index: 1.8 GB, more than a vehicle's computer can spare.
 MAX_PREALLOCATED_CELLS = 16_000_000
 
 
@@ -19,16 +23,67 @@ class MatchInput(Enum):
     CLEANED = "CLEANED"
 
 
-class MapInput(Enum):
-    """Which points make the map that is shown and saved."""
+@dataclass(frozen=True)
+class MapParameters(ParameterSet):
+    """The grids of the map, and how fast map -> odom follows a fix."""
 
-    CLEANED = "CLEANED"
-    MATCHED = "MATCHED"
+    resolution: float = parameter(
+        0.5, "side of a cell of the map that is shown and saved", unit="m", low=0.01, high=100.0, tunable=False,
+        thesis_name="resolution",
+    )  # fmt: skip
+    match_resolution: float = parameter(
+        0.5, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0, tunable=False
+    )
+    map_limit: float = parameter(
+        10000.0, "points farther than this from the map's origin are left out", unit="m", low=1.0, high=1e6,
+        tunable=False,
+    )  # fmt: skip
+    blend_time: float = parameter(1.0, "map -> odom moves to a new fix within this time", unit="s", low=0.0, high=60.0)
 
 
 @dataclass(frozen=True)
-class MatchingParameters(ParameterSet):
-    """What is matched, and what becomes of the answers."""
+class LocaliserParameters(MatcherChoice, OdometryErrors, MapParameters):
+    """All that a localiser is made from."""
+
+    def build_localiser(self) -> Localiser:
+        """Return a localiser with an empty map."""
+        settings = self.localiser_settings()
+        mapper = Mapper(self.map_settings(), self.part(OdometryErrors), settings.matcher)
+        mapper.matching = self.matches_from_start
+        return Localiser(mapper, settings)
+
+    def localiser_settings(self) -> LocaliserSettings:
+        """Return the settings that a localiser can take over while it runs."""
+        anywhere = relocaliser(self.with_effective_beam_width().part(DistributionMatcherParameters))
+        return LocaliserSettings(
+            self.build_matcher(), anywhere, self.edge_half_width, self.blend_time, self.chosen_map_input
+        )
+
+    def map_settings(self) -> MapSettings:
+        """Return what the grids are made from."""
+        return MapSettings(
+            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points
+        )
+
+    @property
+    def matches_from_start(self) -> bool:
+        """Whether scans are matched from the start."""
+        return True
+
+    @property
+    def chosen_map_input(self) -> MapInput:
+        """Which points make the map that is shown and saved."""
+        return MapInput.MATCHED
+
+    @property
+    def expected_blocks(self) -> int:
+        """Number of blocks to reserve memory for."""
+        return 0
+
+
+@dataclass(frozen=True)
+class MlsmNodeParameters(ParameterSet):
+    """What only the live node needs: inputs, frames and rates."""
 
     match_input: MatchInput = parameter(
         MatchInput.ECHOES, "points that are matched: sonar/scan/echoes or sonar/scan/cleaned", tunable=False
@@ -39,34 +94,15 @@ class MatchingParameters(ParameterSet):
         tunable=False,
     )  # fmt: skip
     start_matching: bool = parameter(
-        False, "match from the start; afterwards the topic startMatching says it", tunable=False
-    )
-    match_resolution: float = parameter(
-        0.5, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0, tunable=False
-    )
-    blend_time: float = parameter(
-        1.0, "map -> odom goes over to a new fix within this time", unit="s", low=0.0, high=60.0
-    )
-
-
-@dataclass(frozen=True)
-class MapParameters(ParameterSet):
-    """The map's grid, its frames and how often it is shown."""
-
-    resolution: float = parameter(
-        0.5, "side of a cell", unit="m", low=0.01, high=100.0, tunable=False, thesis_name="resolution"
+        False, "match from the start; the topic startMatching turns it on and off", tunable=False
     )
     size_x_meters: float = parameter(
-        120.0, "extent to reserve memory for; the map grows as it must", unit="m", low=0.0, high=100000.0,
+        120.0, "extent to reserve memory for; the map grows beyond it when it must", unit="m", low=0.0, high=100000.0,
         tunable=False, thesis_name="sizeXMeters",
     )  # fmt: skip
     size_y_meters: float = parameter(
-        50.0, "extent to reserve memory for; the map grows as it must", unit="m", low=0.0, high=100000.0,
+        50.0, "extent to reserve memory for; the map grows beyond it when it must", unit="m", low=0.0, high=100000.0,
         tunable=False, thesis_name="sizeYMeters",
-    )  # fmt: skip
-    map_limit: float = parameter(
-        10000.0, "points farther than this from the map's origin are left out", unit="m", low=1.0, high=1e6,
-        tunable=False,
     )  # fmt: skip
     map_frame: str = parameter("map", "frame of the map", tunable=False)
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
@@ -78,10 +114,15 @@ class MapParameters(ParameterSet):
         0.1, "how far into the future map -> odom is stamped", unit="s", low=0.0, high=10.0
     )
     map_period: float = parameter(
-        1.0, "a changed map is published at most this often, in wall time", unit="s", low=0.05, high=3600.0,
+        1.0, "shortest time between two messages of the map, in wall time", unit="s", low=0.05, high=3600.0,
         tunable=False,
     )  # fmt: skip
     save_folder: str = parameter("~/.ros/maps", "the only folder that save_map writes to", tunable=False)
+
+
+@dataclass(frozen=True)
+class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameters):
+    """All of mlsm_core's parameters, in one namespace."""
 
     def check(self) -> None:
         """Refuse an extent that cannot be reserved, and a map that would correct itself."""
@@ -94,17 +135,16 @@ class MapParameters(ParameterSet):
             raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
 
     @property
+    def matches_from_start(self) -> bool:
+        """Whether scans are matched from the start."""
+        return self.start_matching
+
+    @property
+    def chosen_map_input(self) -> MapInput:
+        """Which points make the map that is shown and saved."""
+        return self.map_input
+
+    @property
     def expected_blocks(self) -> int:
         """Cells of the reserved extent."""
         return int(self.size_x_meters / self.resolution) * int(self.size_y_meters / self.resolution)
-
-
-@dataclass(frozen=True)
-class MlsmCoreParameters(MatcherChoice, OdometryErrors, MatchingParameters, MapParameters, StampParameters):
-    """All of mlsm_core's parameters, in one namespace."""
-
-    def settings(self) -> MapSettings:
-        """Return what the mapper's grids are made from."""
-        return MapSettings(
-            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points
-        )

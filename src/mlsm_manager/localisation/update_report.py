@@ -1,10 +1,10 @@
-"""Tells the diagnostics what became of scans and clouds."""
+"""Reports to the diagnostics what was done with scans and clouds."""
 
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from node_support.health import Health
 
 
-def tell_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
+def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     """Count a scan and show what its match found."""
     health.show("matching", "on" if matching else "off")
     result = update.result
@@ -21,10 +21,10 @@ def tell_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     health.show("odometry scale error", f"{result.motion[0]:.3f}")
     health.show("odometry direction error [rad]", f"{result.motion[1]:.4f}")
     if not update.accepted:
-        health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction stay")
+        health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction are kept")
 
 
-def tell_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:
+def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:
     """Count a cloud and warn of points that did not get into the map."""
     if update.waiting:
         health.count("clouds waiting for their match")
@@ -32,7 +32,7 @@ def tell_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -
     health.count("points inserted", update.report.inserted)
     health.show("blocks", str(blocks))
     if update.unplaced:
-        health.count("points left out, their scan was not matched", update.unplaced)
+        health.count("points not inserted because their scan was not matched", update.unplaced)
     if update.report.outside:
         detail = f"{update.report.outside} beyond map_limit of {limit:g} m; check tf"
         health.problem("points outside the map", detail, update.report.outside)

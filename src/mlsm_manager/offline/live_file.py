@@ -1,4 +1,4 @@
-"""live.yaml: the parameters under which the live nodes do what map_bag did."""
+"""live.yaml: parameters with which the live nodes do what map_bag did."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -24,13 +24,16 @@ _COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.la
 
 
 def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> Dict[str, Dict[str, Any]]:
-    """Return by node what it must be set to, so that it does what a replay with `parameters` did."""
+    """Return for each node the parameters with which it does what a replay with `parameters` did."""
     values = {name: _common(parameters.to_mapping(), name) for name in NODES}
     cloud = SonarToCloudParameters(target_frame=odom_frame)
     values["sonar_to_cloud"].update(
         target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
     )
     values["mlsm_core"].update(
+        size_x_meters=0.0,
+        size_y_meters=0.0,
+        map_frame="map" if odom_frame != "map" else "corrected_map",
         odom_frame=odom_frame,
         base_frame=base_frame,
         match_input=MatchInput.ECHOES.value,
@@ -55,8 +58,13 @@ def replay_values(values: Mapping[str, Any]) -> Dict[str, Any]:
 
 def write_live(path: Path, parameters: ReplayParameters, odom_frame: str, base_frame: str) -> None:
     """Write live.yaml whole or not at all; raises OSError."""
-    text = yaml.safe_dump(live_values(parameters, odom_frame, base_frame), sort_keys=False, allow_unicode=True)
-    write_whole(path, (_COMMENT + text).encode())
+    write_whole(path, live_text(parameters, odom_frame, base_frame).encode())
+
+
+def live_text(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> str:
+    """Return the text of live.yaml."""
+    values = live_values(parameters, odom_frame, base_frame)
+    return _COMMENT + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
 
 
 def _common(values: Mapping[str, Any], node: str) -> Dict[str, Any]:

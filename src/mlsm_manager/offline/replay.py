@@ -1,14 +1,13 @@
-"""Runs the mapper over a recording as the live graph would have run it."""
+"""Gives a recording to the localiser as the live graph would have given it."""
 
 from dataclasses import dataclass, field
 from typing import Callable, List, Sequence
 
 import numpy as np
 
-from mlsm_manager.localisation.live_correction import LiveCorrection
+from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.mapper import Mapper, ScanUpdate
-from mlsm_manager.localisation.sensor_model import trusted
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.geometry.planar import composed
@@ -42,30 +41,24 @@ class Replayed:
 def replay(
     recording: Recording, scans: Sequence[Scan], parameters: ReplayParameters, on_scans: Callable[[int], None]
 ) -> Replayed:
-    """Match the `scans` of corrected beams one after the other; `on_scans` is told with 1 that one is done.
+    """Match the `scans` of corrected beams one after the other; `on_scans` is called with 1 after each of them.
 
     A scan is used from the moment on at which its last beam and the odometry of that time were known.
     """
-    mapper, live = parameters.build_mapper(), LiveCorrection(parameters.blend_time)
-    track, corrections, updates = recording.track, np.empty((len(recording.track.times), 3)), []
+    localiser, track = parameters.build_localiser(), recording.track
+    corrections, updates = np.empty((len(track.times), 3)), []
     done = 0
-    for untrusted in scans:
-        scan = trusted(untrusted, parameters.edge_half_width)
-        known = int(np.searchsorted(track.times, scan.reference_time, side="left"))
-        done = _follow(live, recording, corrections, done, known)
-        updates.append(mapper.take_echoes(scan))
-        mapper.take_cloud(scan)
-        while mapper.take_waiting() is not None:
-            pass
-        live.believe(updates[-1].belief)
+    for scan in scans:
+        known = max(done, int(np.searchsorted(track.times, scan.reference_time, side="left")))
+        corrections[done:known] = _corrections(localiser, track, done, known)
+        done = known
+        updates.append(localiser.take_scan(scan).scan)
         on_scans(1)
-    _follow(live, recording, corrections, done, len(track.times))
-    corrected = composed(corrections, track.poses)
-    return Replayed(track.times, track.poses, corrected, mapper, updates)
+    corrections[done:] = _corrections(localiser, track, done, len(track.times))
+    return Replayed(track.times, track.poses, composed(corrections, track.poses), localiser.mapper, updates)
 
 
-def _follow(live: LiveCorrection, recording: Recording, corrections: np.ndarray, start: int, end: int) -> int:
-    track = recording.track
-    for index in range(start, end):
-        corrections[index] = live.sample(float(track.times[index]), track.poses[index])
-    return max(start, end)
+def _corrections(localiser: Localiser, track: Track, start: int, end: int) -> np.ndarray:
+    """Return T_map_odom (end - start, 3) at the track's times from number `start` to before number `end`."""
+    found = [localiser.correction(float(track.times[one]), track.poses[one]) for one in range(start, end)]
+    return np.array(found).reshape(-1, 3)

@@ -10,8 +10,11 @@ from node_support.headers import DAY
 from node_support.health import Health
 from node_support.ros.tf_buffer import TfBuffer, stamp_of
 
+# s that tf remembers: three slow turns of the head.
 _CACHE = 180.0
+# s to wait for odometry that is on its way; then the scan is given up.
 _PATIENCE = 1.0
+# Times of a track besides those of the beams: four a second in a turn of 16 s.
 _STEADY = 65
 
 
@@ -51,10 +54,16 @@ class OdometryTrack:
         """Return the (4, 4) T_odom_base at `time` [s], which a track has been made of."""
         return self._transforms.matrix(*self._frames, stamp_of(time))
 
-    def newest(self) -> Optional[Tuple[float, np.ndarray]]:
-        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none."""
+    def newest(self) -> Optional[Tuple[Optional[float], np.ndarray]]:
+        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none.
+
+        Static transforms hold at all times and have none of their own: the time is then None.
+        """
         found = self._transforms.newest(*self._frames)
-        return None if found is None else (found[0] * 1e-9, _planar(found[1]))
+        if found is None:
+            return None
+        stamp_ns, matrix = found
+        return (stamp_ns * 1e-9 if stamp_ns else None), _planar(matrix)
 
     def _pose(self, time: float) -> Optional[np.ndarray]:
         try:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import Optional
 
 import numpy as np
 
@@ -11,10 +12,12 @@ COUNT = 8
 BOTTOM = 9
 TOP = 10
 ROW_WIDTH = 11
+MOST_CROSSINGS = np.iinfo(np.uint16).max
+"""Crossings are counted up to here, in two bytes per block."""
 
 
 class BlockType(IntEnum):
-    """Kind of surface. FREE (thesis 6.2.1) is part of the map's vocabulary; inserting points never makes one."""
+    """Kind of surface. FREE (thesis 6.2.1) is what the blocks of a map's free space are, see surface_map/free_space."""
 
     HORIZONTAL = 0
     VERTICAL = 1
@@ -28,10 +31,16 @@ class Blocks:
     rows: (n, 11) float64: mean x y z [m] and strength, their sums of squared deviations, number of points,
         bottom and top [m].
     resolution: side of a cell, m.
+    crossed: (n,) uint16, number of beams that crossed the block since a point last fell into it; 0 when left out.
     """
 
     rows: np.ndarray
     resolution: float
+    crossed: Optional[np.ndarray] = None
+
+    def __post_init__(self) -> None:
+        if self.crossed is None:
+            object.__setattr__(self, "crossed", np.zeros(len(self.rows), dtype=np.uint16))
 
     def __len__(self) -> int:
         return len(self.rows)
@@ -80,6 +89,15 @@ class Blocks:
     def centers(self) -> np.ndarray:
         """(n, 2) x y of each block's cell centre, m."""
         return (self.cells + 0.5) * self.resolution
+
+    def take(self, chosen: np.ndarray) -> "Blocks":
+        """Return the blocks at `chosen`, a mask or indices."""
+        return Blocks(self.rows[chosen], self.resolution, self.crossed[chosen])
+
+    def in_box(self, low: np.ndarray, high: np.ndarray) -> "Blocks":
+        """Return the blocks with means from `low` to `high`, (2,) x y or (3,) x y z [m]."""
+        places = self.rows[:, : len(low)]
+        return self.take(((places >= low) & (places <= high)).all(axis=1))
 
 
 def cells_of(points: np.ndarray, resolution: float) -> np.ndarray:

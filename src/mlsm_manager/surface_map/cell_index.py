@@ -3,7 +3,9 @@
 import numpy as np
 
 _EMPTY = np.iinfo(np.int64).min
+# Share of the table in use: from there on probing takes longer than growing.
 _MAX_LOAD = 0.6
+# The golden ratio times 2^64 and a prime of xxHash: they spread neighbouring cells over the table.
 _MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
 _MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
 NO_BLOCK = -1
@@ -12,6 +14,12 @@ NO_BLOCK = -1
 def cell_keys(cells: np.ndarray) -> np.ndarray:
     """Return (n,) int64, one key per cell; cells is (n, 2) int64 with |index| < 2**31. Keys sort by x, then by y."""
     return (cells[:, 0] << 32) + cells[:, 1]
+
+
+def cells_of_keys(keys: np.ndarray) -> np.ndarray:
+    """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
+    low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
+    return np.column_stack([(keys - low) >> 32, low])
 
 
 class CellIndex:
@@ -45,6 +53,18 @@ class CellIndex:
             pending = pending[self._keys[place] != wanted]
             slots[pending] = (slots[pending] + 1) & (self._keys.size - 1)
         return slots
+
+    def find(self, keys: np.ndarray) -> np.ndarray:
+        """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
+        heads = np.full(keys.size, NO_BLOCK, dtype=np.int32)
+        slots, pending = self._first_slots(keys), np.arange(keys.size)
+        while pending.size:
+            held = self._keys[slots]
+            found = held == keys[pending]
+            heads[pending[found]] = self.heads[slots[found]]
+            further = ~found & (held != _EMPTY)
+            pending, slots = pending[further], (slots[further] + 1) & (self._keys.size - 1)
+        return heads
 
     def _allocate(self, minimum: int) -> None:
         capacity = 1 << max(int(minimum - 1).bit_length(), 10)

@@ -9,6 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, SQUARES, TOP, Blocks
+
 
 @dataclass(frozen=True)
 class Intervals:
@@ -16,7 +18,8 @@ class Intervals:
 
     cell: (n,) int64 key of the cell. bottom, top: (n,) m. count: (n,) points.
     mean, squares: (n, 4) mean of x y z strength and sum of squared deviations from it.
-    row: (n,) int64 number of the stored block, -1 for points that are new.
+    row: (n,) int64 number of the stored block, -1 for what is new.
+    crossed: (n,) uint16 number of beams that crossed it since a point last fell into it.
     """
 
     cell: np.ndarray
@@ -26,6 +29,7 @@ class Intervals:
     mean: np.ndarray
     squares: np.ndarray
     row: np.ndarray
+    crossed: np.ndarray
 
     def __len__(self) -> int:
         return len(self.cell)
@@ -35,11 +39,25 @@ class Intervals:
         return Intervals(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
 
+def joined(first: Intervals, second: Intervals) -> Intervals:
+    """Return those of the first, then those of the second."""
+    names = first.__dataclass_fields__
+    return Intervals(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
+
+
 def concatenated(first: Intervals, second: Intervals) -> Intervals:
     """Return both, sorted by cell, then by bottom."""
-    names = first.__dataclass_fields__
-    both = Intervals(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
+    both = joined(first, second)
     return both.take(np.lexsort((both.bottom, both.cell)))
+
+
+def intervals_of(blocks: Blocks, cell: np.ndarray) -> Intervals:
+    """Return blocks (n) of cells with keys `cell` (n,) as intervals that are new, in the blocks' order."""
+    rows = blocks.rows
+    new = np.full(len(rows), -1, dtype=np.int64)
+    return Intervals(
+        cell, rows[:, BOTTOM], rows[:, TOP], rows[:, COUNT], rows[:, MEAN], rows[:, SQUARES], new, blocks.crossed
+    )
 
 
 def group_points(points: np.ndarray, cell: np.ndarray, resolution: float) -> Intervals:
@@ -58,7 +76,9 @@ def group_points(points: np.ndarray, cell: np.ndarray, resolution: float) -> Int
     mean = points[starts] + _sums(points - points[starts][group], group, len(starts)) / count[:, np.newaxis]
     squares = _sums((points - mean[group]) ** 2, group, len(starts))
     new = np.full(len(starts), -1, dtype=np.int64)
-    return Intervals(cell[starts], z[starts], z[ends], count, mean, squares, new)
+    return Intervals(
+        cell[starts], z[starts], z[ends], count, mean, squares, new, np.zeros(len(starts), dtype=np.uint16)
+    )
 
 
 def link(intervals: Intervals, resolution: float) -> np.ndarray:
@@ -72,6 +92,24 @@ def link(intervals: Intervals, resolution: float) -> np.ndarray:
     starts[0] = True
     starts[1:] = (cell[1:] != cell[:-1]) | (intervals.bottom[1:] - reached[:-1] >= resolution)
     return np.flatnonzero(starts)
+
+
+def linked_alone(intervals: Intervals, resolution: float) -> Intervals:
+    """Return what intervals in any order (n > 0) make among themselves, sorted, at least the resolution apart."""
+    if not _is_sorted(intervals):
+        intervals = intervals.take(np.lexsort((intervals.bottom, intervals.cell)))
+    while True:
+        apart = intervals.bottom[1:] - intervals.top[:-1] >= resolution
+        starts = np.flatnonzero(np.append(True, (intervals.cell[1:] != intervals.cell[:-1]) | apart))
+        if len(starts) == len(intervals):
+            return intervals
+        # One pass joins neighbours only; what reaches beyond its neighbour meets the next one in the next pass.
+        intervals = merge(intervals, starts)
+
+
+def _is_sorted(intervals: Intervals) -> bool:
+    cell, bottom = intervals.cell, intervals.bottom
+    return bool(((cell[1:] > cell[:-1]) | ((cell[1:] == cell[:-1]) & (bottom[1:] >= bottom[:-1]))).all())
 
 
 def _last_top(intervals: Intervals, chosen: np.ndarray) -> np.ndarray:
@@ -88,7 +126,8 @@ def merge(intervals: Intervals, starts: np.ndarray) -> Intervals:
     """Return one interval for each run that begins at `starts`, with exactly pooled mean and variance.
 
     The pooling is that of Chan, Golub and LeVeque (1979); equation 6.6 of the thesis underestimates the variance. Of
-    the stored blocks in a run the one with the highest number gives its row.
+    the stored blocks in a run the one with the highest number gives its row. Whatever is new ends the count of
+    crossings of what was stored, because a beam found the block where it was.
     """
     group = np.zeros(len(intervals), dtype=np.int64)
     group[starts[1:]] = 1
@@ -107,6 +146,7 @@ def merge(intervals: Intervals, starts: np.ndarray) -> Intervals:
         mean,
         squares,
         np.maximum.reduceat(intervals.row, starts),
+        np.maximum.reduceat(np.where(intervals.row < 0, intervals.crossed, 0), starts),
     )
 
 

@@ -1,14 +1,16 @@
 """The Multi Level Surface Map: a grid of cells, each with blocks at several heights (thesis 6.2, 6.5.6)."""
 
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks, cells_of
-from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex, cell_keys
-from mlsm_manager.surface_map.linkage import Intervals, concatenated, group_points, link, merge
-
-_MIN_ROWS = 1024
+from mlsm_manager.surface_map.block_store import BlockStore
+from mlsm_manager.surface_map.blocks import Blocks, cells_of
+from mlsm_manager.surface_map.cell_index import cell_keys
+from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
+from mlsm_manager.surface_map.insertion import InsertionKernel, insert_groups, point_inserter
+from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
 
 
 @dataclass(frozen=True)
@@ -21,35 +23,94 @@ class InsertReport:
 
 
 class MultiLevelSurfaceMap:
-    """Blocks in one float64 row each, found through the first block of their cell and a chain from there.
+    """Blocks found by cell.
 
     The cost of inserting a scan depends on the scan and on the blocks of the cells it touches, not on the map.
     """
 
-    def __init__(self, resolution: float, limit: float = 10000.0, expected_blocks: int = 0) -> None:
-        """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted."""
+    def __init__(
+        self,
+        resolution: float,
+        limit: float = 10000.0,
+        expected_blocks: int = 0,
+        kernel: InsertionKernel = InsertionKernel.NUMPY,
+    ) -> None:
+        """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted.
+
+        Raises ImportError for a kernel that is not installed.
+        """
         self.resolution = resolution
         self.limit = limit
-        self._rows = np.empty((max(expected_blocks, _MIN_ROWS), ROW_WIDTH))
-        self._next = np.empty(len(self._rows), dtype=np.int32)
-        self._index = CellIndex(expected_blocks)
-        self._used = 0
-        self._free = np.empty(0, dtype=np.int64)
+        self._store = BlockStore(expected_blocks)
+        self._changed = ChangedTiles()
+        self._insert_points = point_inserter(kernel)
 
     def __len__(self) -> int:
         """Return the number of blocks."""
-        return self._used - len(self._free)
+        return len(self._store)
 
     @property
     def nbytes(self) -> int:
-        """Memory in use, bytes; rows beyond those are reserved but never touched, so that they cost nothing yet."""
-        return self._used * (self._rows.itemsize * ROW_WIDTH + self._next.itemsize) + self._index.nbytes
+        """Memory in use, bytes; what is reserved but not touched yet costs nothing and is not counted."""
+        return self._store.nbytes
 
     @property
     def blocks(self) -> Blocks:
         """A copy of all blocks, in no particular order."""
-        rows = self._rows[: self._used]
-        return Blocks(rows[rows[:, COUNT] > 0], self.resolution)
+        return self._store.blocks(self._store.rows_in_use, self.resolution)
+
+    def in_box(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return a copy of the blocks whose mean lies between `low` and `high`, (2,) x y or (3,) x y z [m].
+
+        The blocks come in the order in which `blocks` has them. The cost is that of the cells in the box.
+        """
+        low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        return self._in_cells(*cells_of(np.clip([low, high], -self.limit, self.limit), self.resolution)).in_box(
+            low, high
+        )
+
+    def in_tiles(self, tiles: np.ndarray) -> Blocks:
+        """Return a copy of the blocks of tiles (n, 2), none twice, as `take_changed_tiles` names them."""
+        side = np.arange(1 << TILE_BITS)
+        within = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(1, -1, 2)
+        cells = (np.asarray(tiles, dtype=np.int64).reshape(-1, 1, 2) << TILE_BITS) + within
+        rows, _ = self._store.find(cell_keys(cells.reshape(-1, 2)))
+        return self._store.blocks(rows, self.resolution)
+
+    def take_changed_tiles(self) -> np.ndarray:
+        """Return the (n, 2) int64 tiles whose blocks changed since the last call, sorted.
+
+        Tile (i, j) covers 2 ** TILE_BITS cells on a side. A count of crossings is no change.
+        """
+        return self._changed.take()
+
+    def find(self, cells: np.ndarray) -> Tuple[Blocks, np.ndarray, np.ndarray]:
+        """Return the blocks (m) of cells (n, 2), the row of each (m,), and the index of its cell in `cells` (m,).
+
+        The rows are good for `count_crossings` and `remove`, until points are inserted or blocks removed.
+        """
+        rows, owners = self._store.find(cell_keys(cells))
+        return self._store.blocks(rows, self.resolution), rows, owners
+
+    def count_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
+        """Count `beams` (n,) more crossings of the blocks in `rows` (n,), none twice."""
+        self._store.add_crossings(rows, beams)
+
+    def remove(self, rows: np.ndarray) -> None:
+        """Forget the blocks in `rows` (n,), none twice."""
+        if not len(rows):
+            return
+        cells = np.unique(cell_keys(self._store.blocks(rows, self.resolution).cells))
+        slots = self._store.slots(cells)
+        held = self._store.stored(cells, slots)
+        kept = held.take(np.flatnonzero(~np.isin(held.row, rows)))
+        kept = kept.take(np.lexsort((kept.bottom, kept.cell)))
+        self._store.release(rows)
+        still = np.isin(cells, kept.cell)
+        self._store.empty(slots[~still])
+        if still.any():
+            self._store.chain(kept.row, kept.cell, slots[still])
+        self._changed.note(cells)
 
     def insert(self, points: np.ndarray) -> InsertReport:
         """Insert points (n, 4), x y z [m] and strength, in the map's frame, as one batch.
@@ -63,75 +124,35 @@ class MultiLevelSurfaceMap:
         keep = finite & inside
         kept = points if keep.all() else points[keep]
         if len(kept):
-            self._insert_groups(group_points(kept, cell_keys(cells_of(kept, self.resolution)), self.resolution))
+            keys = cell_keys(cells_of(kept, self.resolution))
+            self._changed.note(self._insert_points(self._store, kept, keys, self.resolution))
         not_finite = len(points) - int(np.count_nonzero(finite))
         return InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
 
-    def _insert_groups(self, groups: Intervals) -> None:
-        cells = groups.cell[np.flatnonzero(np.append(True, groups.cell[1:] != groups.cell[:-1]))]
-        slots = self._index.slots(cells)
-        elements = concatenated(groups, self._stored(cells, slots))
-        starts = link(elements, self.resolution)
-        merged = merge(elements, starts)
-        size = np.diff(np.append(starts, len(elements)))
-        self._release(elements, merged, np.repeat(np.arange(len(starts)), size))
-        rows = merged.row.copy()
-        new = rows < 0
-        rows[new] = self._take_rows(int(np.count_nonzero(new)))
-        self._write(rows, merged, changed=new | (size > 1))
-        self._chain(rows, merged.cell, slots)
+    def insert_blocks(self, blocks: Blocks) -> InsertReport:
+        """Insert blocks of the same resolution; each goes where its mean lies, as if its points came with it.
 
-    def _stored(self, cells: np.ndarray, slots: np.ndarray) -> Intervals:
-        rows, owners = [], []
-        row = self._index.heads[slots].astype(np.int64)
-        owner = cells
-        while True:
-            present = row != NO_BLOCK
-            row, owner = row[present], owner[present]
-            if not row.size:
-                break
-            rows.append(row)
-            owners.append(owner)
-            row = self._next[row].astype(np.int64)
-        all_rows = np.concatenate(rows) if rows else np.empty(0, dtype=np.int64)
-        owner = np.concatenate(owners) if owners else np.empty(0, dtype=np.int64)
-        data = self._rows[all_rows]
-        return Intervals(
-            owner, data[:, BOTTOM], data[:, TOP], data[:, COUNT], data[:, MEAN], data[:, SQUARES], all_rows
-        )
+        The report counts points. Blocks with their mean, bottom or top beyond the limit are left out.
+        Raises ValueError for another resolution.
+        """
+        if blocks.resolution != self.resolution:
+            raise ValueError(f"resolution {blocks.resolution:g} m: must be the map's, {self.resolution:g} m")
+        reach = np.abs(np.column_stack([blocks.mean[:, :2], blocks.bottom, blocks.height])).max(axis=1)
+        kept = blocks.take(reach <= self.limit)
+        if len(kept):
+            cells = cell_keys(cells_of(kept.mean, self.resolution))
+            groups = linked_alone(intervals_of(kept, cells), self.resolution)
+            self._changed.note(insert_groups(self._store, groups, self.resolution))
+        inserted = int(kept.count.sum())
+        return InsertReport(inserted, 0, int(blocks.count.sum()) - inserted)
 
-    def _release(self, elements: Intervals, merged: Intervals, run: np.ndarray) -> None:
-        fused = (elements.row >= 0) & (elements.row != merged.row[run])
-        if fused.any():
-            self._rows[elements.row[fused], COUNT] = 0
-            self._free = np.concatenate([self._free, elements.row[fused]])
-
-    def _take_rows(self, number: int) -> np.ndarray:
-        reused, self._free = self._free[:number], self._free[number:]
-        first, self._used = self._used, self._used + number - len(reused)
-        if self._used > len(self._rows):
-            capacity = max(2 * len(self._rows), self._used)
-            self._rows = _grown(self._rows, first, capacity)
-            self._next = _grown(self._next, first, capacity)
-        return np.concatenate([reused, np.arange(first, self._used)])
-
-    def _write(self, rows: np.ndarray, merged: Intervals, changed: np.ndarray) -> None:
-        data = np.empty((len(rows), ROW_WIDTH))
-        data[:, MEAN] = merged.mean
-        data[:, SQUARES] = merged.squares
-        data[:, COUNT] = merged.count
-        data[:, BOTTOM] = merged.bottom
-        data[:, TOP] = merged.top
-        self._rows[rows[changed]] = data[changed]
-
-    def _chain(self, rows: np.ndarray, cell: np.ndarray, slots: np.ndarray) -> None:
-        same_cell = np.append(cell[1:] == cell[:-1], False)
-        self._next[rows] = np.where(same_cell, np.append(rows[1:], NO_BLOCK), NO_BLOCK)
-        first = np.append(True, ~same_cell[:-1])
-        self._index.heads[slots] = rows[first]
-
-
-def _grown(array: np.ndarray, used: int, capacity: int) -> np.ndarray:
-    result = np.empty((capacity, *array.shape[1:]), dtype=array.dtype)
-    result[:used] = array[:used]
-    return result
+    def _in_cells(self, first: np.ndarray, last: np.ndarray) -> Blocks:
+        """Return the blocks of cells from `first` to `last`, (2,) each, both included, sorted by row."""
+        width = np.maximum(last - first + 1, 0)
+        if int(width[0]) * int(width[1]) > len(self._store):
+            blocks = self.blocks
+            return blocks.take(((blocks.cells >= first) & (blocks.cells <= last)).all(axis=1))
+        x, y = np.arange(first[0], last[0] + 1), np.arange(first[1], last[1] + 1)
+        keys = ((x << 32)[:, np.newaxis] + y).ravel()
+        rows, _ = self._store.find(keys)
+        return self._store.blocks(np.sort(rows), self.resolution)

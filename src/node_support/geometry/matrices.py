@@ -19,6 +19,23 @@ def pose_matrix(xyz: Sequence[float], rpy: Sequence[float] = (0.0, 0.0, 0.0)) ->
     return pose
 
 
+def quaternion_of(matrix: np.ndarray) -> np.ndarray:
+    """Return the unit quaternion (4,), x y z w, of the rotation in a (3, 3) or (4, 4) matrix.
+
+    Each row of the products is the quaternion times one of its own components; the largest component loses least to
+    rounding (Shepperd 1978).
+    """
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix[:3, :3]
+    products = np.array([
+        [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
+        [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
+        [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
+        [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
+    ])  # fmt: skip
+    row = products[np.argmax(np.diag(products))]
+    return row / np.linalg.norm(row)
+
+
 def yaw_of(pose: np.ndarray) -> float:
     """Return the heading of a (4, 4) pose, rad in [-pi, pi]."""
     return math.atan2(pose[1, 0], pose[0, 0])

@@ -20,6 +20,9 @@ def unwrapped(angle: float, near: float) -> float:
 
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
+    # On a column of a table numpy picks between two sines by where in memory the result lies; they differ in the last
+    # bit, so that equal runs would end differently. Contiguous values always take the same one.
+    yaw = np.asarray(yaw, order="C")
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = vectors[..., 0], vectors[..., 1]
     first = cos * x - sin * y

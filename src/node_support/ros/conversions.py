@@ -2,9 +2,9 @@
 
 import numpy as np
 from geometry_msgs.msg import Pose, Transform
-from scipy.spatial.transform import Rotation
 
 from node_support.errors import RefusedInput
+from node_support.geometry.matrices import quaternion_of
 
 
 def matrix_from_message(transform: Transform) -> np.ndarray:
@@ -30,6 +30,5 @@ def pose_from_matrix(matrix: np.ndarray) -> Pose:
     """Return the pose message of a (4, 4) matrix."""
     pose = Pose()
     pose.position.x, pose.position.y, pose.position.z = matrix[:3, 3]
-    quaternion = Rotation.from_matrix(matrix[:3, :3]).as_quat()
-    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = quaternion
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = quaternion_of(matrix)
     return pose

@@ -1,7 +1,7 @@
 """Parameters of a running stage: read and validated at start-up, changed through dynamic_reconfigure."""
 
 import importlib
-from typing import Any, Callable, Mapping, Type
+from typing import Any, Callable, Mapping, Type, TypeVar
 
 import rospy
 from dynamic_reconfigure.server import Server
@@ -9,12 +9,22 @@ from dynamic_reconfigure.server import Server
 from node_support.health import Health
 from node_support.parameters import ParameterError, ParameterSet
 
+Parameters = TypeVar("Parameters", bound=ParameterSet)
+
 
 class _RefusingServer(Server):
     """Leaves values as they were sent, so that a value out of range is refused and not bent into it."""
 
     def _clamp(self, config: dict) -> None:
         pass
+
+
+def read_parameters(parameters: Type[Parameters], namespace: str) -> Parameters:
+    """Return what the parameter server holds in `namespace` ("~", or a resolved name).
+
+    Raises ParameterError for an unknown key or a value that is not allowed.
+    """
+    return parameters.from_mapping(rospy.get_param(namespace, {}) or {})
 
 
 class ReconfigurableParameters:
@@ -33,7 +43,7 @@ class ReconfigurableParameters:
         `on_change` is called with the first values and with every accepted change. Raises ParameterError when the
         parameter server holds an unknown key or a value that is not allowed.
         """
-        self.current = parameters.from_mapping(rospy.get_param(namespace, {}) or {})
+        self.current = read_parameters(parameters, namespace)
         self._on_change = on_change
         self._health = health
         on_change(self.current)

@@ -10,6 +10,7 @@ from node_support.errors import RefusedInput
 from node_support.geometry.planar import wrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.beam_width import beam_width_parameter
 
 MOST_PIXELS = 3000  # A picture of 9 MB; more, at the rate of beams, is too much for a network
 _USUAL_PIXELS = 501  # Odd, so that the head is in the middle of a pixel; a bin is then about a pixel
@@ -23,10 +24,7 @@ class SonarImageParameters(ParameterSet):
     metres_per_pixel: float = parameter(
         0.0, f"size of a pixel; 0: the range fits into {_USUAL_PIXELS} pixels", unit="m", low=0.0, high=10.0
     )
-    beam_width: float = parameter(
-        0.0436, "a beam is drawn at least this wide, and as wide as the steps of the head", unit="rad",
-        low=0.0, high=0.5,
-    )  # fmt: skip
+    beam_width: float = beam_width_parameter("a beam is drawn at least this wide, and as wide as the steps of the head")
     max_rate: float = parameter(20.0, "most images per second", unit="1/s", low=0.1, high=1000.0)
 
 

@@ -8,8 +8,8 @@ import numpy as np
 from sonar_simulator.world.materials import Material
 
 SOUND_SPEED = 1500.0
-"""m/s; a head turns times into ranges with a fixed speed."""
-# Facets at grazing incidence: keeps the cosine's powers finite, and there is nothing left of them there.
+"""m/s; a head converts times to ranges with a fixed speed."""
+# Smallest cosine of the incidence angle: keeps its powers finite where facets reflect practically nothing.
 _GRAZING = 0.05
 
 
@@ -17,7 +17,7 @@ def absorption(frequency_khz: float, temperature: float, salinity: float) -> flo
     """Return the absorption of sea water near the surface, dB/m (Ainslie and McColm, JASA 103, 1998; pH 8).
 
     temperature: degrees Celsius. salinity: parts per thousand, 0 in fresh water. Thesis 4.1.3 names its two causes:
-    ionic relaxation, boric acid's and magnesium sulphate's, and viscous friction.
+    ionic relaxation (of boric acid and magnesium sulphate) and viscous friction.
     """
     square = frequency_khz**2
     boron = 0.78 * math.sqrt(salinity / 35.0) * math.exp(temperature / 26.0)
@@ -29,10 +29,10 @@ def absorption(frequency_khz: float, temperature: float, salinity: float) -> flo
 
 
 class Scattering:
-    """How much a ray's patch of surface sends back, by material and incidence.
+    """How much sound a ray's patch of surface returns, by material and incidence.
 
-    Facets of a surface with Gaussian slopes mirror the sound back where they face the sonar (Kirchhoff's approximation
-    for high frequencies), finer roughness scatters it by Lambert's law (APL-UW TR 9407, section IV):
+    Facets of a surface with Gaussian slopes reflect sound back where they face the sonar (Kirchhoff's approximation
+    for high frequencies); finer roughness scatters it by Lambert's law (APL-UW TR 9407, section IV):
     sigma = R^2 / (8 pi s^2 cos^4 t) exp(-tan^2 t / 2 s^2) + mu cos^2 t, at incidence t.
     """
 
@@ -44,7 +44,7 @@ class Scattering:
         self._lambert = np.array([10.0 ** (material.lambert_db / 10.0) for material in materials])
 
     def per_ray(self, material: np.ndarray, cosines: np.ndarray) -> np.ndarray:
-        """Return sigma / cos t: the share sent back of what falls on a patch of 1 / cos t times the ray's section."""
+        """Return sigma / cos t: the share that returns from a patch of 1 / cos t times the ray's cross-section."""
         cosines = np.maximum(cosines, _GRAZING)
         inverse_square = 1.0 / np.square(cosines)
         facets = self._facets[material] * np.exp(self._steepness[material] * (1.0 - inverse_square))

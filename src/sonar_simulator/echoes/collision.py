@@ -1,4 +1,4 @@
-"""The thesis's collision echo model (6.4.1): all contacts of a cone with the world."""
+"""The thesis's collision echo model (6.4.1): counts all contacts of a cone with the world."""
 
 import math
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ from sonar_simulator.rays.cone_pattern import ConePattern
 
 @dataclass(frozen=True)
 class CollisionParameters(ContactEchoParameters):
-    """Parameters of `Collision`; the defaults are the thesis's numbers. Its sensor has no noise."""
+    """Parameters of `Collision`; the defaults are the thesis's numbers. The thesis's sensor has no noise."""
 
     spread: float = parameter(
         0.6, "standard deviation of the added contacts about their contact", unit="m", low=0.0, high=100.0
@@ -26,10 +26,10 @@ class CollisionParameters(ContactEchoParameters):
 
 
 class Collision(ContactEcho):
-    """Counts contacts by range, those that are added around each included; the fullest bin is the strongest.
+    """Counts contacts by range, including those added around each contact; the fullest bin is the strongest.
 
-    Where the thesis's engine reports contacts of meshes, rays spread over the cone do: its contacts went missing and
-    appeared where nothing was (6.4, "sonar cone bug").
+    Contacts come from rays spread over the cone. The thesis used contacts of meshes as its engine reported them, of
+    which some were missing and some were where there was nothing (6.4, "sonar cone bug").
     """
 
     def __init__(self, parameters: CollisionParameters) -> None:
@@ -37,7 +37,7 @@ class Collision(ContactEcho):
         self.parameters = parameters
 
     def pattern(self, fan: BeamPattern) -> RayPattern:
-        """Return as many rays as `fan` has, in the cone."""
+        """Return as many rays as `fan` has, spread over the cone."""
         return ConePattern(math.radians(self.parameters.opening_deg), fan.rays)
 
     def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
@@ -48,5 +48,5 @@ class Collision(ContactEcho):
         all_beams = np.concatenate([beam, np.repeat(beam, self.parameters.increments)])
         counts = self.counts(len(ranges), all_beams, np.concatenate([met, added]))
         fullest = np.maximum(counts.max(axis=1, keepdims=True), 1)
-        # Rounded up: a single contact is heard beside any number of others.
+        # Rounded up, so that a single contact is heard beside any number of others.
         return (-(-self.parameters.saturation * counts // fullest)).astype(np.uint8)

@@ -1,4 +1,4 @@
-"""What the thesis's two echo models share: they count contacts by range, then write noise over them (6.4)."""
+"""What the thesis's two echo models have in common: they count contacts by range, then add noise echoes (6.4)."""
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
@@ -14,13 +14,13 @@ from sonar_simulator.rays.mirrors import Mirrors
 
 @dataclass(frozen=True)
 class ContactEchoParameters(ParameterSet):
-    """Parameters of every model that counts contacts; the defaults are the thesis's numbers for the laser cone."""
+    """Parameters of all models that count contacts; the defaults are the thesis's values for the laser cone."""
 
     bins: int = parameter(500, "bins of a beam", low=1, high=4096, thesis_name="binCount", tunable=False)
     max_range: float = parameter(50.0, "range of the last bin's far end", unit="m", low=0.1, high=1000.0)
     spread: float = parameter(1.0, "standard deviation of an echo about its contact", unit="m", low=0.0, high=100.0)
     saturation: int = parameter(127, "greatest strength of a bin", low=1, high=255)
-    noise_echoes: int = parameter(15, "noise echoes written into each beam that hits something", low=0, high=10000)
+    noise_echoes: int = parameter(15, "noise echoes added to each beam that hits something", low=0, high=10000)
     noise_range_sd: float = parameter(
         4.0, "standard deviation of noise echoes about the nearest contact", unit="m", low=0.0, high=1000.0
     )
@@ -29,11 +29,11 @@ class ContactEchoParameters(ParameterSet):
 
 
 class ContactEcho(ABC):
-    """Strengths from counts of contacts, and noise echoes around the nearest contact.
+    """Computes strengths from counts of contacts, with noise echoes around the nearest contact.
 
-    Three things differ from the thesis's code: an echo spreads about the contact itself and not about the
-    near end of its bin, which drew surfaces up to a bin too near; echoes of negative range are dropped, not
-    heaped into bin 0; a beam that hits nothing stays silent, it has no contact to lay noise around.
+    Three things differ from the thesis's code: an echo spreads about the contact itself, not about the
+    near end of its bin, which placed surfaces up to a bin too near; echoes of negative range are dropped, not
+    added to bin 0; a beam that hits nothing has no echoes, because it has no contact to put noise around.
     """
 
     mirrors = Mirrors()
@@ -52,7 +52,7 @@ class ContactEcho(ABC):
         return self._settings.max_range
 
     def pattern(self, fan: BeamPattern) -> RayPattern:
-        """Return the rays the model wants for a head whose beam is `fan`: those."""
+        """Return the rays that the model needs for a head whose beam is `fan`: those of `fan`."""
         return fan
 
     def echoes(self, contacts: Contacts, rng: np.random.Generator) -> np.ndarray:
@@ -67,7 +67,7 @@ class ContactEcho(ABC):
         """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
 
     def counts(self, beams: int, beam: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-        """Return how many of the echoes at `ranges` (n,) m of beams number `beam` (n,) fall into each (beams, bins)."""
+        """Return (beams, bins): how many of the echoes at `ranges` (n,) m in beams `beam` (n,) each bin holds."""
         index, inside = self._bin_of(ranges)
         cells = beam[inside] * self.bins + index[inside]
         return np.bincount(cells, minlength=beams * self.bins).reshape(beams, self.bins)
@@ -81,6 +81,6 @@ class ContactEcho(ABC):
         strengths[beam[inside], index[inside]] = np.clip(noise[inside], 0, settings.saturation)
 
     def _bin_of(self, ranges: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return bin numbers and which of them exist; a bin holds its far end and not its near one."""
+        """Return bin numbers, and which of them exist; a bin includes its far end but not its near end."""
         index = np.ceil(ranges * self.bins / self.max_range).astype(np.int64) - 1
         return index, (index >= 0) & (index < self.bins)

@@ -1,4 +1,4 @@
-"""What an echo model is, and the table of those that a parameter can pick."""
+"""The interface of echo models, and the table from which a parameter selects one."""
 
 from typing import Any, Callable, Dict, Mapping, NamedTuple, Protocol, Type
 
@@ -14,14 +14,14 @@ from sonar_simulator.rays.mirrors import Mirrors
 
 
 class EchoModel(Protocol):
-    """Turns contacts into echo strengths, and says which rays it wants cast for that."""
+    """Turns contacts into echo strengths, and says which rays have to be cast for that."""
 
     bins: int
     max_range: float
     mirrors: Mirrors
 
     def pattern(self, fan: BeamPattern) -> RayPattern:
-        """Return the rays the model wants for a head whose beam is `fan`."""
+        """Return the rays that the model needs for a head whose beam is `fan`."""
 
     def echoes(self, contacts: Contacts, rng: np.random.Generator) -> np.ndarray:
         """Return strengths (beams, bins) uint8."""

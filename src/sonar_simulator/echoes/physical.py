@@ -1,4 +1,4 @@
-"""An echo model after the sonar equation, the thesis's future work (4.1.2, 4.1.3, 6.4.1)."""
+"""An echo model based on the sonar equation, the thesis's future work (4.1.2, 4.1.3, 6.4.1)."""
 
 import math
 from dataclasses import dataclass
@@ -14,17 +14,17 @@ from sonar_simulator.rays.beam_pattern import BeamPattern, RayPattern
 from sonar_simulator.rays.contacts import Contacts
 from sonar_simulator.rays.mirrors import Mirrors
 
-# Rays are cast over this many times the openings: what lies farther out is 15 dB down, there and back.
+# Rays cover this many times the openings; outside, the beam is 15 dB down (two-way).
 _CAST_WIDTH = 1.6
-# Nothing is nearer than the transducer's own face, m.
+# m; nothing is nearer than the transducer's own face.
 _NEAREST = 0.05
-# Levels at or below this are not there, dB.
+# dB; levels at or below this count as switched off.
 _NONE = -100.0
 _BEHIND = 1000.0  # dB: what lies behind the transducer is not heard
 
 
 class Detector(Enum):
-    """What a head's strengths say."""
+    """What a head's strengths are proportional to."""
 
     AMPLITUDE = "amplitude"
     DECIBELS = "decibels"
@@ -44,52 +44,64 @@ class PhysicalParameters(ParameterSet):
         2.5, "width of the beam where it is 3 dB down", unit="deg", low=0.1, high=90.0
     )
     side_lobe_db: float = parameter(
-        -100.0, "side lobes over all bearings, there and back", unit="dB", low=-100.0, high=0.0
+        -100.0, "level of side lobes over all bearings, two-way", unit="dB", low=-100.0, high=0.0
     )
-    side_rays: int = parameter(60, "rays over all bearings for the side lobes, if there are any", low=0, high=10000)
-    frequency_khz: float = parameter(675.0, "of the sound: sets the absorption", unit="kHz", low=10.0, high=3000.0)
-    temperature: float = parameter(15.0, "of the water", unit="C", low=-2.0, high=40.0)
-    salinity: float = parameter(35.0, "of the water, 0 in a tank", unit="per mille", low=0.0, high=42.0)
+    side_rays: int = parameter(60, "rays over all bearings, if there are side lobes", low=0, high=10000)
+    frequency_khz: float = parameter(
+        675.0, "frequency of the sound: determines the absorption", unit="kHz", low=10.0, high=3000.0
+    )
+    temperature: float = parameter(15.0, "temperature of the water", unit="C", low=-2.0, high=40.0)
+    salinity: float = parameter(35.0, "salinity of the water; 0 in a tank", unit="per mille", low=0.0, high=42.0)
     pulse_length_us: float = parameter(100.0, "length of the pulse", unit="us", low=1.0, high=1000.0)
     source_level_db: float = parameter(
-        105.0, "echo of a surface that fills the beam at 1 m and sends everything back", unit="dB", low=0.0, high=250.0
+        105.0,
+        "level of the echo of a surface that fills the beam at 1 m and reflects everything",
+        unit="dB",
+        low=0.0,
+        high=250.0,
     )
-    noise_level_db: float = parameter(0.0, "noise of receiver and water", unit="dB", low=-300.0, high=100.0)
+    noise_level_db: float = parameter(0.0, "noise level of receiver and water", unit="dB", low=-300.0, high=100.0)
     volume_scattering_db: float = parameter(
-        -60.0, "what a metre of water sends back, as a surface would", unit="dB", low=-300.0, high=0.0
+        -60.0, "level of what one metre of water returns, as if it were a surface", unit="dB", low=-300.0, high=0.0
     )
     ringing: float = parameter(0.3, "range up to which the transducer still rings", unit="m", low=0.0, high=10.0)
     ringing_level_db: float = parameter(60.0, "level of the ringing at its start", unit="dB", low=0.0, high=200.0)
-    speckle: float = parameter(1.0, "share of an echo that comes in random phases", low=0.0, high=1.0)
+    speckle: float = parameter(1.0, "share of an echo that has random phases", low=0.0, high=1.0)
     gain_db: float = parameter(20.0, "gain of the head", unit="dB", low=0.0, high=40.0, thesis_name="gain")
     tvg_spreading: float = parameter(
-        20.0, "the head's gain over range: this times log10 of metres", unit="dB", low=0.0, high=40.0
+        20.0, "the head's gain over range: this times log10 of the range in metres", unit="dB", low=0.0, high=40.0
     )
     tvg_absorption: float = parameter(
-        0.2, "the head's gain over range: absorption made good, per metre each way", unit="dB/m", low=0.0, high=2.55,
+        0.2, "the head's gain over range: compensated absorption, per metre each way", unit="dB/m", low=0.0, high=2.55,
         thesis_name="absorption / 100",
     )  # fmt: skip
-    detector: Detector = parameter(Detector.DECIBELS, "what strengths are in proportion to")
+    detector: Detector = parameter(Detector.DECIBELS, "what strengths are proportional to")
     full_level_db: float = parameter(
-        110.0, "level at 1 m that is the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
+        110.0, "level at 1 m that gives the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
     )
     dynamic_range_db: float = parameter(
-        40.0, "from strength 0 to the greatest strength, of a detector in decibels", unit="dB", low=1.0, high=150.0
+        40.0,
+        "range of levels from strength 0 to the greatest strength, for the detector in decibels",
+        unit="dB",
+        low=1.0,
+        high=150.0,
     )
-    mirror_bounces: int = parameter(1, "mirrors that sound is followed off, on its way there", low=0, high=5)
+    mirror_bounces: int = parameter(1, "number of mirrors off which sound is followed on its way out", low=0, high=5)
     surface_mirror: bool = parameter(False, "the water's surface, z = 0, is one of the mirrors")
-    surface_loss_db: float = parameter(1.0, "what its waves take away", unit="dB", low=0.0, high=60.0)
+    surface_loss_db: float = parameter(
+        1.0, "loss of each reflection at the water's surface", unit="dB", low=0.0, high=60.0
+    )
     vehicle_target_db: float = parameter(
-        -100.0, "target strength of the vehicle itself, which sends echoes out again", unit="dB", low=-100.0, high=20.0
+        -100.0, "target strength of the vehicle itself, which reflects echoes again", unit="dB", low=-100.0, high=20.0
     )
 
 
 class Physical:
-    """Intensities by the sonar equation, speckle and noise as complex amplitudes, strengths as a head gives them.
+    """Computes intensities by the sonar equation, adds speckle and noise as complex amplitudes, and returns strengths.
 
-    A ray stands for a cone of water of solid angle share x beam. Its patch of surface grows with the square of the
-    range, what arrives there and what comes back each fall with it: one square is left (spreading), and a target that
-    is smaller than the beam loses the other by being met by fewer rays.
+    A ray represents a cone of water of solid angle share x beam. Its patch of surface grows with the square of the
+    range; the sound that arrives there and the sound that returns each fall with it. One square remains (spreading).
+    A target smaller than the beam loses another square because fewer rays meet it the farther away it is.
     """
 
     def __init__(self, parameters: PhysicalParameters) -> None:
@@ -126,7 +138,7 @@ class Physical:
         return np.clip(np.rint(scaled), 0, settings.saturation).astype(np.uint8)
 
     def intensities(self, contacts: Contacts) -> np.ndarray:
-        """Return the mean intensities (beams, bins) of the echoes alone, over the receiver's noise."""
+        """Return the mean intensities (beams, bins) of the echoes alone, above the receiver's noise."""
         beams = len(contacts.ranges)
         index = np.ceil(np.minimum(contacts.ranges, 1e9) / self._resolution).astype(np.int64) - 1
         beam, contact = np.nonzero(index < self.bins)
@@ -141,7 +153,7 @@ class Physical:
         return self._with_second_echoes(self._spread_by_pulse(sums * _ratio(self.parameters.source_level_db)))
 
     def _with_second_echoes(self, first: np.ndarray) -> np.ndarray:
-        """Add what the vehicle sends out again: it comes back after the ranges of two echoes."""
+        """Add the echoes that the vehicle reflects again: they return after the sum of the ranges of two echoes."""
         if self.parameters.vehicle_target_db <= _NONE:
             return first
         spectrum = np.fft.rfft(first, 2 * self.bins, axis=1)
@@ -150,13 +162,13 @@ class Physical:
         return first + share * np.maximum(second, 0.0)
 
     def _detected(self, power: np.ndarray) -> np.ndarray:
-        """Return powers over that of the greatest strength as shares of it."""
+        """Return powers as shares of the greatest strength."""
         if self.parameters.detector is Detector.AMPLITUDE:
             return np.sqrt(power)
         return 1.0 + 10.0 * np.log10(np.maximum(power, 1e-30)) / self.parameters.dynamic_range_db
 
     def _lobe(self, directions: np.ndarray, ranges: np.ndarray) -> np.ndarray:
-        """Return what beam pattern, there and back, and absorption leave of (n,) rays."""
+        """Return (n,) the share of each ray's intensity left after beam pattern (two-way) and absorption."""
         half_height = math.sin(math.radians(self.parameters.vertical_opening_deg) / 2.0)
         half_width = math.sin(math.radians(self.parameters.horizontal_opening_deg) / 2.0)
         across = 6.0 * np.square(directions[:, 1] / half_width) + _BEHIND * (directions[:, 0] < 0.0)
@@ -178,7 +190,7 @@ class Physical:
         return uniform_filter1d(parts, samples, axis=-1, mode="wrap") * math.sqrt(samples)
 
     def _water(self) -> np.ndarray:
-        """Return the intensity (bins,) that the water between sends back."""
+        """Return the intensity (bins,) that the water itself returns."""
         settings = self.parameters
         level = settings.source_level_db + settings.volume_scattering_db + 10.0 * math.log10(self._pulse)
         ranges = np.maximum(self._middles, _NEAREST)
@@ -202,7 +214,7 @@ def _ratio(decibels: np.ndarray) -> np.ndarray:
 
 
 def _pulse_kernel(length: float) -> np.ndarray:
-    """Return how an echo that begins anywhere in a bin spreads over it and the next, for a pulse `length` bins long."""
+    """Return how an echo that begins anywhere in a bin spreads over this and later bins; pulse of `length` bins."""
     beginnings, within = np.meshgrid((np.arange(64) + 0.5) / 64.0, (np.arange(256) + 0.5) / 256.0 * length)
     counts = np.bincount((beginnings + within).astype(np.int64).ravel())
     return counts / counts.sum()

@@ -1,4 +1,4 @@
-"""Makes sonar beams of ray scans, with the simulator's echo models. Free of ROS."""
+"""Makes sonar beams from ray scans, with the simulator's echo models. Free of ROS."""
 
 import math
 from dataclasses import dataclass
@@ -22,7 +22,7 @@ class RayScan:
 
 
 class GazeboBeams:
-    """Hears what rays met. Same seed and scans, same beams."""
+    """Makes beams from what the rays hit. The same seed and scans give the same beams."""
 
     def __init__(self, model: EchoModel, seed: int) -> None:
         self._model = model
@@ -34,13 +34,13 @@ class GazeboBeams:
         return self._model.max_range
 
     def turned(self, scan: RayScan, T_sonar_rays: np.ndarray) -> Ping:
-        """Return the beam of a sensor that turned to where the (4, 4) pose says; all its rays belong to it."""
+        """Return the beam of a sensor that has turned to the (4, 4) pose; all its rays belong to the beam."""
         return self._ping(math.atan2(T_sonar_rays[1, 0], T_sonar_rays[0, 0]), scan.rays)
 
     def swept(self, scan: RayScan, head: SonarHead, beam: int, opening: float) -> Ping:
-        """Return beam number `beam` of a sensor that sees the whole circle, `opening` rad wide.
+        """Return beam number `beam`, `opening` rad wide, of a sensor that sees the whole circle.
 
-        Raises RefusedInput when no ray is there.
+        Raises RefusedInput if there is no ray within it.
         """
         angle = head.angle(beam)
         return self._ping(angle, scan.rays.within(angle, opening))

@@ -11,7 +11,7 @@ from sonar_simulator.echoes.echo_model import ECHO_MODELS
 
 
 class HeadMode(Enum):
-    """Who turns the head."""
+    """What turns the head."""
 
     SWEEP = "SWEEP"
     JOINT = "JOINT"
@@ -23,16 +23,16 @@ class GazeboSonarParameters(StampParameters):
 
     head: HeadMode = parameter(
         HeadMode.SWEEP,
-        "SWEEP: the ray sensor reaches around the circle, each scan gives the next beam; JOINT: it turns on a joint",
+        "SWEEP: the ray sensor sees the whole circle, and each scan gives the next beam; JOINT: it turns on a joint",
         tunable=False,
     )
     beams_per_turn: int = parameter(120, "SWEEP: beams in a full turn", low=1, high=3600, tunable=False)
     horizontal_opening_deg: float = parameter(
-        2.5, "SWEEP: rays so far apart make one beam", unit="deg", low=0.01, high=360.0, tunable=False
+        2.5, "SWEEP: width of a beam; the rays within it make one beam", unit="deg", low=0.01, high=360.0, tunable=False
     )
     vertical_opening_deg: float = parameter(
         22.0,
-        "LaserScan: from the ray sensor's lowest row to its highest; a cloud tells it",
+        "LaserScan: angle from the ray sensor's lowest row to its highest; clouds contain it",
         unit="deg",
         low=0.0,
         high=179.0,
@@ -40,14 +40,14 @@ class GazeboSonarParameters(StampParameters):
     )
     ray_rows: int = parameter(
         0,
-        "clouds: vertical samples of the ray sensor; 0: told by a pyramid below 180 deg",
+        "clouds: vertical samples of the ray sensor; 0: derived from the points, for less than 180 deg",
         low=0,
         high=1000,
         tunable=False,
     )
     nothing_range: float = parameter(
         50.0,
-        "clouds: a point so far away means nothing was hit; the ray sensor's greatest range less its smallest",
+        "clouds: range of a point that means nothing was hit: the sensor's greatest range minus its smallest",
         unit="m",
         low=0.1,
         high=10000.0,
@@ -61,7 +61,7 @@ class GazeboSonarParameters(StampParameters):
         may_be_empty=True,
     )
     echo_model: str = parameter("laser_cone", f"one of {', '.join(ECHO_MODELS)}", tunable=False)
-    seed: int = parameter(1, "of all random numbers", low=0, high=2**31 - 1, tunable=False)
+    seed: int = parameter(1, "seed of all random numbers", low=0, high=2**31 - 1, tunable=False)
 
     def check(self) -> None:
         """Refuse an echo model that does not exist."""
@@ -80,4 +80,4 @@ class GazeboSonarParameters(StampParameters):
 
 
 GROUPS: Dict[str, Type[ParameterSet]] = {name: kind.parameters for name, kind in ECHO_MODELS.items()}
-"""The parameters that come in groups, one for each echo model; the one that `echo_model` names is used."""
+"""Groups of parameters, one for each echo model; the one that `echo_model` names is used."""

@@ -1,4 +1,4 @@
-"""The rays of a ray sensor in Gazebo, which come flattened and without their number of rows. Free of ROS."""
+"""The rays of Gazebo's ray sensors, whose messages are flat and lack the number of rows. Free of ROS."""
 
 import math
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ class Rays:
     """A grid of rays around the sensor's +x: (rows, columns) ranges, m, inf where nothing was hit.
 
     elevations: (rows,) above the sensor's x-y plane; bearings: (columns,) counter-clockwise about its +z; rad.
-    retro: (rows, columns) laser_retro of what was hit, or None where the sensor does not tell.
+    retro: (rows, columns) laser_retro of what was hit, or None if the sensor does not provide it.
     """
 
     ranges: np.ndarray
@@ -25,7 +25,7 @@ class Rays:
     retro: Optional[np.ndarray]
 
     def within(self, bearing: float, opening: float) -> "Rays":
-        """Return the columns within `opening` rad (full width) around `bearing`, with bearings counted from there.
+        """Return the columns within `opening` rad (full width) around `bearing`, with bearings relative to it.
 
         Raises RefusedInput when there are none.
         """
@@ -44,7 +44,7 @@ class Rays:
 
 @dataclass(frozen=True)
 class ScanLayout:
-    """How sensor_msgs/LaserScan lays out a ray sensor: columns by its angles, row after row; m and rad."""
+    """The layout of a ray sensor in sensor_msgs/LaserScan: columns by its angles, row after row; m and rad."""
 
     angle_min: float
     angle_max: float
@@ -53,29 +53,32 @@ class ScanLayout:
 
     @property
     def columns(self) -> int:
-        """Number of rays in a row; raises RefusedInput when the angles make no sense."""
+        """Number of rays in a row; raises RefusedInput if the angles are inconsistent."""
         span = self.angle_max - self.angle_min
         if not (math.isfinite(span) and math.isfinite(self.angle_increment)):
             raise RefusedInput("scans refused", f"angles {self.angle_min} to {self.angle_max}, must be finite")
-        # Gazebo gives a single ray no increment that could be divided by.
+        # For a single ray, Gazebo publishes an increment that cannot be used as a divisor.
         if abs(self.angle_increment) < _NO_BEARING:
             return 1
         columns = round(span / self.angle_increment) + 1
         if columns < 1:
-            raise RefusedInput("scans refused", f"angle_increment {self.angle_increment} leads away from angle_max")
+            raise RefusedInput("scans refused", f"angle_increment {self.angle_increment} does not lead to angle_max")
         return columns
 
 
 def rays_of_scan(layout: ScanLayout, ranges: np.ndarray, intensities: np.ndarray, vertical_opening: float) -> Rays:
-    """Return the rays of a LaserScan as gazebo_ros_laser publishes it: the rows of a pyramid one after the other.
+    """Return the rays of a LaserScan as gazebo_ros_laser publishes it: the rows of a pyramid, one after the other.
 
-    ranges: (n,) m, inf or at least range_max where nothing was hit, -inf where it was too near. intensities: (n,) or
-    (0,), laser_retro. vertical_opening: rad from the lowest row to the highest, which the message does not tell.
-    Raises RefusedInput.
+    ranges: (n,) m, inf or at least range_max where nothing was hit, -inf where something was too near.
+    intensities: (n,) or (0,), laser_retro. vertical_opening: rad from the lowest row to the highest, which the
+    message does not contain. Raises RefusedInput.
     """
     columns = layout.columns
     if not len(ranges) or len(ranges) % columns:
-        raise RefusedInput("scans refused", f"{len(ranges)} ranges are no rows of {columns}, which the angles tell")
+        raise RefusedInput(
+            "scans refused",
+            f"{len(ranges)} ranges are not a multiple of the {columns} columns between angle_min and angle_max",
+        )
     rows = len(ranges) // columns
     grid = np.asarray(ranges, dtype=np.float64).reshape(rows, columns)
     retro = np.asarray(intensities, dtype=np.float64).reshape(rows, columns) if len(intensities) == grid.size else None
@@ -91,14 +94,17 @@ def rays_of_scan(layout: ScanLayout, ranges: np.ndarray, intensities: np.ndarray
 def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: int, nothing_range: float) -> Rays:
     """Return the rays of a point cloud as gazebo_ros_block_laser publishes it: one point per ray, row after row.
 
-    points: (n, 3) m in the sensor's frame. rows: how many there are; 0 to tell from a pyramid narrower than 180 deg.
-    A ray that hits nothing gives a point at `nothing_range` m, or farther, which is the sensor's greatest range less
-    its smallest. Raises RefusedInput when they are no such grid.
+    points: (n, 3) m in the sensor's frame. rows: their number; 0 to derive it from the points, for a
+    pyramid narrower than 180 deg. A ray that hits nothing gives a point at `nothing_range` m, or farther, which is the
+    sensor's greatest range minus its smallest. Raises RefusedInput if the points are not such a grid.
     """
     points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     distances = np.linalg.norm(points, axis=1)
     if not len(points) or not np.isfinite(points).all() or not distances.all():
-        raise RefusedInput("scans refused", f"{len(points)} points, must be some, finite and off the sensor's centre")
+        raise RefusedInput(
+            "scans refused",
+            f"{len(points)} points; there must be at least one, all finite and none at the sensor's centre",
+        )
     bearings = np.arctan2(points[:, 1], points[:, 0])
     rows = rows or _rows(bearings)
     if len(points) % rows:
@@ -115,10 +121,12 @@ def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: 
 
 
 def _rows(bearings: np.ndarray) -> int:
-    """Return how often the bearing falls back to where a row begins, and one more."""
+    """Return the number of rows: how often the bearing returns to the beginning of a row, plus one."""
     span = np.ptp(bearings)
     if span > math.pi:
-        raise RefusedInput("scans refused", "points all around the sensor do not tell their rows: set ray_rows")
+        raise RefusedInput(
+            "scans refused", "the number of rows is unknown for points all around the sensor; set ray_rows"
+        )
     if span <= _NO_BEARING:
         return len(bearings)
     steps = np.diff(bearings)
@@ -126,6 +134,6 @@ def _rows(bearings: np.ndarray) -> int:
 
 
 def _cut(ranges: np.ndarray, nothing_range: float) -> np.ndarray:
-    """Make inf of what is no hit; clouds carry single precision."""
+    """Replace ranges without a hit by inf; allows for the single precision of clouds."""
     hit = (ranges > 0.0) & (ranges < nothing_range * (1.0 - 1e-6) - 1e-6)
     return np.where(hit, ranges, np.inf)

@@ -1,1 +1,1 @@
-"""Rays, the surfaces they meet and mirrors."""
+"""Rays, the surfaces that they hit, and mirrors."""

@@ -1,4 +1,4 @@
-"""The rays that stand for one beam, and the planes that bound it."""
+"""The rays that represent one beam, and the planes that bound it."""
 
 import math
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ class RayPattern(Protocol):
 
     @property
     def rays_inside(self) -> int:
-        """How many of them, the first ones, run between the planes."""
+        """Number of rays, from the first, that are between the planes."""
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, rays, 3) unit vectors in the frame of the beam, each beam's drawn anew."""
+        """Return (beams, rays, 3) unit vectors in the frame of the beam, drawn anew for each beam."""
 
     def shares(self) -> np.ndarray:
-        """Return (rays,) the share of the beam's solid angle that each ray stands for."""
+        """Return (rays,) the share of the beam's solid angle that each ray represents."""
 
     def planes(self) -> np.ndarray:
         """Return (k, 3) unit normals, inward, of the planes through the sonar that bound the beam."""
@@ -30,7 +30,7 @@ class RayPattern(Protocol):
 
 @dataclass(frozen=True)
 class BeamPattern:
-    """A fan as a pyramid of rows x columns rays, one in each stratum of equal angles (thesis 4.1.1, 6.4.3).
+    """A fan: a pyramid of rows x columns rays, one in each stratum of equal angles (thesis 4.1.1, 6.4.3).
 
     vertical_opening, horizontal_opening: full angles of the beam, rad, below pi.
     """
@@ -47,13 +47,13 @@ class BeamPattern:
 
     @property
     def rays_inside(self) -> int:
-        """How many of them run between the planes: all."""
+        """Number of rays between the planes: all."""
         return self.rays
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam.
 
-        Every beam gets a jitter of its own: rays at fixed elevations would draw the floor as concentric arcs.
+        Every beam gets its own jitter: rays at fixed elevations would draw the floor as concentric arcs.
         """
         jitter = rng.random((2, beams, self.rows, self.columns))
         row = np.arange(self.rows)[:, np.newaxis]

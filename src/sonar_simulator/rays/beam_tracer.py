@@ -1,4 +1,4 @@
-"""Follows the sound of beams through a world, to what it meets first and, off mirrors, to what it meets then."""
+"""Follows the sound of beams through a world to the first surface and, off mirrors, to further ones."""
 
 import numpy as np
 
@@ -7,14 +7,14 @@ from sonar_simulator.rays.contacts import Contacts
 from sonar_simulator.rays.mirrors import Leg, Mirrors, legs
 from sonar_simulator.rays.ray_caster import RayCaster
 
-# The nearest surface may be a sliver of the beam: its ray stands for a tenth of another ray.
+# The nearest surface may be a sliver of the beam, so its ray represents a tenth of what another ray does.
 _LEADING_SHARE = 0.1
 _AHEAD = np.array([1.0, 0.0, 0.0])
 NO_MIRRORS = Mirrors()
 
 
 class BeamTracer:
-    """Casts the rays of a pattern, and one more per beam at the nearest surface inside it."""
+    """Casts the rays of a pattern, and one more ray per beam at the nearest surface inside it."""
 
     def __init__(self, caster: RayCaster, pattern: RayPattern, mirrors: Mirrors = NO_MIRRORS) -> None:
         self._caster = caster
@@ -27,9 +27,9 @@ class BeamTracer:
     def contacts(
         self, T_world_sonar: np.ndarray, angles: np.ndarray, max_range: float, rng: np.random.Generator
     ) -> Contacts:
-        """Return what beams at head `angles` (beams,) rad from poses (beams, 4, 4) meet within `max_range` m.
+        """Return what beams at head `angles` (beams,) rad from poses (beams, 4, 4) hit within `max_range` m.
 
-        The first contact of every beam is the nearest surface inside it, exactly; the rays follow.
+        The first contact of every beam is exactly the nearest surface inside it; those of the rays follow.
         """
         rotations = T_world_sonar[:, :3, :3] @ head_turns(angles)
         origins = T_world_sonar[:, :3, 3]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-# Gazebo's unit_cone, the shape of the thesis's sensor, is a pyramid of many sides too.
+# Gazebo's unit_cone, the shape of the thesis's sensor, is also a pyramid with many sides.
 _SIDES = 16
 
 
@@ -13,7 +13,7 @@ _SIDES = 16
 class ConePattern:
     """Rays spread evenly over a cone of full angle `opening`, rad (thesis 6.4.1, 6.4.2).
 
-    The cone is a pyramid of 16 sides, as a mesh of a cone is: a flat one touches the round cone from outside.
+    The cone is a pyramid with 16 sides, like a mesh of a cone; each flat side touches the round cone from outside.
     """
 
     opening: float
@@ -21,11 +21,11 @@ class ConePattern:
 
     @property
     def rays_inside(self) -> int:
-        """How many of them run between the planes: all."""
+        """Number of rays between the planes: all."""
         return self.rays
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, rays, 3) unit vectors in the frame of the beam: a sunflower, turned anew for each beam."""
+        """Return (beams, rays, 3) unit vectors in the frame of the beam: a sunflower, rotated anew for each beam."""
         number = np.arange(self.rays)
         turn = number * math.pi * (3.0 - math.sqrt(5.0)) + 2.0 * math.pi * rng.random((beams, 1))
         radius = math.tan(self.opening / 2.0) * np.sqrt((number + rng.random((beams, self.rays))) / self.rays)

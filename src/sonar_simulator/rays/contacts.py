@@ -1,4 +1,4 @@
-"""Where the rays of beams meet surfaces: what ray casters make and echo models take."""
+"""Where the rays of beams hit surfaces: the output of ray casters and the input of echo models."""
 
 from dataclasses import dataclass
 from typing import Optional, Sequence, Tuple
@@ -14,10 +14,10 @@ class Contacts:
 
     ranges: m along the sound's path, inf where a ray hits nothing.
     cosines: of the angle between ray and surface normal, 0 to 1.
-    material: index into `materials`; any where nothing is hit.
+    material: index into `materials`; arbitrary where nothing is hit.
     directions: (beams, contacts, 3) unit vectors in the frame of the beam: x along its axis, z up.
-    shares: share of the beam that a ray stands for; a beam's rays sum to about 1.
-    losses: intensity left after mirrors on the way, 0 to 1; 1 where sound came and went straight.
+    shares: share of the beam that a ray represents; the shares of a beam sum to about 1.
+    losses: share of the intensity left after mirrors on the way, 0 to 1; 1 without a mirror.
     """
 
     ranges: np.ndarray
@@ -37,9 +37,9 @@ class Contacts:
         material: Optional[np.ndarray] = None,
         materials: Tuple[Material, ...] = (DEFAULT_MATERIAL,),
     ) -> "Contacts":
-        """Build from ranges (beams, rays) of rays that stand for equal shares of their beam.
+        """Build from ranges (beams, rays) of rays that represent equal shares of their beam.
 
-        What is left out is taken as along the beam's axis, met at right angles and of the default material.
+        By default, rays are along the beam's axis and hit the default material at right angles.
         """
         ranges = np.atleast_2d(np.asarray(ranges, dtype=np.float64))
         ones = np.ones_like(ranges)
@@ -56,7 +56,7 @@ class Contacts:
 
     @staticmethod
     def joined(parts: Sequence["Contacts"]) -> "Contacts":
-        """Return the contacts of all parts, which are of the same beams and materials, side by side."""
+        """Return the contacts of all parts side by side; the parts have the same beams and materials."""
         if len(parts) == 1:
             return parts[0]
         names = ("ranges", "cosines", "material", "directions", "shares", "losses")

@@ -1,4 +1,4 @@
-"""The way of rays off mirrors: smooth walls, and the water's surface."""
+"""The path of rays off mirrors: smooth walls and the water's surface."""
 
 from dataclasses import dataclass
 from typing import Iterator, Tuple
@@ -7,18 +7,18 @@ import numpy as np
 
 from sonar_simulator.rays.ray_caster import RayCaster
 
-# Sound that leaves a mirror starts this far off it: embree is exact to float32, m.
+# m; sound that leaves a mirror starts this far from it, because embree has the precision of float32.
 _OFF_SURFACE = 1e-3
-# Weaker than this after a mirror, a ray is given up.
+# A ray with less than this share of its intensity after a mirror is dropped.
 _FAINT = 1e-6
 _UP = np.array([0.0, 0.0, 1.0])
 
 
 @dataclass(frozen=True)
 class Mirrors:
-    """How often sound is followed off mirrors, and whether the water's surface, the plane z = 0, is one.
+    """How often sound is followed off mirrors, and whether the water's surface, the plane z = 0, is a mirror.
 
-    surface_loss: share of the intensity that the water's surface keeps back, 0 to 1.
+    surface_loss: share of the intensity that is lost at the water's surface, 0 to 1.
     """
 
     bounces: int = 0
@@ -28,10 +28,10 @@ class Mirrors:
 
 @dataclass(frozen=True)
 class Leg:
-    """One straight part of the way of n rays; rows of rays that ended before hold inf and face -1.
+    """One straight part of the path of n rays; rays that ended earlier have range inf and face -1.
 
-    ranges: (n,) m along all legs up to the surface that is met, inf where none is. faces: (n,) of the world, -1 none.
-    directions: (n, 3) in the world frame. left: (n,) share of the intensity after the mirrors so far, there and back.
+    ranges: (n,) m along all legs up to the surface that is hit, inf for none. faces: (n,) of the world, -1 for none.
+    directions: (n, 3) in the world frame. left: (n,) share of the intensity left after the mirrors so far, two-way.
     """
 
     ranges: np.ndarray
@@ -43,7 +43,7 @@ class Leg:
 def legs(
     caster: RayCaster, origins: np.ndarray, directions: np.ndarray, mirrors: Mirrors, max_range: float
 ) -> Iterator[Leg]:
-    """Yield the legs of rays from (n, 3) origins along (n, 3) unit directions, world frame; the first has no mirror."""
+    """Yield the legs of rays from (n, 3) origins along (n, 3) unit directions, world frame; the first is direct."""
     origins, directions = origins.copy(), directions.copy()
     world = caster.world
     kept = np.array([material.reflection**2 * material.mirror for material in world.materials])
@@ -79,7 +79,7 @@ def _leg(
 def _met(
     caster: RayCaster, origins: np.ndarray, directions: np.ndarray, mirrors: Mirrors
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return distances, faces, and where the water's surface is met first."""
+    """Return distances, faces, and which rays hit the water's surface first."""
     distances, faces = caster.hits(origins, directions)
     if not mirrors.surface:
         return distances, faces, np.zeros(len(origins), dtype=bool)

@@ -1,8 +1,8 @@
 """The exact nearest surface inside beams.
 
-Rays sample a beam: between them they miss the near edge of a floor by metres and a rope altogether. The echo of a beam
-begins at the nearest point of all surfaces inside its pyramid, and that point follows from geometry alone: it is
-visible, for whatever hid it would be nearer and in the beam too.
+Rays only sample a beam: they miss the near edge of a floor by metres, and a rope altogether. The echo of a beam begins
+at the nearest point of all surfaces inside its pyramid. That point follows from geometry alone: it is visible, because
+anything that hid it would be nearer and also inside the beam.
 """
 
 from typing import Iterator, Tuple
@@ -12,11 +12,11 @@ import numpy as np
 from sonar_simulator.rays.triangle_groups import TriangleGroups
 from sonar_simulator.world.world import World
 
-# A segment cut to nothing by rounding alone still counts: m.
+# m; a segment that only rounding cuts to nothing still counts.
 _TOLERANCE = 1e-9
-# Planes of triangles that are no farther than this beyond the limit still count: m.
+# m; triangles whose planes are at most this far beyond the limit still count.
 _MARGIN = 1e-3
-# Of a cone's sides only as many are looked at as cut a triangle, rounded up to one of these.
+# Only those sides of a cone are used that cut a triangle; their number is rounded up to one of these.
 _CUTTING = (3, 5, 8, 12)
 _NEXT_CORNER = np.array([1, 2, 0])
 
@@ -37,7 +37,7 @@ class NearestSurface:
         """Return the (n, 3) nearest points inside beams, in the beams' frames, and their (n,) faces, -1 if none.
 
         origins: (n, 3) where the beams start, world frame, m. rotations: (n, 3, 3) R_world_beam.
-        planes: (k, 3) inward unit normals of the beam's sides, beam frame. limits: (n,) m, look no farther.
+        planes: (k, 3) inward unit normals of the beam's sides, beam frame. limits: (n,) m, greatest range.
         """
         sides = planes[:: max(1, len(planes) // 4)]
         beam, face = self._groups.reached(origins, np.einsum("nij,kj->kni", rotations, sides), limits)
@@ -60,7 +60,7 @@ class NearestSurface:
 def _inside(
     beam: np.ndarray, face: np.ndarray, triangles: np.ndarray, planes: np.ndarray, limits: np.ndarray
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Leave out triangles that lie behind one of the planes with all corners, or in a plane too far away."""
+    """Drop triangles with all corners behind one of the planes, and those whose plane is too far away."""
     ahead = ~(triangles @ planes.T < 0.0).all(axis=1).any(axis=1)
     beam, face, triangles = beam[ahead], face[ahead], triangles[ahead]
     kept = _reach_of_planes(triangles, _widest_cosine(planes)) <= limits[beam] + _MARGIN
@@ -68,12 +68,12 @@ def _inside(
 
 
 def _reach_of_planes(triangles: np.ndarray, cosine: float) -> np.ndarray:
-    """Return how far the planes of triangles (p, 3, 3) are along the round cone, cosine of half its angle, at least."""
+    """Return the least distance in a round cone to the planes of triangles (p, 3, 3); `cosine`: of half its angle."""
     normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
     heights = _dot(triangles[:, 0], normals)
     forward = np.clip(normals[:, 0] * np.sign(heights), -1.0, 1.0)
-    # The cosine of the angle between a perpendicular to the plane and the cone: 1 if it runs inside.
+    # The cosine of the angle between the plane's perpendicular and the cone: 1 if the perpendicular is inside the cone.
     nearest = forward * cosine + np.sqrt((1.0 - forward**2) * (1.0 - cosine**2))
     nearest = np.where(forward >= cosine, 1.0, nearest)
     return np.where(nearest > 0.0, np.abs(heights) / np.maximum(nearest, _TOLERANCE), np.inf)
@@ -91,7 +91,7 @@ def _widest_cosine(planes: np.ndarray) -> float:
 
 
 def _cutting_planes(triangles: np.ndarray, planes: np.ndarray) -> Iterator[Tuple[np.ndarray, np.ndarray]]:
-    """Yield pair numbers (q,) and planes (q, j, 3) that hold all that cut these triangles: of a cone's sides few do."""
+    """Yield pair numbers (q,) and planes (q, j, 3), among them all that cut the triangles; few sides of a cone do."""
     depths = (triangles @ planes.T).min(axis=1)
     cut_by = (depths < 0.0).sum(axis=1)
     fewer = -1
@@ -105,10 +105,10 @@ def _cutting_planes(triangles: np.ndarray, planes: np.ndarray) -> Iterator[Tuple
 
 
 def _nearest_points(triangles: np.ndarray, planes: np.ndarray) -> np.ndarray:
-    """Return the (p, 3) points of triangles (p, 3, 3) inside their planes (p, k, 3) nearest to the origin, inf if none.
+    """Return the (p, 3) points nearest to the origin of triangles (p, 3, 3) inside their planes (p, k, 3), inf if none.
 
     The part of a triangle inside the beam is a convex polygon. Its nearest point is the foot of the perpendicular, or
-    lies on a side: on an edge of the triangle or on one of the planes.
+    is on a side: on an edge of the triangle or on one of the planes.
     """
     normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
@@ -134,14 +134,14 @@ def _axes(normals: np.ndarray, edges: np.ndarray) -> np.ndarray:
 
 
 def _nearest_on_sides(axes: np.ndarray, feet: np.ndarray, sides: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Return the (p, 3) point nearest to the foot on the sides of each polygon, inf if nothing of it is left.
+    """Return the (p, 3) point nearest to the foot on the sides of each polygon, inf if nothing is left of the polygon.
 
-    It lies on a side that the foot is beyond, as the point of a convex polygon nearest to a point outside always does.
+    The point of a convex polygon nearest to a point outside is always on a side that the outside point is beyond.
     """
-    # In the triangle's own plane a half-space is a half-plane: its normal there, made a unit vector, and its offset.
+    # In the triangle's plane, a half-space becomes a half-plane, described by its unit normal and its offset.
     flat = sides @ axes.transpose(0, 2, 1)
     lengths = np.sqrt(_dot(flat, flat))
-    # A plane parallel to the triangle, which lies before it, cuts nothing.
+    # A plane parallel to the triangle, with the triangle on its inner side, cuts nothing.
     cutting = lengths > _TOLERANCE
     flat /= np.where(cutting, lengths, np.inf)[..., np.newaxis]
     outside = offsets - _dot(sides, feet[:, np.newaxis])
@@ -162,7 +162,7 @@ def _nearest_on_sides(axes: np.ndarray, feet: np.ndarray, sides: np.ndarray, off
 
 
 def _cut(flat: np.ndarray, beyond: np.ndarray, starts: np.ndarray, along: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return from where to where, (l,) each, lines run inside half-planes; low > high: nowhere.
+    """Return between which positions (l,), low and high, lines are inside half-planes; low > high: nowhere.
 
     The lines begin at `starts` (l, 2) and run `along` (l, 2); the half-planes have normals `flat` (l, s, 2) and
     offsets `beyond` (l, s).
@@ -182,7 +182,7 @@ def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the cross product; numpy's own takes several times as long for small batches."""
+    """Return the cross product; numpy's own function takes several times as long for small batches."""
     a, b = np.broadcast_arrays(a, b)
     return np.stack(
         [

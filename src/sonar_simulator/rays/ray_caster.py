@@ -9,7 +9,7 @@ from sonar_simulator.rays.nearest_surface import NearestSurface
 from sonar_simulator.world.errors import MissingPackageError
 from sonar_simulator.world.world import World
 
-# Embree answers 1e37 where a ray hits nothing.
+# Embree returns 1e37 where a ray hits nothing.
 _NOTHING = 1e30
 
 
@@ -22,14 +22,14 @@ class RayCaster:
             from embreex.rtcore_scene import EmbreeScene
         except ImportError as error:
             raise MissingPackageError("casts the simulator's rays", "embreex", error) from error
-        # Robust: rays that meet an edge between two triangles must not slip through it.
+        # Robust mode: rays that hit an edge between two triangles must not pass through it.
         self._scene = EmbreeScene(robust=True)
         TriangleMesh(self._scene, world.vertices.astype(np.float32), world.faces.astype(np.int32))
         self.world = world
 
     @cached_property
     def nearest(self) -> NearestSurface:
-        """What finds the nearest surface inside a beam."""
+        """Finds the nearest surface inside a beam."""
         return NearestSurface(self.world)
 
     def distances(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:

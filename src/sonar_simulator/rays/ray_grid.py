@@ -1,4 +1,4 @@
-"""Contacts from a grid of measured ranges, such as Gazebo's ray sensor publishes."""
+"""Contacts from a grid of measured ranges, as Gazebo's ray sensor publishes it."""
 
 from typing import Optional, Tuple
 
@@ -13,10 +13,11 @@ def contacts_of_grid(
 ) -> Contacts:
     """Return the contacts of one beam.
 
-    ranges: (rows, columns) m; what is not finite or not above 0 hit nothing. elevations: (rows,) and bearings:
-    (columns,) rad off the beam's axis, up and left positive. retro: (rows, columns) pressure reflected, 0 to 1, as
-    <laser_retro> gives it; 0 or None: the default material. Incidence angles follow from neighbours in the grid; with
-    one row surfaces count as upright, with one column as across the beam. Raises ValueError for shapes that disagree.
+    ranges: (rows, columns) m; values not finite or not above 0 mean that nothing was hit. elevations: (rows,) and
+    bearings: (columns,) rad off the beam's axis, up and left positive. retro: (rows, columns) share of pressure
+    reflected, 0 to 1, as in <laser_retro>; 0 or None: the default material. Incidence angles follow from neighbours in
+    the grid; with one row, surfaces count as vertical; with one column, as perpendicular to the beam. Raises ValueError
+    for shapes that do not fit together.
     """
     ranges = np.asarray(ranges, dtype=np.float64)
     if ranges.shape != (len(elevations), len(bearings)):
@@ -49,7 +50,7 @@ def _cosines(ranges: np.ndarray, directions: np.ndarray) -> np.ndarray:
 
 
 def _tangents(points: np.ndarray, hit: np.ndarray, axis: int) -> np.ndarray:
-    """Return the step to the nearer of both neighbours along an axis: the other may lie on another surface."""
+    """Return the step to the nearer of the two neighbours along an axis; the other may be on a different surface."""
     points, hit = np.moveaxis(points, axis, 0), np.moveaxis(hit, axis, 0)
     steps = np.where((hit[1:] & hit[:-1])[..., np.newaxis], points[1:] - points[:-1], np.nan)
     none = np.full((1, *points.shape[1:]), np.nan)

@@ -1,11 +1,11 @@
-"""Which triangles may reach into a beam: bounding boxes of triangles, in groups that lie close together."""
+"""Finds triangles that may reach into a beam, by bounding boxes of triangles and of groups of neighbours."""
 
 from typing import Tuple
 
 import numpy as np
 
 _GROUP = 8  # Triangles behind one box: fewer make more boxes to test, more make each of them looser
-# Boxes are compared in float32, m.
+# m; margin of the boxes, which are compared in float32.
 _MARGIN = 1e-3
 
 
@@ -17,16 +17,16 @@ class TriangleGroups:
         self._middle = (low + high).mean(axis=0) / 2.0 if len(corners) else np.zeros(3)
         low, high = low - self._middle, high - self._middle
         order = _neighbours_first((low + high) / 2.0, np.linalg.norm(high - low, axis=1))
-        # A group that is not full repeats its last triangle; the repetitions are left out at the end.
+        # An incomplete group repeats its last triangle; the repetitions are removed at the end.
         self._members = np.append(order, np.repeat(order[-1:], -len(order) % _GROUP)).reshape(-1, _GROUP)
         self._is_first = np.arange(self._members.size).reshape(self._members.shape) < len(order)
         self._boxes = _boxes(low[self._members], high[self._members])
         self._group_boxes = _boxes(low[self._members].min(axis=1), high[self._members].max(axis=1))
 
     def reached(self, origins: np.ndarray, planes: np.ndarray, limits: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return (beam, triangle) pairs whose box reaches into the beam.
+        """Return the (beam, triangle) pairs for which the triangle's box reaches into the beam.
 
-        origins: (n, 3) m. planes: (k, n, 3) inward unit normals of each beam's sides. limits: (n,) m, no farther.
+        origins: (n, 3) m. planes: (k, n, 3) inward unit normals of each beam's sides. limits: (n,) m, greatest range.
         """
         origins, planes = (origins - self._middle).astype(np.float32), planes.astype(np.float32)
         limits = np.minimum(limits, 1e15).astype(np.float32)
@@ -55,12 +55,12 @@ class TriangleGroups:
 
 
 def _boxes(low: np.ndarray, high: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return centres and half edges of boxes, a little larger than they are."""
+    """Return centres and half edges of boxes, slightly enlarged."""
     return ((low + high) / 2.0).astype(np.float32), ((high - low) / 2.0 + _MARGIN).astype(np.float32)
 
 
 def _neighbours_first(centres: np.ndarray, sizes: np.ndarray) -> np.ndarray:
-    """Return an order in which triangles of one size class that lie close together follow each other."""
+    """Return an order in which neighbouring triangles of one size class follow each other."""
     size_class = np.ceil(np.log2(np.maximum(sizes, _MARGIN)))
     extent = np.maximum(np.ptp(centres, axis=0), _MARGIN) if len(centres) else np.ones(3)
     cells = np.clip((centres / extent + 0.5) * 1023.0, 0, 1023).astype(np.int64)

@@ -1,4 +1,4 @@
-"""Writes the bag of a whole simulation, without a master."""
+"""Writes the bag of a whole simulation, without a ROS master."""
 
 import math
 from pathlib import Path
@@ -27,7 +27,7 @@ _SETTINGS_TOPIC = "/sonar_simulator/settings"
 
 
 class _Stamp(rospy.Time):
-    """A time that compares fast: rosbag sorts every message into an index of all that came before it."""
+    """A time that compares fast: rosbag sorts every message into an index of all earlier messages."""
 
     __slots__ = ()
 
@@ -36,7 +36,7 @@ class _Stamp(rospy.Time):
 
 
 class BagWriter:
-    """Puts moments into a bag, at the times and on the topics that the simulator as a node gives them."""
+    """Writes moments into a bag, at the times and on the topics that the simulator node would use."""
 
     def __init__(self, bag: rosbag.Bag, setup: Setup) -> None:
         self._bag = bag
@@ -45,7 +45,7 @@ class BagWriter:
         self._pose = Pose()
 
     def begin(self, robot: RobotDescription, settings: Settings) -> None:
-        """Write what holds for the whole bag: the fixed transforms and the parameters."""
+        """Write what applies to the whole bag: the fixed transforms and the parameters."""
         start = _stamp(0.0)
         transforms = [
             transform_message(pose_from_matrix(joint.T_parent_child), start, joint.parent, joint.child)
@@ -79,9 +79,9 @@ def write_bag(
     compression: str = "none",
     tell: Callable[[float], object] = lambda time: None,
 ) -> int:
-    """Write the bag of a simulation that ends, whole or not at all; return the number of its beams.
+    """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
 
-    `tell` receives the simulated time [s] now and then. Raises OSError.
+    `tell` receives the simulated time [s] from time to time. Raises OSError.
     """
     beams = 0
     with whole_file(path) as temporary, rosbag.Bag(str(temporary), "w", compression=compression) as bag:
@@ -96,7 +96,7 @@ def write_bag(
 
 
 def _told(settings: Settings) -> str:
-    """Return the settings as yaml, files by name alone: the bag must be the same in whatever folder they are."""
+    """Return the settings as yaml, with file names only, so that the bag does not depend on the folder."""
     values = settings.to_mapping()
     files = {key: Path(values[key]).name for key in ("world", "script")}
     return yaml.safe_dump({**values, **files}, sort_keys=False)

@@ -1,4 +1,4 @@
-"""gazebo_sonar: the scans of a ray sensor in Gazebo become sonar beams, so that no plugin has to be built."""
+"""gazebo_sonar: makes sonar beams from the scans of a ray sensor in Gazebo, so that no plugin has to be built."""
 
 from typing import Optional
 

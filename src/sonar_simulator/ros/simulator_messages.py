@@ -1,4 +1,4 @@
-"""What happens at one moment of a simulation, as messages: for publishers and for bags alike."""
+"""The state at one moment of a simulation as messages, for publishers and for bags."""
 
 from typing import List, Tuple
 
@@ -29,13 +29,13 @@ TOPICS = {
     topics.GROUND_TRUTH: Odometry,
     topics.BEAMS: SonarScanLine,
 }
-"""Topics, relative to the namespace but for /tf, and their types."""
+"""Topics and their types; relative to the namespace, except /tf."""
 
 
 def moment_messages(moment: Moment, stamp: rospy.Time, max_range: float) -> List[Tuple[str, Message]]:
     """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
 
-    Transform and joint come with every moment, so that a beam can be placed at its own stamp; the rest comes with
+    Transform and joint are part of every moment, so that a beam can be placed at its own stamp; the rest is part of
     ticks only, at the steady rate of an instrument.
     """
     messages = placing_messages(moment, stamp)
@@ -75,7 +75,7 @@ def transform_message(pose: Pose, stamp: rospy.Time, parent: str, child: str) ->
 
 
 def joint_state(tilt: float, stamp: rospy.Time) -> JointState:
-    """Return where the sonar's servo stands, rad."""
+    """Return the position of the sonar's servo, rad."""
     message = JointState(name=[SERVO_JOINT], position=[tilt])
     message.header.stamp = stamp
     return message

@@ -30,7 +30,7 @@ class Simulator:
     """Runs a simulation against the wall clock, `real_time_factor` times as fast."""
 
     def __init__(self) -> None:
-        """Raises ParameterError when a parameter, the world, the script or the robot's description cannot be used."""
+        """Raises ParameterError if a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
         self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
@@ -80,7 +80,7 @@ class Simulator:
             pass
 
     def _play(self, moments: Iterator[Moment], pace: Pace) -> bool:
-        """Publish the next moment when its time has come; return False when there is none or the node ends."""
+        """Publish the next moment when its time has come; return False if there is none or the node ends."""
         with self._lock, self.health.timed():
             moment = next(moments, None)
         if moment is None or self._ended.is_set():
@@ -103,7 +103,7 @@ class Simulator:
             self.health.problem("delays", detail)
 
     def _wait_for_listener(self) -> None:
-        """Let the clock run until somebody takes the beams, and until he has had time to learn of tf as well."""
+        """Let the clock run until somebody subscribes to the beams and has had time to connect to tf as well."""
         start, waited = self._setup.simulation.moment(0.0), 0.0
         while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
             waited += _WAIT_STEP if self._publisher.has_listener else 0.0
@@ -118,6 +118,6 @@ def _robot() -> RobotDescription:
     try:
         return RobotDescription(rospy.get_param("robot_description"))
     except KeyError as error:
-        raise ParameterError("robot_description is not set: it says where the sonar is mounted") from error
+        raise ParameterError("robot_description is not set; the simulator reads the sonar's mount from it") from error
     except DescriptionError as error:
         raise ParameterError(str(error)) from error

@@ -1,4 +1,4 @@
-"""Publishes what happens at one moment of a simulation."""
+"""Publishes the state at one moment of a simulation."""
 
 import rospy
 from rosgraph_msgs.msg import Clock
@@ -15,10 +15,10 @@ _QUEUE_SIZE = 100  # A second of every topic at the usual rates
 
 
 class SimulatorPublisher:
-    """The simulator's topics. Its world is the frame `map`, which the odometry's error moves away from `odom`.
+    """The simulator's topics. Its world is the frame `map`, from which `odom` drifts away by the odometry's error.
 
-    A vehicle that follows a script gets its commands from nobody: then the velocity is on cmd_vel as well, where the
-    rest of the graph expects it.
+    If the vehicle follows a script, nobody sends commands; the velocity is then also published on cmd_vel, where other
+    nodes expect it.
     """
 
     def __init__(self, max_range: float, drive: Drive) -> None:
@@ -34,29 +34,29 @@ class SimulatorPublisher:
 
     @property
     def has_listener(self) -> bool:
-        """Whether anybody takes the beams."""
+        """Whether anybody subscribes to the beams."""
         return self._publishers[topics.BEAMS].get_num_connections() > 0
 
     def publish_clock(self, stamp: rospy.Time) -> None:
-        """Set everybody's time."""
+        """Publish the simulated time."""
         self._clock.publish(Clock(clock=stamp))
 
     def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
-        """Send what places a sonar that waits: the time, the vehicle where it stands at a moment, and its servo."""
+        """Publish what places a waiting sonar: the time, and the vehicle and its servo at a moment."""
         self.publish_clock(stamp)
         for topic, message in placing_messages(moment, stamp):
             self._publishers[topic].publish(message)
 
     def publish_world(self, world: World) -> None:
-        """Show the world, once for all who come."""
+        """Publish the world once; latched."""
         self._world.publish(world_marker(world, WORLD_FRAME))
 
     def publish_progress(self, share: float) -> None:
-        """Tell which share of the script is done; 1 at its end."""
+        """Publish the completed share of the script; 1 at its end."""
         self._progress.publish(Float32(data=share))
 
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
-        """Send everything that belongs to a moment."""
+        """Publish everything that belongs to a moment."""
         self.publish_clock(stamp)
         for topic, message in moment_messages(moment, stamp, self._max_range):
             self._publishers[topic].publish(message)

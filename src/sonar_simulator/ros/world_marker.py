@@ -7,7 +7,7 @@ from visualization_msgs.msg import Marker
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_mesh import world_triangles
 
-# The map grows on the world and must be seen on it and through it.
+# Transparent, because the map grows on the world and must be visible through it.
 _OPACITY = 0.45
 
 

@@ -1,1 +1,1 @@
-"""World, vehicle and sonar on one time line."""
+"""World, vehicle and sonar simulated together over time."""

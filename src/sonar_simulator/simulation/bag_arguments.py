@@ -15,7 +15,7 @@ examples:
   simulate_bag --world harbour --out harbour.bag --set echo_model=physical --set odometry.scale_error=0.1
   simulate_bag --world my_pool.dae --script my_moves.yaml --out pool.bag --set sonar.ray_rows=15 --set seed=7
 
-What --set takes, key by key, stands in yaml/sonar_simulator_default.yaml."""
+yaml/sonar_simulator_default.yaml lists the keys that --set takes."""
 
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
@@ -44,7 +44,7 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
 def settings_of(options: argparse.Namespace, package: Path) -> Dict[str, Any]:
     """Return the simulator's parameters that a command line asks for; raises ParameterError.
 
-    `package` is the package's folder, where its worlds, tours and the parameters of the demo are.
+    `package` is the package's folder, which holds the worlds, the tours and the demo's parameters.
     """
     own = package / "yaml" / f"sonar_simulator_{options.world}.yaml"
     chosen = options.parameters or (own if own.is_file() else None)

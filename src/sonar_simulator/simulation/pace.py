@@ -3,21 +3,21 @@
 import time
 from typing import Callable
 
-# What may be caught up by running faster than asked; beyond it the schedule moves.
+# s; a smaller delay is caught up by running faster than requested, a greater one shifts the schedule.
 _CATCH_UP = 0.5
 
 
 class Pace:
-    """Waits until a simulated time has come, at `factor` simulated seconds per second of wall time.
+    """Waits until a simulated time is reached, at `factor` simulated seconds per second of wall time.
 
-    A machine that is too slow, or was stopped, does not make time race afterwards: the schedule is moved and the
-    delay counted in `lost`.
+    A machine that is too slow, or was stopped, does not make time run faster afterwards: the schedule is
+    shifted, and the delay is counted in `lost`.
     """
 
     def __init__(
         self, factor: float, wait: Callable[[float], object], clock: Callable[[], float] = time.monotonic
     ) -> None:
-        """`wait` sleeps for so many seconds, or less when the simulation ends."""
+        """`wait` sleeps for the given number of seconds, or less if the simulation ends."""
         self.lost = 0.0
         self._factor = factor
         self._wait = wait
@@ -25,7 +25,7 @@ class Pace:
         self._start = clock()
 
     def wait_for(self, simulated: float) -> float:
-        """Wait for a simulated time [s since the start]; return by how much it was late already, s of wall time."""
+        """Wait for a simulated time [s since the start]; return how late it already was, s of wall time."""
         late = self._clock() - (self._start + simulated / self._factor)
         if late < 0.0:
             self._wait(-late)

@@ -1,4 +1,4 @@
-"""World, vehicle and sonar together on one time line (thesis 6.4). Free of ROS."""
+"""Simulates world, vehicle and sonar together over time (thesis 6.4). Free of ROS."""
 
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -30,19 +30,23 @@ class SimulatorParameters(ParameterSet):
         "yaml/basin_tour.yaml", "moves of the vehicle; relative to the package's folder", tunable=False
     )
     echo_model: str = parameter(
-        "laser_cone", "how contacts become echoes: laser_cone, collision or physical", tunable=False
+        "laser_cone", "model that turns contacts into echoes: laser_cone, collision or physical", tunable=False
     )
     drive: Drive = parameter(
-        Drive.SCRIPT, "what moves the vehicle: its script, or from the script's start on commands", tunable=False
+        Drive.SCRIPT,
+        "what moves the vehicle: the script, or commands (then the script only gives the start)",
+        tunable=False,
     )
-    seed: int = parameter(1, "of all random numbers: same seed, same beams", low=0, high=2**31 - 1, tunable=False)
+    seed: int = parameter(
+        1, "seed of all random numbers: the same seed gives the same beams", low=0, high=2**31 - 1, tunable=False
+    )
     real_time_factor: float = parameter(
         1.0, "simulated seconds per second of wall time", low=0.01, high=1000.0, tunable=False
     )
     clock_rate: float = parameter(
-        20.0, "ticks of /clock, odometry and tf", unit="1/s", low=1.0, high=1000.0, tunable=False
+        20.0, "rate of /clock, odometry and tf", unit="1/s", low=1.0, high=1000.0, tunable=False
     )
-    wait_for_listener: bool = parameter(True, "SCRIPT: begin when somebody subscribes to the beams", tunable=False)
+    wait_for_listener: bool = parameter(True, "SCRIPT: wait until somebody subscribes to the beams", tunable=False)
 
 
 @dataclass(frozen=True)
@@ -55,10 +59,10 @@ class Ping:
 
 @dataclass(frozen=True)
 class Moment:
-    """All there is to know at one time [s since the start].
+    """The complete state at one time [s since the start].
 
-    tilt: angle of the sonar's servo, rad. is_tick: whether it is a moment of the steady rate. head_angle: where the
-    head looks, rad, if it sends a beam now; `ping` is that beam once it was heard.
+    tilt: angle of the sonar's servo, rad. is_tick: whether this is a tick of the steady rate. head_angle: direction of
+    the head, rad, if it sends a beam now; `ping` is that beam once it has been simulated.
     """
 
     time: float
@@ -83,7 +87,7 @@ class Simulation:
         servo: Optional[Servo] = None,
         tilt_commands: Sequence[TiltCommand] = (),
     ) -> None:
-        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` it stays there."""
+        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` the mount is fixed."""
         self.duration = movement.duration
         self._movement = movement
         self._odometry = odometry
@@ -96,8 +100,8 @@ class Simulation:
     def moments(self, tick_rate: float, beams_at_once: int = 1) -> Iterator[Moment]:
         """Yield all moments from time 0 to the end of the motion, in order of time.
 
-        With `beams_at_once` > 1 moments are held back until so many beams can be cast together, which is faster and
-        draws random numbers in another order.
+        With `beams_at_once` > 1, moments are held back until that many beams can be cast together. This is faster, and
+        draws random numbers in a different order.
         """
         waiting: List[Moment] = []
         beams = 0
@@ -110,7 +114,7 @@ class Simulation:
         yield from self._heard(waiting)
 
     def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
-        """Return the state at `time`, not before that of the last call, with a beam still to be heard."""
+        """Return the state at `time`, not before that of the last call, with a beam still to be simulated."""
         self._command_tilt(time)
         truth = self._movement.state(time)
         return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), is_tick, head_angle)

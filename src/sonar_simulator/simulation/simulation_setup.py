@@ -1,4 +1,4 @@
-"""Makes a simulation of plain parameter values, for the node and for bags alike. Free of ROS."""
+"""Makes a simulation from plain parameter values, for the node and for bags. Free of ROS."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,12 +32,12 @@ GROUPS: Dict[str, Type[ParameterSet]] = {
     "odometry": OdometryParameters,
     **{name: kind.parameters for name, kind in ECHO_MODELS.items()},
 }
-"""The parameters that come in groups; of the echo models' groups the one that `echo_model` names is used."""
+"""Groups of parameters; of the echo models' groups, the one that `echo_model` names is used."""
 
 
 @dataclass(frozen=True)
 class Settings:
-    """All parameters of a simulation, validated; `echo` are those of the echo model that is used."""
+    """All parameters of a simulation, validated; `echo` holds those of the selected echo model."""
 
     simulator: SimulatorParameters
     sonar: SonarParameters
@@ -59,7 +59,7 @@ class Settings:
         return cls(simulator=simulator, echo=echo, **parts)
 
     def to_mapping(self) -> Dict[str, Any]:
-        """Return plain values, as `from_mapping` takes them; of the echo models the one that is used."""
+        """Return plain values, as `from_mapping` takes them; with only the selected echo model."""
         groups = {name: getattr(self, name) for name in GROUPS if name not in ECHO_MODELS}
         groups[self.simulator.echo_model] = self.echo
         return {**self.simulator.to_mapping(), **{name: group.to_mapping() for name, group in groups.items()}}
@@ -67,7 +67,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Setup:
-    """A simulation and the parts of it that others want to reach."""
+    """A simulation, and those of its parts that others use."""
 
     simulation: Simulation
     world: World
@@ -80,14 +80,14 @@ class Setup:
 def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: Callable[[str], None]) -> Setup:
     """Load world and script, relative to `folder`, and put everything together.
 
-    `warn` receives what the world could not give. Raises ParameterError.
+    `warn` receives a line for each part of the world that could not be loaded. Raises ParameterError.
     """
     parameters = settings.simulator
     model = make_echo_model(parameters.echo_model, settings.echo.to_mapping())
     script = _loaded(lambda: load_script(folder / Path(parameters.script).expanduser()))
     T_base_sonar = _loaded(lambda: robot.mount(BASE_FRAME, SONAR_FRAME))
     world = _loaded(lambda: _load_world(folder / Path(parameters.world).expanduser(), warn))
-    # Streams of their own: a change of the odometry's noise must leave the beams as they are.
+    # Separate streams, so that a change of the odometry's noise does not change the beams.
     beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
     sonar = Sonar(_loaded(lambda: RayCaster(world)), settings.sonar.pattern(), model, beams)
     servo = Servo(settings.servo)

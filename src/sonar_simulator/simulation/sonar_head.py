@@ -1,4 +1,4 @@
-"""The scanning head: when it looks where, and what it hears (thesis 4.1)."""
+"""The scanning head: its direction over time, and what it hears (thesis 4.1)."""
 
 import math
 from dataclasses import dataclass
@@ -11,7 +11,7 @@ from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.beam_tracer import BeamTracer
 from sonar_simulator.rays.ray_caster import RayCaster
 
-# Large enough for numpy, small enough for the cache.
+# Beams per batch: large enough for numpy to be efficient, small enough for the processor's cache.
 _BATCH = 120
 
 
@@ -20,9 +20,11 @@ class SonarParameters(ParameterSet):
     """The head's timing and the shape of its beam."""
 
     beams_per_turn: int = parameter(
-        120, "beams in a full turn", low=1, high=3600, thesis_name="step = 360 / beams_per_turn", tunable=False
+        120, "beams per revolution", low=1, high=3600, thesis_name="step = 360 / beams_per_turn", tunable=False
     )
-    seconds_per_turn: float = parameter(16.0, "time of a full turn", unit="s", low=0.01, high=3600.0, tunable=False)
+    seconds_per_turn: float = parameter(
+        16.0, "duration of a revolution", unit="s", low=0.01, high=3600.0, tunable=False
+    )
     vertical_opening_deg: float = parameter(
         22.0, "height of the beam", unit="deg", low=0.0, high=150.0, thesis_name="opening"
     )
@@ -38,7 +40,7 @@ class SonarParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class SonarHead:
-    """A head that turns counter-clockwise in equal steps and never stops; beam 0 looks along +x at time 0."""
+    """A head that turns counter-clockwise in equal steps and never stops; beam 0 points along +x at time 0."""
 
     beams_per_turn: int
     seconds_per_turn: float
@@ -56,7 +58,10 @@ class SonarHead:
 
 
 class Sonar:
-    """Hears a world. Same seed and calls, same bytes; a batch draws its random numbers in another order."""
+    """Simulates beams in a world. The same seed and calls give the same bytes.
+
+    Batches draw random numbers in a different order.
+    """
 
     def __init__(self, caster: RayCaster, pattern: BeamPattern, model: EchoModel, rng: np.random.Generator) -> None:
         self._tracer = BeamTracer(caster, model.pattern(pattern), model.mirrors)
@@ -80,7 +85,7 @@ class Sonar:
     def pings(self, T_world_sonar: np.ndarray, angles: np.ndarray) -> np.ndarray:
         """Return the strengths (beams, bins) uint8 at head `angles` (beams,) rad from poses (beams, 4, 4).
 
-        Any number of beams: they are taken in batches that fit into memory.
+        Any number of beams is allowed: they are processed in batches that fit into memory.
         """
         starts = range(0, len(angles), _BATCH)
         batches = [self._batch(T_world_sonar[i : i + _BATCH], angles[i : i + _BATCH]) for i in starts]

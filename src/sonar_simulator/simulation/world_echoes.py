@@ -1,4 +1,4 @@
-"""Echoes of a world file for an emulated head, which asks for one ping at a time (thesis 6.4)."""
+"""Echoes from a world file for an emulated head, which needs one ping at a time (thesis 6.4)."""
 
 import math
 from typing import Protocol
@@ -19,7 +19,7 @@ _FULL_STRENGTH_DB = 20.0  # Start gain at which an echo has the strength that th
 
 
 class PingCommand(Protocol):
-    """What of a head's command changes its echoes: reach in m, gain in dB."""
+    """The settings in a head's command that change its echoes: range in m, gain in dB."""
 
     max_range: int
     start_gain_db: int
@@ -34,7 +34,7 @@ class PingRequest(Protocol):
 
 
 class HeadInWorld(Protocol):
-    """Which world, and where the head stands in it: m, degrees counter-clockwise."""
+    """The world, and the position and heading of the head in it: m, degrees counter-clockwise."""
 
     world_file: str
     x: float
@@ -45,7 +45,7 @@ class HeadInWorld(Protocol):
 
 
 class WorldEchoes:
-    """Answers pings with what a head that stands still hears of a world; the gain scales the strengths."""
+    """Answers pings with what a head at rest hears in a world; the gain scales the strengths."""
 
     def __init__(self, world: World, T_world_sonar: np.ndarray, seed: int) -> None:
         """Raises MissingPackageError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""

@@ -1,1 +1,1 @@
-"""The simulated vehicle: movement, odometry, servo, description."""
+"""The simulated vehicle: motion, odometry, servo and robot description."""

@@ -16,17 +16,25 @@ _STILL_SPEED = 1e-3  # m/s and rad/s: slower is the tail of an exponential, and 
 
 @dataclass(frozen=True)
 class VehicleParameters(ParameterSet):
-    """What the vehicle can do when it is driven by commands. Scripts have speeds of their own."""
+    """Limits of the vehicle when it is driven by commands; scripts have their own."""
 
     surge_speed: float = parameter(1.0, "greatest speed forward and back", unit="m/s", low=0.0, high=20.0)
     sway_speed: float = parameter(0.4, "greatest speed to either side", unit="m/s", low=0.0, high=20.0)
     heave_speed: float = parameter(0.4, "greatest speed up and down", unit="m/s", low=0.0, high=20.0)
     turn_rate_deg: float = parameter(30.0, "greatest turn rate", unit="deg/s", low=0.0, high=360.0)
     response_time: float = parameter(
-        0.6, "time constant of the speed; 80 % of a new command is reached after 3", unit="s", low=0.02, high=60.0
+        0.6,
+        "time constant of the speed; 80 % of a new command is reached after three of them",
+        unit="s",
+        low=0.02,
+        high=60.0,
     )
     command_timeout: float = parameter(
-        0.5, "the vehicle stops when no command came for so long, simulated time", unit="s", low=0.01, high=3600.0
+        0.5,
+        "the vehicle stops if no command has arrived for this long, in simulated time",
+        unit="s",
+        low=0.01,
+        high=3600.0,
     )
 
     def limits(self) -> np.ndarray:
@@ -35,10 +43,10 @@ class VehicleParameters(ParameterSet):
 
 
 class CommandedVehicle:
-    """Approaches the commanded velocity like a critically damped spring, so that acceleration never jumps.
+    """Approaches the commanded velocity like a critically damped spring, so that its acceleration never jumps.
 
-    It keeps itself level (thesis 4.3.1: trimmed, no pitch control), stays below the surface at z = 0 and stops when
-    commands cease. There is no collision: it swims through walls.
+    It keeps itself level (thesis 4.3.1: trimmed, no pitch control), stays below the surface at z = 0, and stops when
+    commands cease. There are no collisions: it can move through walls.
     """
 
     duration = math.inf
@@ -56,8 +64,8 @@ class CommandedVehicle:
     def command(self, time: float, twist: np.ndarray) -> bool:
         """Follow a (6,) body twist from `time` s on; return whether its speed had to be limited.
 
-        Roll and pitch rates are beyond the vehicle and ignored. Raises RefusedInput when a value is not finite: the
-        last command stays until it times out.
+        Roll and pitch rates are ignored, because the vehicle cannot control them. Raises RefusedInput if a value is not
+        finite; the last command then stays valid until it times out.
         """
         if not np.isfinite(twist).all():
             raise RefusedInput("velocity commands refused", f"{twist.tolist()}: every value must be finite")

@@ -1,4 +1,4 @@
-"""What moves a vehicle: its state at any time, wherever that comes from."""
+"""The state of a vehicle at any time, and the interface of whatever moves it."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,9 +8,9 @@ import numpy as np
 
 @dataclass(frozen=True)
 class VehicleState:
-    """Where the vehicle truly is and how it moves.
+    """The vehicle's true pose and velocity.
 
-    T_world_base: (4, 4). twist: (6,) in the body frame, linear x y z m/s, angular x y z rad/s. is_still: it rests.
+    T_world_base: (4, 4). twist: (6,) in the body frame, linear x y z m/s, angular x y z rad/s. is_still: at rest.
     """
 
     T_world_base: np.ndarray
@@ -19,10 +19,10 @@ class VehicleState:
 
 
 class Movement(Protocol):
-    """A vehicle on its way."""
+    """A vehicle in motion."""
 
     duration: float
-    """When the way ends, s since its start; inf where it has no end."""
+    """When the motion ends, s since its start; inf if it has no end."""
 
     def state(self, time: float) -> VehicleState:
         """Return the state at `time` s since the start; times must not decrease from call to call."""

@@ -1,4 +1,4 @@
-"""What the vehicle believes of its own motion (thesis 7.4)."""
+"""The vehicle's own estimate of its motion (thesis 7.4)."""
 
 import math
 from dataclasses import dataclass
@@ -16,13 +16,13 @@ _NOISE_TIME = 1.0  # s: correlation time, about that of a vehicle's own dynamics
 
 @dataclass(frozen=True)
 class OdometryParameters(ParameterSet):
-    """The error of the odometry. Depth is right: it comes from a pressure sensor (thesis 4.3.2)."""
+    """The errors of the odometry. Depth has none, because it comes from a pressure sensor (thesis 4.3.2)."""
 
     scale_error: float = parameter(
-        0.3, "the vehicle really moves 1 + scale_error times what odometry says", low=-0.9, high=10.0
+        0.3, "true distances are 1 + scale_error times those of the odometry", low=-0.9, high=10.0
     )
     heading_drift_deg_per_minute: float = parameter(
-        0.0, "the believed heading turns away from the true one at this rate", unit="deg/min", low=-360.0, high=360.0
+        0.0, "the odometry's heading drifts from the true one at this rate", unit="deg/min", low=-360.0, high=360.0
     )
     speed_noise: float = parameter(
         0.0, "standard deviation of the measured speed along each axis, as a share of the speed", low=0.0, high=10.0
@@ -33,21 +33,21 @@ class OdometryParameters(ParameterSet):
 
 
 class Estimate(NamedTuple):
-    """What odometry says: (4, 4) T_odom_base and the (6,) body twist, m/s and rad/s."""
+    """The odometry's estimate: (4, 4) T_odom_base and the (6,) body twist, m/s and rad/s."""
 
     T_odom_base: np.ndarray
     twist: np.ndarray
 
 
 class Odometry:
-    """Dead reckoning from a speed and a turn rate that are measured wrongly. The odom frame begins as the world frame.
+    """Dead reckoning from a speed and a turn rate measured with errors. At the start, odom is the world frame.
 
-    Noise is a Gauss-Markov process with a correlation time of 1 s, so that what it does to the pose does not depend
-    on how often odometry is asked. A vehicle that rests is measured to rest, but for the drift of its heading.
+    Noise is a Gauss-Markov process with a correlation time of 1 s, so that its effect on the pose does not depend
+    on how often the odometry is evaluated. A vehicle at rest is measured to be at rest, except for its heading drift.
     """
 
     def __init__(self, parameters: OdometryParameters, start: np.ndarray, rng: np.random.Generator) -> None:
-        """`start`: (4, 4) T_world_base at time 0, when odometry is right."""
+        """`start`: (4, 4) T_world_base at time 0, when the odometry is exact."""
         self._parameters = parameters
         self._rng = rng
         self._time = 0.0
@@ -57,7 +57,7 @@ class Odometry:
         self._noise = rng.standard_normal(3)
 
     def estimate(self, time: float, state: VehicleState) -> Estimate:
-        """Return what odometry says at `time` s, never before that of the last call, of the true `state`."""
+        """Return the estimate at `time` s, which must not be before that of the last call, for the true `state`."""
         duration = max(time - self._time, 0.0)
         self._advance(duration, state)
         self._time = max(time, self._time)

@@ -28,7 +28,7 @@ class RobotDescription:
     """The joints of a URDF."""
 
     def __init__(self, urdf: str) -> None:
-        """Raises DescriptionError when the text is no URDF."""
+        """Raises DescriptionError if the text is not a URDF."""
         try:
             root = ET.fromstring(urdf)
         except ET.ParseError as error:
@@ -48,11 +48,11 @@ class RobotDescription:
 
     @property
     def fixed_joints(self) -> List[Joint]:
-        """Return the joints that never move, which belong on /tf_static."""
+        """Return the fixed joints, which belong on /tf_static."""
         return [joint for joint in self._joints.values() if joint.is_fixed]
 
     def mount(self, base: str, link: str) -> np.ndarray:
-        """Return the (4, 4) T_base_link with every joint at zero; raises DescriptionError when none leads there."""
+        """Return the (4, 4) T_base_link with every joint at zero; raises DescriptionError if no joints lead there."""
         pose, child = np.eye(4), link
         for _ in range(len(self._joints) + 1):
             if child == base:

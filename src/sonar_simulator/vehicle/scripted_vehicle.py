@@ -10,7 +10,7 @@ from node_support.geometry.matrices import pose_matrix
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 
-# The greatest slope of the minimum-jerk law, reached half way: peak speed over mean speed.
+# Peak speed over mean speed of the minimum-jerk law: its greatest slope, reached half way.
 _PEAK = 1.875
 
 
@@ -20,7 +20,7 @@ class ScriptError(ValueError):
 
 @dataclass(frozen=True)
 class Start(ParameterSet):
-    """Where a script begins, in the world frame."""
+    """The start pose of a script, in the world frame."""
 
     x: float = parameter(0.0, "start", unit="m")
     y: float = parameter(0.0, "start", unit="m")
@@ -34,63 +34,63 @@ class Start(ParameterSet):
 
 @dataclass(frozen=True)
 class Move(ParameterSet):
-    """One entry of a script: a displacement along the axes of the world, with a turn, from rest to rest."""
+    """One entry of a script: a displacement along the axes of the world, with a turn, beginning and ending at rest."""
 
     x: float = parameter(0.0, "displacement", unit="m")
     y: float = parameter(0.0, "displacement", unit="m")
     z: float = parameter(0.0, "displacement, up positive", unit="m")
     yaw_deg: float = parameter(0.0, "turn, counter-clockwise positive", unit="deg")
-    speed: float = parameter(1.0, "greatest speed on the way", unit="m/s", low=0.001)
-    turn_rate_deg: float = parameter(15.0, "greatest turn rate on the way", unit="deg/s", low=0.001)
-    seconds: float = parameter(0.0, "time of the move; 0: as speed and turn rate give", unit="s", low=0.0)
+    speed: float = parameter(1.0, "greatest speed during the move", unit="m/s", low=0.001)
+    turn_rate_deg: float = parameter(15.0, "greatest turn rate during the move", unit="deg/s", low=0.001)
+    seconds: float = parameter(0.0, "duration of the move; 0: determined by speed and turn rate", unit="s", low=0.0)
 
     def check(self) -> None:
-        """Refuse a move that goes nowhere: a wait has its own entry."""
+        """Refuse a move that goes nowhere; there is a separate entry for waiting."""
         if not self.displacement().any():
             raise ParameterError("x, y, z, yaw_deg are all 0: one must differ; to stay use wait")
 
     def displacement(self) -> np.ndarray:
-        """Return x, y, z [m] and yaw [rad] to go."""
+        """Return the displacement x, y, z [m] and yaw [rad]."""
         return np.array([self.x, self.y, self.z, math.radians(self.yaw_deg)])
 
     def duration(self) -> float:
-        """Return the time of the move, s."""
+        """Return the duration of the move, s."""
         distance = math.sqrt(self.x**2 + self.y**2 + self.z**2)
         return self.seconds or _PEAK * max(distance / self.speed, abs(self.yaw_deg) / self.turn_rate_deg)
 
 
 @dataclass(frozen=True)
 class Wait(ParameterSet):
-    """One entry of a script: staying where it is."""
+    """One entry of a script: waiting."""
 
     wait: float = parameter(0.0, "time to stay", unit="s", low=0.0)
 
     def displacement(self) -> np.ndarray:
-        """Return x, y, z [m] and yaw [rad] to go: none."""
+        """Return the displacement x, y, z [m] and yaw [rad]: none."""
         return np.zeros(4)
 
     def duration(self) -> float:
-        """Return the time of the wait, s."""
+        """Return the duration of the wait, s."""
         return self.wait
 
 
 @dataclass(frozen=True)
 class Tilt(ParameterSet):
-    """One entry of a script: the sonar's servo turns from now on; the script goes on at once."""
+    """One entry of a script: the sonar's servo starts to turn, and the script continues at once."""
 
     tilt_deg: float = parameter(0.0, "angle of the servo, positive down", unit="deg", low=-180.0, high=180.0)
 
     def displacement(self) -> np.ndarray:
-        """Return x, y, z [m] and yaw [rad] to go: none."""
+        """Return the displacement x, y, z [m] and yaw [rad]: none."""
         return np.zeros(4)
 
     def duration(self) -> float:
-        """Return the time it takes the vehicle, s: none."""
+        """Return the time that it takes, s: none."""
         return 0.0
 
 
 class TiltCommand(NamedTuple):
-    """When the servo is told to turn, s since the script's start, and to which angle, rad."""
+    """A command to the servo: when, s since the script's start, and to which angle, rad."""
 
     time: float
     angle: float
@@ -99,8 +99,8 @@ class TiltCommand(NamedTuple):
 class VehicleScript:
     """Moves one after the other; each follows the minimum-jerk law, so the twist is continuous.
 
-    `start` is (4,) x, y, z [m], yaw [rad]; `tilt_commands` are in order of time. Before time 0 the vehicle stands at
-    its start, after `duration` where the last move ended.
+    `start` is (4,) x, y, z [m], yaw [rad]; `tilt_commands` are in order of time. Before time 0 the vehicle is at
+    its start pose, after `duration` where the last move ended.
     """
 
     def __init__(self, entries: Sequence[Any], start: np.ndarray) -> None:
@@ -150,7 +150,7 @@ class VehicleScript:
         return np.array([forward, left, velocity[2], 0.0, 0.0, velocity[3]])
 
     def is_still(self, time: float) -> bool:
-        """Return whether the vehicle rests between moves at `time` s; the slow ends of a move are no rest."""
+        """Return whether the vehicle is at rest between moves at `time` s; the slow ends of a move do not count."""
         index = self._index(time)
         return time < 0.0 or index == len(self._ends) or not self._displacements[index].any()
 

@@ -1,10 +1,10 @@
-"""What goes wrong when a world is loaded."""
+"""Errors of loading a world."""
 
 import sys
 
 
 class WorldError(ValueError):
-    """No world can be made of a file; the text names the file."""
+    """A file cannot be loaded as a world; the text names the file."""
 
 
 class MissingPackageError(WorldError):

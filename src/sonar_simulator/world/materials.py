@@ -1,4 +1,4 @@
-"""What surfaces do to sound: the materials a world file can name."""
+"""How surfaces reflect sound: the materials that a world file can name."""
 
 from dataclasses import dataclass
 from typing import Dict, Tuple
@@ -8,13 +8,13 @@ Colour = Tuple[float, float, float, float]
 
 @dataclass(frozen=True)
 class Material:
-    """A surface as high-frequency sound meets it.
+    """The acoustic properties of a surface at high frequencies.
 
-    reflection: pressure reflected at normal incidence over pressure that arrives, 0 to 1: from the impedances of
-        water and material, (Z - Zw) / (Z + Zw).
-    slope: rms slope of the surface's facets (tangent); small is a mirror, large throws sound everywhere.
+    reflection: share of the pressure reflected at normal incidence, 0 to 1, from the impedances of water and
+        material: (Z - Zw) / (Z + Zw).
+    slope: rms slope of the surface's facets (tangent); small is like a mirror, large scatters sound in all directions.
     lambert_db: strength of Lambert's diffuse scattering, dB (10 log mu, APL-UW TR 9407).
-    mirror: share of the reflected intensity that leaves as from a mirror, 0 to 1.
+    mirror: share of the reflected intensity that is reflected as by a mirror, 0 to 1.
     colour: red, green, blue, alpha, 0 to 1, for pictures.
     """
 
@@ -45,6 +45,6 @@ DEFAULT_MATERIAL = MATERIALS["concrete"]
 
 
 def material_of_reflection(reflection: float) -> Material:
-    """Return a material that reflects this share of the pressure, 0 to 1, and is otherwise like the default."""
+    """Return a material that reflects this share of the pressure, 0 to 1, and is otherwise the default."""
     like = DEFAULT_MATERIAL
     return Material(f"reflection {reflection:g}", reflection, like.slope, like.lambert_db, like.mirror, like.colour)

@@ -18,7 +18,7 @@ _COLLADA_AXES: Dict[str, np.ndarray] = {"X_UP": _X_UP, "Y_UP": _Y_UP, "Z_UP": np
 def load_mesh(path: Path, submesh: str = "") -> Mesh:
     """Return vertices (n, 3) in m, z up, and faces (m, 3) of a mesh file, or of one named mesh in it.
 
-    Collada says its unit and up axis, glTF is in metres and y up; the others are taken as metres and z up.
+    Collada states its unit and up axis, glTF is in metres with y up; others are taken to be in metres with z up.
     Raises WorldError, naming the file.
     """
     parts = _parts(path)
@@ -50,7 +50,7 @@ def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
     except OSError as error:
         raise WorldError(f"{path}: {error.strerror or error}") from error
     except Exception as error:
-        # The readers of the formats fail each in their own way on files that are not what their name says.
+        # Each reader fails in its own way on a file whose content does not match its name.
         reason = " ".join(str(error).split())
         raise WorldError(f"{path}: not a mesh: {type(error).__name__}: {reason}") from error
     parts = []
@@ -64,7 +64,7 @@ def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
 
 
 def _to_metres_z_up(path: Path) -> np.ndarray:
-    """Return the (3, 3) matrix from a file's own coordinates."""
+    """Return the (3, 3) matrix from a file's coordinates to metres with z up."""
     suffix = path.suffix.lower()
     if suffix in (".glb", ".gltf"):
         return _Y_UP

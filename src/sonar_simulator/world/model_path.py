@@ -13,7 +13,7 @@ _NEWEST = (1, 7)  # Newest version of SDF that is read
 
 
 def model_folders() -> Tuple[Path, ...]:
-    """Return the folders that Gazebo's variables name, and its own one in the home folder."""
+    """Return the folders in Gazebo's environment variables, and its folder in the home directory."""
     named = [folder for variable in PATH_VARIABLES for folder in os.environ.get(variable, "").split(os.pathsep)]
     return tuple(Path(os.path.expanduser(folder)) for folder in [*named, _HOME_MODELS] if folder)
 
@@ -50,7 +50,7 @@ def _in_package(rest: str) -> Optional[Path]:
 
 
 def sdf_of_model(folder: Path) -> Path:
-    """Return the SDF file of a model's folder: the newest its model.config offers up to 1.7, or model.sdf."""
+    """Return the SDF file of a model's folder: the newest version up to 1.7 in its model.config, or model.sdf."""
     if folder.is_file():
         return folder
     try:

@@ -6,7 +6,7 @@ import numpy as np
 
 Mesh = Tuple[np.ndarray, np.ndarray]
 
-# The chords of a 64-gon lie at most 0.12 % of the radius inside the circle: less than a bin at any range.
+# The chords of a 64-gon are at most 0.12 % of the radius inside the circle, less than a bin at any range.
 _SEGMENTS = 64
 _RINGS = 32  # Half of the segments, so that the facets of a sphere are as high as wide
 _ENDLESS = 4000.0  # m: far beyond any sonar's range, and still exact to a millimetre in float32
@@ -32,14 +32,14 @@ def sphere(radius: float) -> Mesh:
 
 
 def plane(x: float, y: float) -> Mesh:
-    """Return a rectangle across the z axis, m; one without end is cut off where no sonar hears it."""
+    """Return a rectangle perpendicular to the z axis, m; an infinite one is cut off where no sonar hears it."""
     half_x, half_y = min(x, _ENDLESS) / 2.0, min(y, _ENDLESS) / 2.0
     corners = [[-half_x, -half_y, 0.0], [half_x, -half_y, 0.0], [half_x, half_y, 0.0], [-half_x, half_y, 0.0]]
     return np.array(corners), _split(np.array([[0, 1, 2, 3]]))
 
 
 def _revolved(radii: np.ndarray, heights: np.ndarray) -> Mesh:
-    """Turn a profile about the z axis; triangles that shrink to lines on the axis are left out."""
+    """Rotate a profile about the z axis; triangles that degenerate to lines on the axis are left out."""
     turn = np.arange(_SEGMENTS) * 2.0 * np.pi / _SEGMENTS
     rings = [
         np.column_stack([radius * np.cos(turn), radius * np.sin(turn), np.full(_SEGMENTS, height)])

@@ -17,9 +17,9 @@ from sonar_simulator.world.world import Shape, World
 
 VERSIONS = ("1.4", "1.5", "1.6", "1.7")
 _NOT_LOADED = ("population", "road", "actor")
-# An include inside an include this often includes itself.
+# Includes nested deeper than this are taken for a model that includes itself.
 _DEEPEST = 20
-# What Gazebo ships and worlds include, known without Gazebo; the sun makes no sound.
+# Models of Gazebo that worlds often include, known without Gazebo; the sun has no surface.
 _LIGHTS = ("model://sun",)
 _GROUND_PLANE = ET.fromstring(
     '<model name="ground_plane"><static>true</static><link name="link"><collision name="collision"><geometry><plane>'
@@ -29,7 +29,7 @@ _GROUND_PLANE = ET.fromstring(
 
 @dataclass(frozen=True)
 class LoadedWorld:
-    """A world and, one line each, what its file holds that could not be given."""
+    """A world, and one line for each part of its file that could not be loaded."""
 
     world: World
     warnings: Tuple[str, ...]
@@ -37,7 +37,7 @@ class LoadedWorld:
 
 @dataclass(frozen=True)
 class _Place:
-    """Where an element stands: (4, 4) pose in the world, its name, what things are of there, and how deep it is."""
+    """The place of an element: its (4, 4) pose in the world, name, default material, and depth of nested includes."""
 
     pose: np.ndarray
     name: str
@@ -50,9 +50,9 @@ class _Place:
 
 
 def load_sdf(path: Union[str, Path]) -> LoadedWorld:
-    """Read a world file. What cannot be given becomes a warning and the rest loads.
+    """Read a world file. A part that cannot be loaded becomes a warning, and the rest is loaded.
 
-    Raises WorldError when the file cannot be read, is not XML, is not SDF or leaves no shape at all.
+    Raises WorldError if the file cannot be read, is not XML, is not SDF or contains no shape at all.
     """
     root = _parsed(path)
     reader = _Reader(Path(path), [], [])
@@ -79,7 +79,7 @@ def _parsed(path: Union[str, Path]) -> Element:
 
 
 class _Reader:
-    """Reads one file; readers of included files add to the same lists."""
+    """Reads one file; the readers of included files append to the same lists."""
 
     def __init__(self, path: Path, shapes: List[Shape], warnings: List[str]) -> None:
         self._path = path

@@ -1,4 +1,4 @@
-"""Poses in SDF: of elements in the model or world they stand in, `relative_to` other frames of it included."""
+"""Poses in SDF: of elements in their model or world, including those `relative_to` other frames of it."""
 
 import math
 from typing import Callable, Tuple
@@ -14,14 +14,14 @@ _DEFAULT_BASE = {"frame": "attached_to", "joint": "child"}
 
 
 class Scope:
-    """A world or a model: the frames that poses inside it may name."""
+    """A world or a model, with the frames that poses inside it may name."""
 
     def __init__(self, element: Element, warn: Callable[[str, str], None]) -> None:
         self._named = {element_name(child): child for child in element if child.tag in _NAMED}
         self._warn = warn
 
     def pose(self, element: Element, name: str, seen: Tuple[str, ...] = ()) -> np.ndarray:
-        """Return (4, 4) T_scope_element of a child of the scope. Raises ValueError for a pose that makes no sense."""
+        """Return (4, 4) T_scope_element of a child of the scope. Raises ValueError for an invalid pose."""
         pose = element.find("pose")
         base = _base(element, pose)
         return self._frame(base, name, seen) @ own_pose(element)
@@ -43,13 +43,13 @@ class Scope:
 
 
 def element_name(element: Element) -> str:
-    """Return the name an element goes by."""
+    """Return the name of an element."""
     name = element.get("name") or element.findtext("name") or element.findtext("uri") or element.tag
     return name.strip()
 
 
 def own_pose(element: Element) -> np.ndarray:
-    """Return the (4, 4) matrix an element's <pose> spells, the identity if it has none. Raises ValueError."""
+    """Return the (4, 4) matrix of an element's <pose>, the identity if it has none. Raises ValueError."""
     pose = element.find("pose")
     if pose is None or not (pose.text or "").strip():
         return np.eye(4)
@@ -60,7 +60,7 @@ def own_pose(element: Element) -> np.ndarray:
 
 
 def numbers(element: Element, count: int) -> Tuple[float, ...]:
-    """Return the numbers an element's text spells. Raises ValueError unless it is `count` finite ones."""
+    """Return the numbers in an element's text. Raises ValueError unless they are `count` finite numbers."""
     words = (element.text or "").split()
     try:
         found = tuple(float(word) for word in words)

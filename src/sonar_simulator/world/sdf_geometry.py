@@ -1,4 +1,4 @@
-"""What an SDF <geometry> and its surface's material become."""
+"""Shapes and materials from SDF's <geometry> and material elements."""
 
 import dataclasses
 import math
@@ -20,9 +20,9 @@ _PROPERTIES = ("reflection", "slope", "lambert_db", "mirror")
 
 
 def shape_of(geometry: Element, name: str, pose: np.ndarray, is_collision: bool, beside: Path) -> Shape:
-    """Return the shape that a child of <geometry> describes; `beside` is the folder of the file it stands in.
+    """Return the shape that a child of <geometry> describes; `beside` is the folder of its file.
 
-    Raises ValueError or WorldError with what is wrong with it.
+    Raises ValueError or WorldError that say what is wrong with it.
     """
     if geometry.tag == "plane":
         return Shape(name, "plane", pose @ _turned_to(_normal(geometry)), _plane_size(geometry, is_collision))
@@ -32,10 +32,10 @@ def shape_of(geometry: Element, name: str, pose: np.ndarray, is_collision: bool,
 
 
 def material_of(element: Element, inherited: Material) -> Material:
-    """Return the material of a model, link or collision; raises ValueError for one that makes no sense.
+    """Return the material of a model, link or collision; raises ValueError for an invalid one.
 
-    <NAMESPACE:material>NAME</...> picks one of the table, attributes change its properties; <laser_retro> above 0 is
-    the pressure that is reflected, 1 all of it.
+    <NAMESPACE:material>NAME</...> selects one from the table, and attributes change its properties;
+    <laser_retro> above 0 is the share of pressure that is reflected.
     """
     named = next((child for child in element if child.tag.endswith("}material")), None)
     if named is not None:
@@ -83,7 +83,7 @@ def _size(geometry: Element) -> Tuple[float, ...]:
 
 
 def _plane_size(geometry: Element, is_collision: bool) -> Tuple[float, ...]:
-    """Return the edges, m: the plane of a collision has no end (sdformat.org), its <size> is for looks."""
+    """Return the edges, m; the plane of a collision is infinite (sdformat.org), its <size> is only for display."""
     if is_collision:
         return (math.inf, math.inf)
     element = geometry.find("size")

@@ -1,16 +1,16 @@
-"""The world the sonar looks at: shapes, their triangles, what they are of and their outlines from above."""
+"""The world around the sonar: shapes, their triangles, materials, and outlines from above."""
 
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
-from scipy.spatial import ConvexHull, QhullError
+from scipy.spatial import ConvexHull
 
 from sonar_simulator.world import primitives
 from sonar_simulator.world.materials import DEFAULT_MATERIAL, Colour, Material
 
-# A shape this many times wider than high, both ways, is ground: it has no outline to draw among walls.
+# A shape that is this many times wider than high, in both directions, is ground and gets no outline among the walls.
 _GROUND_RATIO = 10.0
 
 
@@ -18,13 +18,13 @@ _GROUND_RATIO = 10.0
 class Shape:
     """A solid or a surface placed in the world.
 
-    name: where it stands in its file, as model/link/collision.
+    name: its path in the file, as model/link/collision.
     kind, size: "box" (x, y, z), "cylinder" (radius, length) about its z axis, "sphere" (radius,), "plane" (x, y)
         across its z axis, or "mesh" (scale along x, y and z); m.
     pose: (4, 4) T_world_shape; a primitive is centred on its own origin.
-    material: what its surface is of.
+    material: of its surface.
     mesh: of a "mesh", its vertices (n, 3) in m before scaling and faces (m, 3).
-    colour: for pictures, red, green, blue, alpha from 0 to 1; None: as its material.
+    colour: for pictures, red, green, blue, alpha from 0 to 1; None: that of its material.
     """
 
     name: str
@@ -45,7 +45,7 @@ class Shape:
 
 @dataclass(frozen=True)
 class World:
-    """All that reflects sound: vertices (n, 3) float64 in m, faces (m, 3) int32, the shapes they are of.
+    """Everything that reflects sound: vertices (n, 3) float64 in m, faces (m, 3) int32, and the shapes they come from.
 
     face_material: (m,) index of each face's material into `materials`.
     """
@@ -88,7 +88,7 @@ class World:
         return normals / np.where(lengths > 0.0, lengths, 1.0)
 
     def outlines(self) -> List[np.ndarray]:
-        """Return shapes but ground as seen from above: closed (k, 2) polylines, m, first point repeated."""
+        """Return the outlines from above of all shapes but ground: closed (k, 2) polylines, m, first point repeated."""
         corners = [shape.triangles()[0] for shape in self.shapes]
         return [_outline(vertices[:, :2]) for vertices in corners if not _is_ground(vertices)]
 
@@ -101,8 +101,8 @@ def _is_ground(vertices: np.ndarray) -> bool:
 def _outline(points: np.ndarray) -> np.ndarray:
     try:
         corners = ConvexHull(points).vertices
-    except QhullError:
-        # Upright and flat: a line from above.
+    except RuntimeError:
+        # QhullError, which scipy 1.3 does not export: a flat vertical shape is a line when seen from above.
         ends = points[np.argsort(points @ np.ptp(points, axis=0))[[0, -1]]]
         return ends[[0, 1, 0]]
     return points[np.append(corners, corners[0])]

@@ -11,9 +11,9 @@ from sonar_simulator.world.world import Shape, World
 
 
 def load_world(path: Union[str, Path]) -> LoadedWorld:
-    """Read a world: a mesh when the file's name ends like one, SDF otherwise.
+    """Read a world: a mesh if the file's name ends like one, SDF otherwise.
 
-    Raises WorldError when nothing can be made of the file; what of an SDF file cannot be given becomes a warning.
+    Raises WorldError if the file cannot be loaded; a part of an SDF file that cannot be loaded becomes a warning.
     """
     path = Path(path)
     if path.suffix.lower() not in MESH_SUFFIXES:

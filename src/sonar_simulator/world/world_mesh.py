@@ -7,7 +7,7 @@ import numpy as np
 
 from sonar_simulator.world.world import Shape, World
 
-# Where there is nothing but planes without end, this much of them is shown, m.
+# m; extent shown of infinite planes if there is nothing else.
 _SHOWN = 100.0
 
 
@@ -20,7 +20,7 @@ class WorldTriangles:
 
 
 def world_triangles(world: World) -> WorldTriangles:
-    """Return all triangles of a world; planes without end are cut to the extent of the rest."""
+    """Return all triangles of a world; infinite planes are cut to the extent of the rest."""
     bounded = [shape for shape in world.shapes if np.isfinite(shape.size).all()]
     low, high = _extent(bounded)
     points, colours = [np.empty((0, 3))], [np.empty((0, 4), dtype=np.float32)]
@@ -40,7 +40,7 @@ def _extent(shapes: list) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def _cut(plane: Shape, low: np.ndarray, high: np.ndarray) -> Shape:
-    """Return the part of an endless plane below, above and beside a box from `low` to `high` m in the world."""
+    """Return the part of an infinite plane below, above and beside a box from `low` to `high` m in the world."""
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
     flat = (corners - plane.pose[:3, 3]) @ plane.pose[:3, :2]
     pose = plane.pose.copy()

@@ -1,15 +1,19 @@
 """live.yaml takes what map_bag did to the live nodes, and back."""
 
+import dataclasses
 import subprocess
+from enum import Enum
 from pathlib import Path
 
 import pytest
 import yaml
+from hypothesis import given
+from hypothesis import strategies as st
 
 from mlsm_manager.localisation.parameters import MapInput
-from mlsm_manager.offline.live_file import NODES, live_values, replay_values, write_live
+from mlsm_manager.offline.live_file import NODES, live_text, live_values, replay_values, write_live
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from node_support.parameters import ParameterError
+from node_support.parameters import ParameterError, describe
 
 ROOT = Path(__file__).resolve().parents[3]
 USED = ReplayParameters().changed(
@@ -43,8 +47,33 @@ def test_a_comment_says_what_it_is_for(written):
 def test_the_live_matcher_and_mapper_are_those_of_the_replay(written):
     core = NODES["mlsm_core"].from_mapping(yaml.safe_load(written.read_text())["mlsm_core"])
     assert vars(core.build_matcher()) == vars(USED.build_matcher())
-    live, replayed = core.settings(), USED.build_mapper().settings
-    assert (live.match_resolution, live.fewest_blocks) == (replayed.match_resolution, replayed.fewest_blocks)
+    assert core.map_settings() == USED.map_settings()
+
+
+def values_of(field):
+    """Return a strategy of all that a parameter may be, its limits among them."""
+    told = describe(field)
+    if issubclass(field.type, Enum):
+        return st.sampled_from(field.type)
+    if field.type is bool:
+        return st.booleans()
+    kind = st.integers if field.type is int else st.floats
+    return st.one_of(st.sampled_from([field.type(told.low), field.type(told.high)]), kind(told.low, told.high))
+
+
+ANY_PARAMETERS = st.fixed_dictionaries({field.name: values_of(field) for field in dataclasses.fields(ReplayParameters)})
+ANY_FRAME = st.sampled_from(["odom", "map", "corrected_map", "base_link", "5", "true", "\u00e9 #: x"])
+
+
+@given(ANY_PARAMETERS, ANY_FRAME, ANY_FRAME)
+def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
+    """Over their default files, as launch files load it."""
+    parameters = ReplayParameters(**values)
+    text = live_text(parameters, odom_frame, base_frame)
+    for name, own in yaml.safe_load(text).items():
+        defaults = yaml.safe_load((ROOT / f"yaml/{name}_default.yaml").read_text())
+        NODES[name].from_mapping({**defaults, **own})
+    assert ReplayParameters.from_mapping(replay_values(yaml.safe_load(text))) == parameters
 
 
 def test_map_bag_takes_it_back(written):

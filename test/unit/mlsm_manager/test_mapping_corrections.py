@@ -8,8 +8,9 @@ from made_scans import at_velocity, still
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.live_correction import LiveCorrection
+from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.prediction import Belief
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.matching.problem.scan import Track
 
 TIMES = np.arange(0.0, 10.0, 0.1)
 
@@ -23,8 +24,7 @@ def belief_of(time, pose, *errors):
 
 def cloud_at(times):
     times = np.array(times, dtype=float)
-    points = np.zeros((len(times), 4))
-    return Scan(points, times, np.zeros(len(times), dtype=bool), Track(TIMES, np.zeros((100, 3))), float(times[-1]))
+    return TimedPoints(np.zeros((len(times), 4)), times, float(times[-1]))
 
 
 def history_of(*stretches):

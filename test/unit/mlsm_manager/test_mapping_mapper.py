@@ -5,6 +5,7 @@ from made_scans import at_velocity, harbour, scan_of, still, wall
 
 from mlsm_manager.localisation.mapper import Mapper, MapSettings
 from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
+from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
@@ -87,7 +88,7 @@ def test_after_rejections_the_place_is_less_sure_and_is_found_again():
 
 def test_a_cloud_waits_for_the_match_of_its_time_and_goes_where_that_puts_it():
     mapper, _ = mapped([drifting(0)])
-    cloud = drifting(1)
+    cloud = TimedPoints.of_scan(drifting(1))
     assert mapper.take_cloud(cloud).waiting
     assert mapper.take_waiting() is None
     mapper.take_echoes(drifting(1))
@@ -98,14 +99,14 @@ def test_a_cloud_waits_for_the_match_of_its_time_and_goes_where_that_puts_it():
 
 def test_a_cloud_of_a_rejected_scan_stays_out_of_the_map():
     mapper, _ = mapped([drifting(0), drifting(1), unknown_place(2)])
-    update = mapper.take_cloud(drifting(2))
+    update = mapper.take_cloud(TimedPoints.of_scan(drifting(2)))
     assert update.unplaced > 0.8 * len(harbour())
     assert update.report.inserted < 0.2 * len(harbour())
 
 
 def test_without_matching_a_cloud_is_inserted_at_once():
     mapper = mapper_of(matching=False)
-    update = mapper.take_cloud(drifting(0))
+    update = mapper.take_cloud(TimedPoints.of_scan(drifting(0)))
     assert not update.waiting
     assert update.report.inserted == len(harbour())
 
@@ -120,7 +121,7 @@ def test_an_empty_scan_is_rejected_and_nothing_breaks():
 def test_clear_forgets_map_and_place():
     mapper, _ = mapped([drifting(0), drifting(1)])
     mapper.clear()
-    assert (len(mapper.matched), len(mapper.shown), mapper.belief, mapper.newest) == (0, 0, None, None)
+    assert (len(mapper.matched), mapper.block_count, mapper.belief) == (0, 0, None)
     np.testing.assert_array_equal(mapper.correction, np.zeros(3))
 
 

@@ -3,7 +3,13 @@
 import numpy as np
 from made_corridor import heard, path
 
-from mlsm_manager.localisation.sensor_model import SensorModel, at_beam_edge, rescaled, restamped, trusted
+from mlsm_manager.localisation.sensor_model import (
+    SensorModel,
+    at_beam_edge,
+    rescaled,
+    restamped,
+    without_doubtful_points,
+)
 from mlsm_manager.matching.problem.scan import Scan, Track
 
 
@@ -40,12 +46,12 @@ def test_the_edge_of_the_beam_makes_a_wall_straight():
     assert np.abs(straight.points[:, 0] - 10.0).mean() < 0.05
 
 
-def test_a_lone_echo_of_a_wide_beam_is_not_trusted():
+def test_a_lone_echo_of_a_wide_beam_is_doubtful():
     scan = wall_from_wide_beam(0.07)
     rows = np.vstack([scan.points, [[-30.0, 0.0, 0.0, 9.0]]])
     lone = Scan(rows, np.zeros(68), np.ones(68, dtype=bool), scan.track, 0.0)
     assert len(at_beam_edge(lone, 0.07)) == 68
-    assert trusted(lone, 0.07).points[:, 0].min() > 0.0
+    assert without_doubtful_points(lone, 0.07).points[:, 0].min() > 0.0
 
 
 def test_the_defaults_change_nothing():

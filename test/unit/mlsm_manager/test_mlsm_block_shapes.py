@@ -8,6 +8,7 @@ from made_blocks import blocks_of
 
 from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists
 from mlsm_manager.surface_map.blocks import BlockType
+from mlsm_manager.surface_map.changed_tiles import TILE_BITS
 
 BOTTOMS = st.floats(-50.0, 50.0)
 DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))
@@ -40,7 +41,7 @@ def test_boxes_reach_from_bottom_to_top_without_a_gap(intervals, resolution):
 def test_boxes_are_as_wide_as_a_cell_and_a_power_of_two_high(intervals):
     lists = box_lists(blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], 0.5))
     assert [boxes.size.tolist() for boxes in lists] == [[0.5, 0.5, 0.5 * 2.0**boxes.power] for boxes in lists]
-    assert len({boxes.power for boxes in lists}) == len(lists)
+    assert len({(boxes.tile, boxes.power) for boxes in lists}) == len(lists)
 
 
 @given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20))
@@ -74,6 +75,15 @@ def test_blocks_as_deep_as_a_cell_are_drawn_as_vertical():
     assert [boxes.type for boxes in box_lists(blocks_of([(0.0, 0.4999)]))] == [BlockType.HORIZONTAL]
 
 
-def test_a_map_of_metres_needs_few_lists():
+def test_a_tile_of_metres_needs_few_lists():
     depths = np.linspace(0.0, 60.0, 2000)
-    assert len(box_lists(blocks_of([(0.0, depth) for depth in depths]))) <= 11
+    lists = box_lists(blocks_of([(0.0, depth) for depth in depths]))
+    most = max(sum(boxes.tile == tile for boxes in lists) for tile in {boxes.tile for boxes in lists})
+    assert most <= 11
+
+
+def test_a_box_lies_in_its_tile_and_knows_its_block():
+    blocks = blocks_of([(0.0, 3.0)] * 50)
+    for boxes in box_lists(blocks):
+        np.testing.assert_array_equal(boxes.centers[:, :2], blocks.centers[boxes.owners])
+        assert {tuple(tile) for tile in (blocks.cells[boxes.owners] >> TILE_BITS).tolist()} == {boxes.tile}

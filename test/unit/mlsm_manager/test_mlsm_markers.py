@@ -13,6 +13,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
 from mlsm_manager.surface_map.block_shapes import box_lists
 from mlsm_manager.surface_map.blocks import BlockType
+from mlsm_manager.surface_map.changed_tiles import TILE_BITS
+from mlsm_manager.surface_map.export.colors import ColorBy, block_colors
 
 HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
 MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.9), (5.0, 5.01)]
@@ -28,11 +30,11 @@ def _read(message):
     return MarkerArray().deserialize(_bytes(message)).markers
 
 
-def _object_by_object(boxes):
+def _object_by_object(boxes, number):
     return Marker(
         header=HEADER,
         ns=boxes.type.name.lower(),
-        id=boxes.power + 64,
+        id=number,
         type=Marker.CUBE_LIST,
         action=Marker.ADD,
         pose=Pose(orientation=Quaternion(w=1.0)),
@@ -45,28 +47,30 @@ def _object_by_object(boxes):
 @pytest.mark.parametrize("intervals", [MIXED, MIXED[:1], MIXED * 200])
 def test_the_bytes_are_those_of_markers_built_point_by_point(intervals):
     blocks = blocks_of(intervals)
-    expected = MarkerArray(markers=[_object_by_object(boxes) for boxes in box_lists(blocks)])
-    assert _bytes(BlockMarkers().array(blocks, HEADER)) == _bytes(expected)
+    packed = BlockMarkers().whole(blocks, HEADER)
+    numbers = [marker.id for marker in _read(packed)]
+    expected = [_object_by_object(boxes, number) for boxes, number in zip(box_lists(blocks), numbers)]
+    assert _bytes(packed) == _bytes(MarkerArray(markers=expected))
 
 
 def test_a_subscriber_reads_every_box():
     blocks = blocks_of(MIXED)
-    points = [[p.x, p.y, p.z] for marker in _read(BlockMarkers().array(blocks, HEADER)) for p in marker.points]
+    points = [[p.x, p.y, p.z] for marker in _read(BlockMarkers().whole(blocks, HEADER)) for p in marker.points]
     assert points == np.concatenate([boxes.centers for boxes in box_lists(blocks)]).tolist()
 
 
 def test_an_empty_map_makes_no_markers():
-    assert _read(BlockMarkers().array(blocks_of([]), HEADER)) == []
+    assert _read(BlockMarkers().whole(blocks_of([]), HEADER)) == []
 
 
 def test_horizontal_and_vertical_blocks_differ_in_namespace_and_colour():
-    markers = {marker.ns: marker for marker in _read(BlockMarkers().array(blocks_of([(0, 0), (0, 0.5)]), HEADER))}
+    markers = {marker.ns: marker for marker in _read(BlockMarkers().whole(blocks_of([(0, 0), (0, 0.5)]), HEADER))}
     assert sorted(markers) == ["horizontal", "vertical"]
     assert markers["horizontal"].color != markers["vertical"].color
 
 
 def test_markers_can_be_seen():
-    for marker in _read(BlockMarkers().array(blocks_of(MIXED), HEADER)):
+    for marker in _read(BlockMarkers().whole(blocks_of(MIXED), HEADER)):
         assert marker.color.a == 1.0
         assert marker.pose.orientation == Quaternion(0.0, 0.0, 0.0, 1.0)
         assert min(marker.scale.x, marker.scale.y, marker.scale.z) > 0.0
@@ -75,25 +79,59 @@ def test_markers_can_be_seen():
 
 def test_a_class_of_boxes_that_vanished_is_deleted_once():
     markers = BlockMarkers()
-    (shown,) = _read(markers.array(blocks_of([(0.0, 0.1)]), HEADER))
-    actions = {(m.ns, m.id): m.action for m in _read(markers.array(blocks_of([(0.0, 4.0)]), HEADER))}
+    (shown,) = _read(markers.whole(blocks_of([(0.0, 0.1)]), HEADER))
+    actions = {(m.ns, m.id): m.action for m in _read(markers.whole(blocks_of([(0.0, 4.0)]), HEADER))}
     assert actions.pop((shown.ns, shown.id)) == Marker.DELETE
     assert list(actions.values()) == [Marker.ADD]
-    assert [m.action for m in _read(markers.array(blocks_of([(0.0, 4.0)]), HEADER))] == [Marker.ADD]
+    assert [m.action for m in _read(markers.whole(blocks_of([(0.0, 4.0)]), HEADER))] == [Marker.ADD]
 
 
 def test_an_emptied_map_deletes_all_that_was_shown():
     markers = BlockMarkers()
-    shown = {(m.ns, m.id) for m in _read(markers.array(blocks_of(MIXED), HEADER))}
-    left = _read(markers.array(blocks_of([]), HEADER))
+    shown = {(m.ns, m.id) for m in _read(markers.whole(blocks_of(MIXED), HEADER))}
+    left = _read(markers.whole(blocks_of([]), HEADER))
     assert {(m.ns, m.id) for m in left} == shown
     assert {m.action for m in left} == {Marker.DELETE}
 
 
 def test_no_two_markers_of_a_message_share_namespace_and_id():
-    names = [(m.ns, m.id) for m in _read(BlockMarkers().array(blocks_of(MIXED), HEADER))]
+    names = [(m.ns, m.id) for m in _read(BlockMarkers().whole(blocks_of(MIXED), HEADER))]
     assert len(set(names)) == len(names) > 3
 
 
 def test_surfaces_that_points_make_have_a_colour():
     assert set(COLORS) == {BlockType.HORIZONTAL, BlockType.VERTICAL}
+
+
+def test_blocks_are_coloured_one_by_one_when_asked():
+    blocks = blocks_of(MIXED)
+    read = _read(BlockMarkers(ColorBy.HEIGHT).whole(blocks, HEADER))
+    expected = block_colors(blocks, ColorBy.HEIGHT)
+    for marker, boxes in zip(read, box_lists(blocks)):
+        colors = [[color.r, color.g, color.b] for color in marker.colors]
+        np.testing.assert_allclose(colors, expected[boxes.owners], atol=1e-6)
+        assert {color.a for color in marker.colors} == {1.0}
+
+
+def test_a_changed_tile_is_sent_alone_and_keeps_its_ids():
+    markers, blocks = BlockMarkers(), blocks_of([(0.0, 0.1)] * 40)
+    before = {(m.points[0].x, m.ns): m.id for m in _read(markers.whole(blocks, HEADER))}
+    assert len(before) == 3
+    second = blocks.take((blocks.cells[:, 0] >> TILE_BITS) == 1)
+    (sent,) = _read(markers.changed(second, [(1, 0)], HEADER))
+    assert before[sent.points[0].x, sent.ns] == sent.id
+
+
+def test_a_tile_that_lost_its_blocks_is_deleted():
+    markers, blocks = BlockMarkers(), blocks_of([(0.0, 0.1)] * 40)
+    ids = {m.id for m in _read(markers.whole(blocks, HEADER))}
+    (deleted,) = _read(markers.changed(blocks_of([]), [(1, 0)], HEADER))
+    assert (deleted.action, deleted.id in ids) == (Marker.DELETE, True)
+    assert _read(markers.changed(blocks_of([]), [(1, 0)], HEADER)) == []
+
+
+def test_a_late_subscriber_gets_all_and_changes_nothing_for_the_others():
+    markers, blocks = BlockMarkers(), blocks_of([(0.0, 0.1)] * 40)
+    shown = {m.id for m in _read(markers.whole(blocks, HEADER))}
+    assert {m.id for m in _read(markers.again(blocks, HEADER))} == shown
+    assert {m.id for m in _read(markers.whole(blocks_of([]), HEADER))} == shown

@@ -8,7 +8,7 @@ from example_parameters import Color, ExampleParameters
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node_support.parameters import ParameterError
+from node_support.parameters import ParameterError, describe, with_defaults
 
 RADIUS = "must be a number from 0 to 10 m"
 COUNT = "must be an integer from 1 to 1000"
@@ -113,3 +113,24 @@ def test_plain_values_make_the_same_set_again(radius, count, fast, frame, color)
 def test_tunable_fields_leave_out_what_only_the_start_can_set():
     names = [field.name for field in ExampleParameters.tunable_fields()]
     assert names == ["radius", "count", "fast", "color", "inner"]
+
+
+@dataclasses.dataclass(frozen=True)
+@with_defaults(radius=2.0, color="deep+blue")
+class WiderParameters(ExampleParameters):
+    """The same parameters with two other defaults."""
+
+
+def test_a_derived_set_has_other_defaults_and_the_same_parameters():
+    assert WiderParameters() == WiderParameters(radius=2.0, color=Color.DEEP_BLUE)
+    fields, derived = dataclasses.fields(ExampleParameters), dataclasses.fields(WiderParameters)
+    assert [(one.name, one.type, describe(one)) for one in derived] == [
+        (one.name, one.type, describe(one)) for one in fields
+    ]
+    assert ExampleParameters().radius == 1.5
+
+
+@pytest.mark.parametrize("defaults", [{"radius": 10.1}, {"no_such": 1}])
+def test_a_default_that_is_not_allowed_is_refused(defaults):
+    with pytest.raises(ParameterError, match=next(iter(defaults))):
+        with_defaults(**defaults)(type("Derived", (ExampleParameters,), {}))

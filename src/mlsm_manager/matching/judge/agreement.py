@@ -11,9 +11,13 @@ from typing import Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+# About a beam's width each.
 _DIRECTIONS = 128
+# The farthest tenth of the echoes is chance: what lies beyond the others need not be heard.
 _REACH_QUANTILE = 0.9
+# m beyond the farthest echo that the map counts as known.
 _BEYOND = 2.0
+# m, and rad as seen from the sonar (a beam's width): an echo nearer to a block than both is of that block.
 _NEAR_DISTANCE = 1.0
 _NEAR_ANGLE = 0.04
 
@@ -48,5 +52,6 @@ def _beside(values: np.ndarray, merged: np.ufunc) -> np.ndarray:
 
 def _polar(offsets: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return the number (n,) of the direction and the distance (n,) of offsets (n, 2)."""
-    turns = np.arctan2(offsets[:, 1], offsets[:, 0]) / (2.0 * np.pi) + 0.5
-    return (turns * _DIRECTIONS).astype(np.int64) % _DIRECTIONS, np.hypot(offsets[:, 0], offsets[:, 1])
+    x, y = np.array(offsets.T, order="C")
+    turns = np.arctan2(y, x) / (2.0 * np.pi) + 0.5
+    return (turns * _DIRECTIONS).astype(np.int64) % _DIRECTIONS, np.hypot(x, y)

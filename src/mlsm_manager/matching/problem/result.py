@@ -1,4 +1,4 @@
-"""What a matcher is told beforehand and what it answers."""
+"""What a matcher takes besides scan and map, and what it returns."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -6,7 +6,7 @@ from enum import Enum
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
-from node_support.geometry.planar import composed, inverse, wrapped
+from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 
 class MatchStatus(Enum):
@@ -21,7 +21,7 @@ class MatchStatus(Enum):
 
 @dataclass(frozen=True)
 class Prior:
-    """What the odometry and earlier matches say before a scan is matched; its covariance must be honest.
+    """What odometry and earlier matches tell before a scan is matched; its covariance must be true.
 
     correction: (3,) planar T_map_odom at the scan's reference time; the pose it gives is T_map_odom * T_odom_base.
     rate: (3,) error of the odometry's velocity during the scan, m/s, m/s, rad/s in the vehicle's frame: the true
@@ -29,7 +29,7 @@ class Prior:
     motion: (2,) relative error of the distances that the odometry reports, and error of their direction [rad]:
         the vehicle went 1 + motion[0] times as far, turned by motion[1] counter-clockwise.
     covariance: (8, 8) of [pose, rate, motion]; pose: x y [m] in map, yaw [rad] of base_link at the reference time.
-        A state without variance is held.
+        A state without variance is fixed.
     """
 
     correction: np.ndarray
@@ -52,7 +52,7 @@ class MatchResult:
     rate, motion, state_covariance: as in `Prior`, after the match; the covariance is (8, 8) of [pose, rate, motion].
     error: mean distance of the used points from the map, m. seconds: time the match took.
     beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
-    reason: one line that tells why a match was not accepted, with the value that decided; empty when it was.
+    reason: one line that says why a match was not accepted, with the value that decided; empty when it was accepted.
     """
 
     status: MatchStatus
@@ -80,3 +80,9 @@ class MatchResult:
         correction = composed(self.pose, inverse(scan.reference_pose))
         correction[2] = wrapped(correction[2])
         return correction
+
+
+def corrected_points(scan: Scan, result: MatchResult) -> np.ndarray:
+    """Return (n, 4) points in map: each taken from the odometry's pose to the matched pose at its own beam's time."""
+    path = np.stack([np.interp(scan.times, result.beam_times, column) for column in result.beam_poses.T], axis=-1)
+    return transformed(composed(path, inverse(scan.track.at(scan.times))), scan.points)

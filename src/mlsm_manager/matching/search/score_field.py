@@ -7,6 +7,7 @@ from scipy.ndimage import gaussian_filter
 
 from mlsm_manager.surface_map.blocks import Blocks
 
+# Times the field's width: what is as dense over four widths is clutter.
 _BROAD = 4.0
 
 
@@ -60,6 +61,15 @@ class ScoreField:
         x, y = index[:, 0], index[:, 1]
         near = (x >= reach) & (x < columns - reach) & (y >= reach) & (y < rows - reach)
         size = 2 * reach + 1
-        windows = np.lib.stride_tricks.sliding_window_view(self.values, (size, size))
-        patches = windows[y[near] - reach, x[near] - reach]
+        patches = _windows(self.values, size)[y[near] - reach, x[near] - reach]
         return np.tensordot(weights[near].astype(np.float32), patches, axes=1)
+
+
+def _windows(values: np.ndarray, size: int) -> np.ndarray:
+    """Return a read-only view (rows - size + 1, columns - size + 1, size, size) of all square windows of `values`.
+
+    numpy has this as sliding_window_view from 1.20 on.
+    """
+    rows, columns = values.shape
+    shape = (max(rows - size + 1, 0), max(columns - size + 1, 0), size, size)
+    return np.lib.stride_tricks.as_strided(values, shape, values.strides * 2, writeable=False)

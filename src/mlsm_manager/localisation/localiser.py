@@ -1,0 +1,242 @@
+"""Scans, clouds and odometry in; a map and T_map_odom at any time out: the same for a live vehicle and a recording."""
+
+import threading
+import time as wall
+from dataclasses import dataclass
+from enum import Enum
+from typing import Callable, List, Optional, Protocol
+
+import numpy as np
+
+from mlsm_manager.localisation.live_correction import LiveCorrection
+from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.relocalisation import relocalised
+from mlsm_manager.localisation.sensor_model import without_doubtful_points
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.matchers.matcher_table import Matcher
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
+from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.surface_map.blocks import Blocks
+
+# s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
+_JUMP_BACK = 30.0
+# s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over.
+_LONGEST_SILENCE = 60.0
+
+
+class MapInput(Enum):
+    """Which points make the map that is shown and saved."""
+
+    CLEANED = "CLEANED"
+    MATCHED = "MATCHED"
+
+
+class ScanMapper(Protocol):
+    """Finds the poses of scans and draws the map. `Mapper` does it scan by scan, with a matcher.
+
+    A solver over many scans can take its place: it may change the poses of earlier scans with each one that it takes,
+    as long as `belief`, `blocks` and the places of clouds are what it knows at the time they are asked for.
+    """
+
+    matching: bool
+    matcher: Matcher
+    errors: OdometryErrors
+    belief: Optional[Belief]
+    correction: np.ndarray
+
+    @property
+    def blocks(self) -> Blocks:
+        """The map that is shown and saved."""
+
+    @property
+    def block_count(self) -> int:
+        """Number of those blocks, without a copy of them."""
+
+    @property
+    def target(self) -> Blocks:
+        """The map in which a lost vehicle is searched."""
+
+    def take_echoes(self, scan: Scan) -> ScanUpdate:
+        """Find the pose of a scan, and keep the scan where that holds."""
+
+    def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
+        """Take a match that was made elsewhere as the pose of a scan."""
+
+    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
+        """Insert a cloud, or let it wait until the pose of its time is known."""
+
+    def take_placed(self, points: np.ndarray) -> CloudUpdate:
+        """Insert points (n, 4) that are in map already."""
+
+    def take_waiting(self) -> Optional[CloudUpdate]:
+        """Insert the next cloud that waited; None when none can be inserted now."""
+
+    def follow(self, track: Track, time: float) -> None:
+        """Bring the belief to a later `time` by the odometry alone."""
+
+    def forget_place(self) -> None:
+        """Keep the map, forget the pose."""
+
+    def clear(self) -> None:
+        """Forget map and pose."""
+
+
+@dataclass(frozen=True)
+class LocaliserSettings:
+    """matcher: for scans near their expected place. anywhere: for a vehicle that is lost.
+
+    edge_half_width: rad, see BeamEdge. blend_time: s, within which the correction goes over to a new one.
+    """
+
+    matcher: Matcher
+    anywhere: Matcher
+    edge_half_width: float
+    blend_time: float
+    map_input: MapInput
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What was done with a scan, and with the clouds that could be inserted after it."""
+
+    scan: ScanUpdate
+    clouds: List[CloudUpdate]
+
+
+class Localiser:
+    """Safe to use from several threads: a correction can be asked for while a scan is being matched."""
+
+    def __init__(
+        self, mapper: ScanMapper, settings: LocaliserSettings, clock: Callable[[], float] = wall.monotonic
+    ) -> None:
+        """`clock`: s, tells how long ago the newest scan came where the odometry has no stamps."""
+        self.mapper = mapper
+        self._clock = clock
+        self._lock = threading.RLock()
+        self._live = LiveCorrection(settings.blend_time)
+        self._newest: Optional[Scan] = None
+        self._newest_came = 0.0
+        self.use(settings)
+
+    def use(self, settings: LocaliserSettings) -> None:
+        """Work with other settings from the next scan on; the map stays."""
+        with self._lock:
+            self._settings = settings
+            self.mapper.matcher = settings.matcher
+            self._live.blend_time = settings.blend_time
+
+    @property
+    def matching(self) -> bool:
+        """Whether scans are matched with the map, or placed by the odometry."""
+        return self.mapper.matching
+
+    def match(self, matching: bool) -> bool:
+        """Turn matching on or off; return whether that is a change."""
+        with self._lock:
+            changed = self.mapper.matching != matching
+            self.mapper.matching = matching
+        return changed
+
+    @property
+    def blocks(self) -> Blocks:
+        """The map that is shown and saved, as it is now."""
+        with self._lock:
+            return self.mapper.blocks
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks of the map."""
+        return self.mapper.block_count
+
+    @property
+    def believed_until(self) -> Optional[float]:
+        """Time [s] of the newest belief; None before the first scan."""
+        belief = self.mapper.belief
+        return None if belief is None else belief.time
+
+    def take_scan(self, scan: Scan) -> Taken:
+        """Match a scan and put it, and the clouds that waited for it, into the map."""
+        with self._lock:
+            self.notice_time(scan.reference_time)
+            scan = without_doubtful_points(scan, self._settings.edge_half_width)
+            self._newest, self._newest_came = scan, self._clock()
+            update = self.mapper.take_echoes(scan)
+            self._live.believe(update.belief)
+            clouds = []
+            if self._settings.map_input is MapInput.MATCHED:
+                clouds.append(self.mapper.take_cloud(TimedPoints.of_scan(scan)))
+            clouds += iter(self.mapper.take_waiting, None)
+        return Taken(update, clouds)
+
+    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
+        """Put a cloud into the map, or let it wait for the scan of its time."""
+        with self._lock:
+            self.notice_time(cloud.end)
+            return self.mapper.take_cloud(cloud)
+
+    def take_placed(self, points: np.ndarray) -> CloudUpdate:
+        """Put points (n, 4) that are in map already into the map."""
+        with self._lock:
+            return self.mapper.take_placed(points)
+
+    def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        """Return T_map_odom (3,) to be shown at `time` [s], when the odometry says T_odom_base (3,)."""
+        return self._live.sample(time, odometry)
+
+    def standing_correction(self, odometry: np.ndarray) -> np.ndarray:
+        """Return T_map_odom (3,) to be shown now by an odometry without stamps, as a static transform is.
+
+        Such an odometry says nothing of the time between scans: a new correction is blended in and then holds.
+        """
+        newest = self._newest
+        if newest is None:
+            return self.mapper.correction
+        blended = min(max(self._clock() - self._newest_came, 0.0), self._settings.blend_time)
+        return self._live.sample(newest.reference_time + blended, odometry)
+
+    def notice_time(self, time: float) -> float:
+        """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did."""
+        until = self.believed_until
+        if until is None or time >= until - _JUMP_BACK:
+            return 0.0
+        with self._lock:
+            self.mapper.forget_place()
+            self._live.clear()
+            self._newest = None
+        return until - time
+
+    def silent_since(self, time: float) -> Optional[float]:
+        """Return the time [s] of the belief when it is so old at `time` that `follow` must be called, else None."""
+        until = self.believed_until
+        return until if until is not None and time - until > _LONGEST_SILENCE else None
+
+    def follow(self, track: Track, time: float) -> None:
+        """Bring the belief to `time` [s] by the odometry, which `track` knows from `silent_since` on."""
+        with self._lock:
+            self.mapper.follow(track, time)
+
+    def relocalise(self) -> Optional[ScanUpdate]:
+        """Search the whole map for the newest scan, and take the place that is found as the vehicle's.
+
+        Return None when there is no scan yet.
+        """
+        with self._lock:
+            scan = self._newest
+            if scan is None:
+                return None
+            result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
+            if not result.accepted:
+                return ScanUpdate(scan, result, False, self.mapper.belief)
+            update = self.mapper.adopt(scan, result)
+            self._live.believe(update.belief)
+        return update
+
+    def clear(self) -> int:
+        """Forget map and place; return how many blocks the map had."""
+        with self._lock:
+            count = self.mapper.block_count
+            self.mapper.clear()
+            self._live.clear()
+            self._newest = None
+        return count

@@ -1,0 +1,32 @@
+"""Points with the times of their beams: all that the map needs of a cloud."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan
+
+
+@dataclass(frozen=True)
+class TimedPoints:
+    """points: (n, 4) float64, x y z [m] in odom and echo strength. times: (n,) s. end: s, stamp of the newest beam."""
+
+    points: np.ndarray
+    times: np.ndarray
+    end: float
+
+    @classmethod
+    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "TimedPoints":
+        """Build from a cloud's points (n, 4) and signed time stamps (n,); points that are not finite are left out."""
+        points = np.asarray(points, dtype=np.float64)
+        stamps = np.asarray(time_stamps, dtype=np.float64)
+        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
+        return cls(points[valid], np.abs(stamps[valid]), end)
+
+    @classmethod
+    def of_scan(cls, scan: Scan) -> "TimedPoints":
+        """Return the points of a scan."""
+        return cls(scan.points, scan.times, scan.reference_time)
+
+    def __len__(self) -> int:
+        return len(self.points)

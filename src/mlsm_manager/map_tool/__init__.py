@@ -1,0 +1,1 @@
+"""map_tool: looks at, exports, crops, merges and compares maps."""

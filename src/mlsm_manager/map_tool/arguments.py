@@ -1,0 +1,58 @@
+"""Command line of map_tool."""
+
+import argparse
+from pathlib import Path
+from typing import List
+
+from mlsm_manager.surface_map.export.colors import ColorBy
+from mlsm_manager.surface_map.export.formats import ENDINGS
+
+_MAPS = "a map (.mlsm, or a .ply of this package)"
+
+
+def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
+    """Return `command` and what it needs; exits on a bad command line."""
+    parser = argparse.ArgumentParser("map_tool", description="Look at, export, crop, merge and compare maps.")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands.required = True
+    info = commands.add_parser("info", help="say what maps hold")
+    info.add_argument("maps", type=Path, nargs="+", metavar="FILE", help=_MAPS)
+    view = commands.add_parser("view", help="show a map in a window; without a screen write a picture")
+    _add_map(view)
+    _add_colors(view)
+    export = commands.add_parser("export", help="write a map in another format")
+    _add_map(export)
+    export.add_argument("out", type=Path, metavar="OUT", help=f"file ending with one of {' '.join(ENDINGS)}")
+    export.add_argument(
+        "--slice", type=float, nargs=2, default=(float("-inf"), float("inf")), metavar=("LOW", "HIGH"),
+        help="heights between which a .pgm shows what is occupied [m] (default: all)",
+    )  # fmt: skip
+    _add_colors(export)
+    crop = commands.add_parser("crop", help="keep what lies in a box")
+    _add_map(crop)
+    crop.add_argument("out", type=Path, metavar="OUT")
+    crop.add_argument("--low", type=float, nargs="+", required=True, metavar="X Y [Z]", help="its lower corner [m]")
+    crop.add_argument("--high", type=float, nargs="+", required=True, metavar="X Y [Z]", help="its upper corner [m]")
+    merge = commands.add_parser("merge", help="make one map of two")
+    _add_two_maps(merge)
+    merge.add_argument("out", type=Path, metavar="OUT")
+    merge.add_argument(
+        "--transform", type=float, nargs=4, default=(0.0, 0.0, 0.0, 0.0), metavar=("X", "Y", "Z", "YAW"),
+        help="where the second map's origin lies in the first [m, deg] (default: at its origin)",
+    )  # fmt: skip
+    _add_two_maps(commands.add_parser("diff", help="say what only one of two maps has"))
+    return parser.parse_args(arguments)
+
+
+def _add_map(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("map", type=Path, metavar="MAP", help=_MAPS)
+
+
+def _add_two_maps(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("first", type=Path, metavar="FIRST", help=_MAPS)
+    parser.add_argument("second", type=Path, metavar="SECOND", help=_MAPS)
+
+
+def _add_colors(parser: argparse.ArgumentParser) -> None:
+    names = [by.value.lower() for by in ColorBy]
+    parser.add_argument("--color", choices=names, default="height", help="what blocks are coloured by")

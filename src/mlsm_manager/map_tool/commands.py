@@ -1,0 +1,114 @@
+"""What the commands of map_tool do."""
+
+import sys
+import time
+from argparse import Namespace
+from pathlib import Path
+from typing import Callable, Dict, List
+
+import numpy as np
+
+from mlsm_manager.map_tool.arguments import map_tool_arguments
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.colors import ColorBy
+from mlsm_manager.surface_map.export.formats import ExportOptions, export
+from mlsm_manager.surface_map.export.window import has_screen, show
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map
+from mlsm_manager.surface_map.operations.compare import cropped, difference
+from mlsm_manager.surface_map.operations.merge import merged
+from mlsm_manager.surface_map.operations.move import LevelTransform
+from mlsm_manager.surface_map.storage import read_ply
+
+
+def run_map_tool() -> None:
+    """Run map_tool with the command line; ends with one line and status 1 when something is wrong with the input."""
+    options = map_tool_arguments(sys.argv[1:])
+    try:
+        lines = _COMMANDS[options.command](options)
+    except OSError as error:
+        sys.exit(f"map_tool: {error.filename or 'output'}: {error.strerror or error}")
+    except ValueError as error:
+        sys.exit(f"map_tool: {error}")
+    except KeyboardInterrupt:
+        sys.exit("map_tool: interrupted")
+    print("\n".join(lines))
+
+
+def read_any(path: Path) -> StoredMap:
+    """Return the map in a .mlsm or in a .ply of this package. Raises ValueError, of one line, and OSError."""
+    return StoredMap("map", {Layer.SHOWN: read_ply(path)}) if path.suffix == ".ply" else read_map(path)
+
+
+def info_lines(path: Path, stored: StoredMap) -> List[str]:
+    """Return in words what a map holds."""
+    made = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(stored.made)) if stored.made else "at a time not known"
+    lines = [f"{path}: frame {stored.frame}, made {made}"]
+    lines += [f"  {layer.value}: {_layer_line(blocks)}" for layer, blocks in stored.layers.items()]
+    lines += [f"  calibration: {name} = {value}" for name, value in sorted(stored.calibration.items())]
+    lines += [f"  with {name} {'x'.join(map(str, array.shape))}" for name, array in sorted(stored.arrays.items())]
+    return lines
+
+
+def _layer_line(blocks: Blocks) -> str:
+    if not len(blocks):
+        return f"no blocks of {blocks.resolution:g} m"
+    low = [*(blocks.cells.min(axis=0) * blocks.resolution), blocks.bottom.min()]
+    high = [*((blocks.cells.max(axis=0) + 1) * blocks.resolution), blocks.height.max()]
+    box = ", ".join(f"{axis} {start:.1f} to {end:.1f} m" for axis, start, end in zip("xyz", low, high))
+    return f"{len(blocks)} blocks of {blocks.resolution:g} m, {blocks.count.sum()} points, {box}"
+
+
+def _info(options: Namespace) -> List[str]:
+    return [line for path in options.maps for line in info_lines(path, read_any(path))]
+
+
+def _view(options: Namespace) -> List[str]:
+    stored, color_by = read_any(options.map), ColorBy(options.color.upper())
+    if has_screen():
+        show(stored.shown, options.map.name, color_by)
+        return []
+    picture = Path(f"{options.map.stem}.png")
+    export(stored, picture, ExportOptions(color_by=color_by))
+    return [f"no screen; {picture} written"]
+
+
+def _export(options: Namespace) -> List[str]:
+    low, high = options.slice
+    export(read_any(options.map), options.out, ExportOptions(low, high, ColorBy(options.color.upper())))
+    return [f"{options.out} written"]
+
+
+def _crop(options: Namespace) -> List[str]:
+    if not (len(options.low) == len(options.high) in (2, 3)):
+        raise ValueError(f"--low {options.low} --high {options.high}: must both be X Y or both X Y Z")
+    stored = cropped(read_any(options.map), np.array(options.low), np.array(options.high))
+    export(stored, options.out, ExportOptions())
+    return [f"{options.out}: {len(stored)} blocks"]
+
+
+def _merge(options: Namespace) -> List[str]:
+    x, y, z, yaw = options.transform
+    transform = LevelTransform(x, y, z, np.radians(yaw))
+    first, second = read_any(options.first), read_any(options.second)
+    stored = merged(first, second, transform)
+    export(stored, options.out, ExportOptions())
+    exact = "exactly" if transform.keeps_cells(stored.shown.resolution) else "cells do not align, so to within a cell"
+    return [f"{options.out}: {len(stored)} blocks of {len(first)} and {len(second)}, {exact}"]
+
+
+def _diff(options: Namespace) -> List[str]:
+    result = difference(read_any(options.first).shown, read_any(options.second).shown)
+    lines = [
+        f"{len(result.both)} blocks of {options.first.name} are in {options.second.name} too",
+        f"{len(result.only_first)} are in {options.first.name} only",
+        f"{len(result.only_second)} are in {options.second.name} only",
+    ]
+    if len(result.shift):
+        middle, most = np.median(result.shift), np.abs(result.shift).max()
+        lines.append(f"where both are, the second is higher by {middle:.3f} m (median), {most:.3f} m at most")
+    return lines
+
+
+_COMMANDS: Dict[str, Callable[[Namespace], List[str]]] = {
+    "info": _info, "view": _view, "export": _export, "crop": _crop, "merge": _merge, "diff": _diff
+}  # fmt: skip

@@ -1,0 +1,129 @@
+"""Where a map keeps its blocks: one float64 row each, found through the first block of their cell and a chain."""
+
+from typing import Tuple
+
+import numpy as np
+
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, MOST_CROSSINGS, ROW_WIDTH, SQUARES, TOP, Blocks
+from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
+from mlsm_manager.surface_map.linkage import Intervals
+
+_MIN_ROWS = 1024
+"""Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
+
+
+class BlockStore:
+    """Rows, the chain of each cell and the rows that are free. All access is by whole arrays."""
+
+    def __init__(self, expected_blocks: int) -> None:
+        self._rows = np.empty((max(expected_blocks, _MIN_ROWS), ROW_WIDTH))
+        self._next = np.empty(len(self._rows), dtype=np.int32)
+        self._crossed = np.empty(len(self._rows), dtype=np.uint16)
+        self._index = CellIndex(expected_blocks)
+        self._used = 0
+        self._free = np.empty(0, dtype=np.int64)
+
+    def __len__(self) -> int:
+        return self._used - len(self._free)
+
+    @property
+    def nbytes(self) -> int:
+        """Memory in use, bytes; rows beyond those are reserved but never touched, so that they cost nothing yet."""
+        per_block = self._rows.itemsize * ROW_WIDTH + self._next.itemsize + self._crossed.itemsize
+        return self._used * per_block + self._index.nbytes
+
+    @property
+    def rows_in_use(self) -> np.ndarray:
+        """(n,) numbers of all rows that hold a block, increasing."""
+        return np.flatnonzero(self._rows[: self._used, COUNT])
+
+    def blocks(self, rows: np.ndarray, resolution: float) -> Blocks:
+        """Return a copy of the blocks in `rows` (n,)."""
+        return Blocks(self._rows[rows], resolution, self._crossed[rows])
+
+    def slots(self, cells: np.ndarray) -> np.ndarray:
+        """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
+        return self._index.slots(cells)
+
+    def stored(self, cells: np.ndarray, slots: np.ndarray) -> Intervals:
+        """Return all blocks of cells with keys `cells` (n,) at `slots` (n,)."""
+        return self._intervals(*self._followed(cells, self._index.heads[slots]))
+
+    def chains(self, slots: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return views of all rows and of the row that follows each in its cell, and the first rows of cells (n,)."""
+        return self._rows, self._next, self._index.heads[slots]
+
+    def find(self, cells: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return row numbers (m,) of all blocks of cells with keys `cells` (n,), and whose they are, (m,) indices."""
+        owners, rows = self._followed(np.arange(len(cells)), self._index.find(cells))
+        return rows, owners
+
+    def release(self, rows: np.ndarray) -> None:
+        """Give back rows (n,); the chain must be told by `chain`."""
+        self._rows[rows, COUNT] = 0.0
+        self._free = np.concatenate([self._free, rows])
+
+    def take(self, number: int) -> np.ndarray:
+        """Return the numbers (number,) of rows that are free now, growing where none are."""
+        reused, self._free = self._free[:number], self._free[number:]
+        first, self._used = self._used, self._used + number - len(reused)
+        if self._used > len(self._rows):
+            capacity = max(2 * len(self._rows), self._used)
+            self._rows = _grown(self._rows, first, capacity)
+            self._next = _grown(self._next, first, capacity)
+            self._crossed = _grown(self._crossed, first, capacity)
+        return np.concatenate([reused, np.arange(first, self._used)])
+
+    def write(self, rows: np.ndarray, intervals: Intervals) -> None:
+        """Write intervals (n) into `rows` (n,)."""
+        data = np.empty((len(rows), ROW_WIDTH))
+        data[:, MEAN] = intervals.mean
+        data[:, SQUARES] = intervals.squares
+        data[:, COUNT] = intervals.count
+        data[:, BOTTOM] = intervals.bottom
+        data[:, TOP] = intervals.top
+        self.write_rows(rows, data, intervals.crossed)
+
+    def write_rows(self, rows: np.ndarray, data: np.ndarray, crossed: np.ndarray) -> None:
+        """Write data (n, ROW_WIDTH) and crossings (n,), or one number for all, into `rows` (n,)."""
+        self._rows[rows] = data
+        self._crossed[rows] = crossed
+
+    def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
+        """Count `beams` (n,) more crossings of the blocks at `rows` (n,), none twice."""
+        self._crossed[rows] = np.minimum(self._crossed[rows] + beams, MOST_CROSSINGS)
+
+    def chain(self, rows: np.ndarray, cell: np.ndarray, slots: np.ndarray) -> None:
+        """Make `rows` (n,) of cells with keys `cell` (n,), grouped, all that the cells at `slots` hold."""
+        same_cell = np.append(cell[1:] == cell[:-1], False)
+        self._next[rows] = np.where(same_cell, np.append(rows[1:], NO_BLOCK), NO_BLOCK)
+        first = np.append(True, ~same_cell[:-1])
+        self._index.heads[slots] = rows[first]
+
+    def empty(self, slots: np.ndarray) -> None:
+        """Let the cells at `slots` (n,) hold nothing."""
+        self._index.heads[slots] = NO_BLOCK
+
+    def _followed(self, owners: np.ndarray, heads: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return owners and row numbers of all blocks that chains from `heads` (n,) lead to."""
+        found_owners, found_rows = [owners[:0]], [np.empty(0, dtype=np.int64)]
+        row = heads.astype(np.int64)
+        while True:
+            present = row != NO_BLOCK
+            row, owners = row[present], owners[present]
+            if not row.size:
+                return np.concatenate(found_owners), np.concatenate(found_rows)
+            found_rows.append(row)
+            found_owners.append(owners)
+            row = self._next[row].astype(np.int64)
+
+    def _intervals(self, cells: np.ndarray, rows: np.ndarray) -> Intervals:
+        data = self._rows[rows]
+        mean, squares = data[:, MEAN], data[:, SQUARES]
+        return Intervals(cells, data[:, BOTTOM], data[:, TOP], data[:, COUNT], mean, squares, rows, self._crossed[rows])
+
+
+def _grown(array: np.ndarray, used: int, capacity: int) -> np.ndarray:
+    result = np.empty((capacity, *array.shape[1:]), dtype=array.dtype)
+    result[:used] = array[:used]
+    return result

@@ -1,0 +1,60 @@
+"""The one folder in which maps lie, each under its name; what is replaced is kept under a numbered name."""
+
+import os
+from itertools import count
+from pathlib import Path
+from typing import Optional
+
+from mlsm_manager.surface_map.files.errors import MapFileError
+from mlsm_manager.surface_map.files.map_file import ENDING, StoredMap, read_map, write_map
+
+
+class MapFolder:
+    """Saves and loads maps by name; nothing is written or read outside of the folder."""
+
+    def __init__(self, folder: str) -> None:
+        """`folder`: a path in which ~ stands for the home; it is made when the first map is saved."""
+        self.folder = Path(folder).expanduser()
+
+    def path(self, name: str) -> Path:
+        """Return where the map `name` lies. Raises MapFileError for a name that would leave the folder."""
+        if not name or name.startswith(".") or Path(name).name != name or "\0" in name:
+            raise MapFileError(f"name {name!r}: must be a plain file name without a path and not start with a dot")
+        path = self.folder / (name if name.endswith(ENDING) else f"{name}{ENDING}")
+        if path.is_symlink() and path.resolve().parent != self.folder.resolve():
+            raise MapFileError(f"{path}: leads to {path.resolve()}, which is not in {self.folder}")
+        return path
+
+    def save(self, name: str, stored: StoredMap, overwrite: bool = False) -> Path:
+        """Write the map and return its path; a map of that name is kept under a numbered one unless `overwrite`.
+
+        Raises MapFileError for a bad name and for an empty map where there is one already, and OSError.
+        """
+        path = self.path(name)
+        if path.exists():
+            if not len(stored):
+                raise MapFileError(f"{path}: not replaced, the map has no blocks")
+            if not overwrite:
+                _kept(path)
+        write_map(path, stored)
+        return path
+
+    def load(self, name: str) -> StoredMap:
+        """Return the map of that name. Raises MapFileError, of one line, where there is none or it is damaged."""
+        path = self.path(name)
+        try:
+            return read_map(path)
+        except OSError as error:
+            raise MapFileError(f"{path}: {error.strerror or error}") from None
+
+
+def _kept(path: Path) -> Optional[Path]:
+    """Give the file a second name, the first that is free of NAME.1.mlsm, NAME.2.mlsm and so on, and return it."""
+    for number in count(1):
+        kept = path.with_name(f"{path.name[: -len(ENDING)]}.{number}{ENDING}")
+        try:
+            os.link(str(path), str(kept))
+        except FileExistsError:
+            continue
+        return kept
+    return None

@@ -1,0 +1,135 @@
+"""Carves free space out of what is unknown, and takes blocks away that beams go through.
+
+What a beam says. Its first echo says that nothing nearer, in the whole fan, echoes strongly enough to be heard.
+Sideways the fan is narrow (2.5 deg) and says where free space is. In height it is wide (22 deg: 8 m at 20 m), so that
+"free" is a statement about the plane in which the vehicle moves and not about what lies above or below it. A crossed
+cell is therefore noted free at the height of the beam's axis only, while a block speaks against a beam, and the beam
+against the block, when it lies in the inner part of the fan, where echoes are loud.
+
+What is kept. Of each block how many points fell into it and how many beams crossed it since the last of them did.
+Counts and not log-odds: they do not depend on the order of beams within a scan, need no limits to stay able to change,
+and add up when maps are merged.
+"""
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cells_of
+from mlsm_manager.surface_map.cell_index import cell_keys
+from mlsm_manager.surface_map.free_space.beam_paths import BeamPaths, FirstEchoes, beam_paths
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.parameters import ParameterSet, parameter
+
+_MOST_POINTS = 50
+"""More points make a block no surer: a ship that lay there for an hour has left once it is not heard any more."""
+_ENOUGH = 5
+"""So many crossings make a cell as free as it gets: OctoMap's cells too reach their limit after five misses."""
+
+
+@dataclass(frozen=True)
+class CarvingParameters(ParameterSet):
+    """What crossing beams say."""
+
+    carve: bool = parameter(True, "mark space that beams crossed as free, and take blocks away that beams go through")
+    fan_core: float = parameter(
+        0.19, "vertical angle of the inner part of the fan, in which a beam surely hears what is there", unit="rad",
+        low=0.0, high=3.0,
+    )  # fmt: skip
+    crossings_least: int = parameter(10, "so many beams in a row must cross a block before it goes", low=1, high=10000)
+    crossings_per_point: float = parameter(
+        2.0, f"and so many more for each point that fell into it, up to {_MOST_POINTS}", low=0.0, high=1000.0
+    )
+
+
+@dataclass(frozen=True)
+class CarveReport:
+    """free: cells that a scan crossed. crossed: blocks that its beams went through. removed: blocks that went."""
+
+    free: int
+    crossed: int
+    removed: int
+
+
+class Carver:
+    """Applies the beams of a scan to the map of what is occupied and to that of what is free.
+
+    The cost depends on the cells that the scan's beams cross and not on the map.
+    """
+
+    def __init__(self, parameters: CarvingParameters, beam_width: float) -> None:
+        """`beam_width`: horizontal, rad."""
+        self._parameters = parameters
+        self._beam_width = beam_width
+
+    def carve(
+        self, occupied: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray
+    ) -> CarveReport:
+        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side.
+
+        A beam says nothing about what lies behind the first block in its way, even where its echo came from farther:
+        either that block or that echo is wrong. That block counts a crossing, unless the scan itself hit its cell.
+        """
+        paths = beam_paths(beams, self._beam_width, occupied.resolution)
+        hit = np.isin(cell_keys(paths.cells), cell_keys(cells_of(points, occupied.resolution)))
+        blocks, rows, owners = occupied.find(paths.cells)
+        pair, block = self._meetings(paths, blocks, owners)
+        first = np.full(len(beams.origins), np.inf)
+        np.minimum.at(first, paths.beam[pair], paths.distance[pair])
+        crossing = (paths.distance[pair] == first[paths.beam[pair]]) & ~hit[paths.cell[pair]]
+        crossed, removed = self._charge(occupied, blocks, rows, block[crossing])
+        before = (paths.distance < first[paths.beam]) & ~hit[paths.cell]
+        noted = _free_blocks(paths.take(before), occupied.resolution)
+        free.insert_blocks(noted.take(~_known(noted, free)))
+        return CarveReport(len(noted), crossed, removed)
+
+    def _meetings(self, paths: BeamPaths, blocks: Blocks, owners: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return pairs (k,) of `paths` and blocks (k,) that lie in the way of their beams."""
+        sizes = np.diff(np.append(paths.starts, len(paths.cell)))
+        number = sizes[owners]
+        block = np.repeat(np.arange(len(owners)), number)
+        rank = np.arange(len(block)) - np.repeat(np.cumsum(number) - number, number)
+        pair = paths.starts[owners][block] + rank
+        half = np.maximum(paths.distance[pair] * np.tan(self._parameters.fan_core / 2.0), blocks.resolution / 2.0)
+        above = blocks.bottom[block] - paths.height[pair]
+        below = paths.height[pair] - blocks.height[block]
+        inside = np.maximum(above, below) <= half
+        return pair[inside], block[inside]
+
+    def _charge(
+        self, occupied: MultiLevelSurfaceMap, blocks: Blocks, rows: np.ndarray, crossings: np.ndarray
+    ) -> Tuple[int, int]:
+        """Count `crossings`, indices of blocks, and remove those with too many; return how many of both."""
+        beams = np.bincount(crossings, minlength=len(blocks))
+        crossed = np.flatnonzero(beams)
+        occupied.count_crossings(rows[crossed], beams[crossed])
+        total = blocks.crossed[crossed] + beams[crossed]
+        points = np.minimum(blocks.count[crossed], _MOST_POINTS)
+        gone = total > self._parameters.crossings_least + self._parameters.crossings_per_point * points
+        occupied.remove(rows[crossed[gone]])
+        return len(crossed), int(np.count_nonzero(gone))
+
+
+def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:
+    """Return one block per cell, with the heights of the axes that crossed it."""
+    rows = np.zeros((len(paths.cells), ROW_WIDTH))
+    if not len(rows):
+        return Blocks(rows, resolution)
+    rows[:, :2] = (paths.cells + 0.5) * resolution
+    rows[:, COUNT] = np.diff(np.append(paths.starts, len(paths.cell)))
+    rows[:, BOTTOM] = np.minimum.reduceat(paths.height, paths.starts)
+    rows[:, TOP] = np.maximum.reduceat(paths.height, paths.starts)
+    rows[:, 2] = (rows[:, BOTTOM] + rows[:, TOP]) / 2.0
+    return Blocks(rows, resolution)
+
+
+def _known(noted: Blocks, free: MultiLevelSurfaceMap) -> np.ndarray:
+    """Return (n,) which of the blocks, one per cell, are known for free at their height well enough."""
+    there, _, owners = free.find(noted.cells)
+    joins = (there.bottom - noted.height[owners] < free.resolution) & (
+        noted.bottom[owners] - there.height < free.resolution
+    )
+    known = np.zeros(len(noted), dtype=bool)
+    known[owners[joins & (there.count >= _ENOUGH)]] = True
+    return known

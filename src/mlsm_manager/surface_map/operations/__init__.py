@@ -1,0 +1,1 @@
+"""What is done with whole maps: moving, merging, cropping, comparing."""

@@ -1,0 +1,73 @@
+#!/usr/bin/env python3
+"""A vehicle that stands still, with a static odometry, keeps its place from scan to scan."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import Diagnostics, Inbox, wait_for_publisher_links
+from nav_msgs.msg import Odometry
+from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
+
+from sonar_processing.cloud import IntensityCloud
+from sonar_processing.ros.conversions import cloud_to_message
+from underwater_map_construction.msg import StampedIntensityCloud
+
+SCANS = 4
+SECONDS = 16.0
+START = 1_400_000_000.0
+WALLS = [((-12, 12), (14, 12)), ((14, 12), (14, -10)), ((-10, -8), (-4, -10)), ((3, 6), (5, 8))]
+
+
+class Standing(unittest.TestCase):
+    """Four scans of one place; the vehicle was moved by 0.5 m after the first, which the odometry does not tell."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Publish the scans and wait until all but the first, which makes the map, are matched."""
+        cls.fixes, cls.transforms = Inbox("/MLSM/odometry", Odometry), Inbox("/tf", TFMessage)
+        cls.diagnostics = Diagnostics()
+        publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
+        wait_for_publisher_links(publisher, 1)
+        cls.transforms.wait_for()
+        for turn in range(SCANS):
+            publisher.publish(cloud_to_message(scan(START + turn * SECONDS, 0.5 * (turn > 0))))
+        cls.diagnostics.wait_for("mlsm_core", "scans in", SCANS)
+        cls.publisher = publisher
+
+    def test_every_scan_after_the_first_gives_a_fix(self) -> None:
+        """They lie 0.5 m from where the first was taken."""
+        self.fixes.wait_for(lambda _: len(self.fixes.messages) >= SCANS - 1, timeout=10.0)
+        places = [fix.pose.pose.position.x for fix in self.fixes.messages]
+        np.testing.assert_allclose(places, 0.5, atol=0.1)
+
+    def test_map_to_odom_comes_to_the_fix_and_stays(self) -> None:
+        """Within the blend time."""
+        found = self.transforms.wait_for(lambda message: message.transforms[0].transform.translation.x > 0.4, 10.0)
+        self.assertAlmostEqual(found.transforms[0].transform.translation.x, 0.5, delta=0.1)
+
+    def test_the_place_can_be_searched_for(self) -> None:
+        """The newest scan is not forgotten."""
+        answer = rospy.ServiceProxy("/mlsm_core/relocalise", Trigger)()
+        self.assertTrue(answer.success, answer.message)
+
+    def test_time_did_not_jump(self) -> None:
+        """A transform that holds for all time has the stamp 0."""
+        self.assertNotIn("jumps back in time", self.diagnostics.values("mlsm_core"))
+
+
+def scan(start: float, moved: float) -> IntensityCloud:
+    """Return the echoes of all walls as heard from x = `moved` [m], in odom, from `start` [s] on."""
+    points = np.vstack([np.linspace(*ends, 40) for ends in np.array(WALLS, dtype=float)])
+    points = points[np.argsort(np.arctan2(points[:, 1], points[:, 0]))] - [moved, 0.0]
+    times = start + np.linspace(0.0, SECONDS, len(points))
+    rows = np.column_stack([points, np.full(len(points), -2.0), np.full(len(points), 50.0)])
+    return IntensityCloud(rows.astype(np.float32), -times, round(times[-1] * 1e9), "odom")
+
+
+if __name__ == "__main__":
+    rospy.init_node("standing_test")
+    rostest.rosrun("underwater_map_construction", "standing", Standing, sys.argv)

@@ -1,0 +1,38 @@
+"""Maps made at random, and what tells two of them apart."""
+
+import numpy as np
+
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+
+def random_points(seed, count, extent=10.0):
+    """Return points (count, 4) in a cube of side 2 `extent`."""
+    rng = np.random.RandomState(seed)
+    return np.column_stack([rng.uniform(-extent, extent, (count, 3)), rng.uniform(0, 127, count)])
+
+
+def random_map(seed=0, count=2000, resolution=0.5, extent=10.0):
+    """Return a map of random points."""
+    surface_map = MultiLevelSurfaceMap(resolution)
+    surface_map.insert(random_points(seed, count, extent))
+    return surface_map
+
+
+def stored_map(seed=0, **options):
+    """Return all that a file can hold."""
+    shown = random_map(seed, **options).blocks
+    free = random_map(seed + 1, count=100).blocks
+    arrays = {"place": np.array([1.0, 2.0, 0.3])}
+    calibration = {"range_scale": 0.98, "sonar_delay": 0.1, "mode": "PEAKS"}
+    return StoredMap("map", {Layer.SHOWN: shown, Layer.FREE: free}, calibration, 1.5e9, arrays)
+
+
+def content(stored):
+    """Return all that a stored map holds as something that can be compared."""
+    layers = {
+        layer.value: (blocks.rows.tobytes(), blocks.crossed.tobytes(), blocks.resolution)
+        for layer, blocks in stored.layers.items()
+    }
+    arrays = {name: (array.tobytes(), array.shape) for name, array in stored.arrays.items()}
+    return layers, arrays, stored.frame, stored.made, dict(stored.calibration)

@@ -1,0 +1,225 @@
+"""Maps in other programs' formats, read back by those programs' own readers."""
+
+import re
+import shutil
+import subprocess
+
+import numpy as np
+import pytest
+import yaml
+from made_maps import random_map
+from PIL import Image
+
+from mlsm_manager.surface_map.export.clouds import write_pcd
+from mlsm_manager.surface_map.export.colors import ColorBy, block_colors
+from mlsm_manager.surface_map.export.errors import ExportError
+from mlsm_manager.surface_map.export.formats import ExportOptions, export
+from mlsm_manager.surface_map.export.octomap import block_voxels, octree, write_octree
+from mlsm_manager.surface_map.export.picture import bar_length
+from mlsm_manager.surface_map.export.raster_files import write_ascii_grid, write_geotiff, write_map_server
+from mlsm_manager.surface_map.export.rasters import FREE, OCCUPIED, UNKNOWN, elevation, occupancy
+from mlsm_manager.surface_map.export.window import box_mesh
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.storage import write_ply
+
+RESOLUTION = 0.5
+
+
+def _blocks(*places):
+    surface_map = MultiLevelSurfaceMap(RESOLUTION)
+    surface_map.insert(np.array([[*place, 50.0] for place in places], dtype=np.float64).reshape(-1, 4))
+    return surface_map.blocks
+
+
+@pytest.fixture(scope="module")
+def occupied():
+    return random_map(0).blocks
+
+
+@pytest.fixture(scope="module")
+def free():
+    return random_map(1).blocks
+
+
+def _voxel_set(blocks):
+    return {tuple(voxel) for voxel in block_voxels(blocks)[0].tolist()}
+
+
+def test_octomap_reads_the_same_cells_free_and_occupied(tmp_path, occupied, free):
+    pyoctomap = pytest.importorskip("pyoctomap")
+    for ending in (".bt", ".ot"):
+        path = tmp_path / f"map{ending}"
+        write_octree(path, occupied, free)
+        if ending == ".bt":
+            tree = pyoctomap.OcTree(0.1)
+            assert tree.readBinary(str(path))
+        else:
+            tree = pyoctomap.OcTree(0.1).read(str(path))
+        assert tree.getResolution() == RESOLUTION
+        leaves = {True: set(), False: set()}
+        for leaf in tree.begin_leafs():
+            leaves[tree.isNodeOccupied(leaf)] |= _cells_of_leaf(leaf.getCoordinate(), leaf.getSize())
+        assert leaves[True] == _voxel_set(occupied)
+        assert leaves[False] == _voxel_set(free) - _voxel_set(occupied)
+
+
+def _cells_of_leaf(center, size):
+    """Return all cells that a leaf covers; pruned leaves cover 8, 64 and so on."""
+    side = round(size / RESOLUTION)
+    first = np.rint((np.array(center) - size / 2.0) / RESOLUTION).astype(int)
+    return {(first[0] + x, first[1] + y, first[2] + z) for x in range(side) for y in range(side) for z in range(side)}
+
+
+@pytest.mark.skipif(shutil.which("bt2vrml") is None, reason="needs apt's octomap-tools")
+def test_the_packaged_octomap_reads_the_same_occupied_cells(tmp_path, occupied, free):
+    pytest.importorskip("pyoctomap")
+    write_octree(tmp_path / "map.bt", occupied, free)
+    subprocess.run(["bt2vrml", "map.bt"], cwd=str(tmp_path), check=True, stdout=subprocess.DEVNULL)
+    boxes = re.findall(r"translation (\S+) (\S+) (\S+).*?size (\S+)", (tmp_path / "map.bt.wrl").read_text(), re.S)
+    cells = set().union(*(_cells_of_leaf(list(map(float, box[:3])), float(box[3])) for box in boxes))
+    assert cells == _voxel_set(occupied)
+
+
+def test_the_more_points_the_surer_a_cell_of_the_tree():
+    pytest.importorskip("pyoctomap")
+    tree = octree(_blocks((0.1, 0.1, 0.1), *[(5.1, 0.1, 0.1)] * 3), _blocks((9.1, 0.1, 0.1)))
+    log_odds = [tree.search([x, 0.25, 0.25]).getLogOdds() for x in (0.25, 5.25, 9.25)]
+    np.testing.assert_allclose(log_odds, [0.85, 2.55, -0.4], rtol=1e-5)
+
+
+def test_a_map_wider_than_a_tree_is_refused():
+    with pytest.raises(ExportError, match="reaches beyond 16384 m"):
+        block_voxels(_far_blocks())
+
+
+def _far_blocks():
+    surface_map = MultiLevelSurfaceMap(RESOLUTION, limit=1e6)
+    surface_map.insert(np.array([[20000.0, 0.0, 0.0, 1.0]]))
+    return surface_map.blocks
+
+
+def test_open3d_reads_what_a_pcd_holds(tmp_path, occupied):
+    open3d = pytest.importorskip("open3d")
+    write_pcd(tmp_path / "map.pcd", occupied)
+    cloud = open3d.t.io.read_point_cloud(str(tmp_path / "map.pcd"))
+    _assert_cloud(cloud, occupied)
+    np.testing.assert_array_equal(cloud.point["count"].numpy()[:, 0], occupied.count)
+
+
+def test_open3d_reads_what_a_ply_holds(tmp_path, occupied):
+    open3d = pytest.importorskip("open3d")
+    write_ply(tmp_path / "map.ply", occupied)
+    _assert_cloud(open3d.t.io.read_point_cloud(str(tmp_path / "map.ply")), occupied)
+
+
+def _assert_cloud(cloud, blocks):
+    np.testing.assert_allclose(cloud.point["positions"].numpy(), blocks.mean[:, :3], rtol=1e-6, atol=1e-6)
+    expected = {"intensity": blocks.mean[:, 3], "type": blocks.type, "height": blocks.height}
+    expected.update(variance_x=blocks.variance[:, 0], variance_intensity=blocks.variance[:, 3], bottom=blocks.bottom)
+    for name, values in expected.items():
+        np.testing.assert_allclose(cloud.point[name].numpy()[:, 0], values, rtol=1e-6, atol=1e-6)
+
+
+def test_a_grid_tells_free_unknown_and_occupied_apart():
+    grid = occupancy(_blocks((0.1, 0.1, 0.0), (2.1, 0.1, 5.0)), _blocks((0.6, 0.1, 0.0), (0.1, 0.1, 0.0)), -1.0, 1.0)
+    assert grid.values.tolist() == [[OCCUPIED, FREE]]
+    grid = occupancy(_blocks((0.1, 0.1, 0.0), (1.1, 0.6, 0.0)), _blocks((0.6, 0.1, 0.0)), -1.0, 1.0)
+    assert grid.values.tolist() == [[OCCUPIED, FREE, UNKNOWN], [UNKNOWN, UNKNOWN, OCCUPIED]]
+    assert grid.origin.tolist() == [0.0, 0.0]
+
+
+def test_map_servers_file_has_the_first_row_at_the_top(tmp_path):
+    grid = occupancy(_blocks((-0.4, 0.1, 0.0), (0.6, 0.6, 0.0)), _blocks((0.1, 0.1, 0.0)), -1.0, 1.0)
+    write_map_server(tmp_path / "map.pgm", grid)
+    words = yaml.safe_load((tmp_path / "map.yaml").read_text())
+    assert np.asarray(Image.open(str(tmp_path / "map.pgm"))).tolist() == [[205, 205, 0], [0, 254, 205]]
+    assert (words["image"], words["resolution"], words["origin"]) == ("map.pgm", 0.5, [-0.5, 0.0, 0.0])
+
+
+def test_map_servers_thresholds_tell_the_three_shades_apart(tmp_path):
+    write_map_server(tmp_path / "map.pgm", occupancy(_blocks((0.1, 0.1, 0.0)), _blocks(), -1.0, 1.0))
+    words = yaml.safe_load((tmp_path / "map.yaml").read_text())
+    probability = {shade: (255 - shade) / 255.0 for shade in (0, 205, 254)}
+    assert probability[0] > words["occupied_thresh"]
+    assert probability[254] < words["free_thresh"] < probability[205] < words["occupied_thresh"]
+
+
+def test_an_elevation_is_the_highest_point_of_a_cell():
+    raster = elevation(_blocks((0.1, 0.1, -5.0), (0.1, 0.1, -2.0), (1.1, 0.6, -3.0)))
+    np.testing.assert_array_equal(raster.values, [[-2.0, np.nan, np.nan], [np.nan, np.nan, -3.0]])
+
+
+def test_an_ascii_grid_begins_in_the_upper_left(tmp_path):
+    write_ascii_grid(tmp_path / "map.asc", elevation(_blocks((-0.4, 0.1, -2.0), (0.1, 0.6, -3.0))))
+    lines = (tmp_path / "map.asc").read_text().splitlines()
+    assert lines[:6] == ["ncols 2", "nrows 2", "xllcorner -0.5", "yllcorner 0", "cellsize 0.5", "NODATA_value -9999"]
+    assert [list(map(float, line.split())) for line in lines[6:]] == [[-9999.0, -3.0], [-2.0, -9999.0]]
+
+
+def test_a_geotiff_is_tied_to_the_upper_left_corner(tmp_path):
+    write_geotiff(tmp_path / "map.tif", elevation(_blocks((-0.4, 0.1, -2.0), (0.1, 0.6, -3.0))))
+    with Image.open(str(tmp_path / "map.tif")) as image:
+        np.testing.assert_array_equal(np.asarray(image), [[np.nan, -3.0], [-2.0, np.nan]])
+        assert image.tag_v2[33922] == (0.0, 0.0, 0.0, -0.5, 1.0, 0.0)
+        assert image.tag_v2[33550] == (0.5, 0.5, 0.0)
+
+
+def test_a_raster_that_would_not_fit_into_memory_is_refused():
+    surface_map = MultiLevelSurfaceMap(0.01, limit=1e6)
+    surface_map.insert(np.array([[-9e5, -9e5, 0, 1], [9e5, 9e5, 0, 1]]))
+    with pytest.raises(ExportError, match="crop the map first"):
+        elevation(surface_map.blocks)
+
+
+@pytest.mark.parametrize("by", list(ColorBy))
+def test_colours_are_from_0_to_1(occupied, by):
+    colors = block_colors(occupied, by)
+    assert colors.shape == (len(occupied), 3)
+    assert ((colors >= 0.0) & (colors <= 1.0)).all()
+
+
+def test_higher_blocks_have_other_colours():
+    low, high = block_colors(_blocks((0.1, 0.1, -5.0), (1.1, 0.1, 0.0)), ColorBy.HEIGHT)
+    assert np.abs(low - high).max() > 0.3
+
+
+@pytest.mark.parametrize(("width", "length"), [(100.0, 20.0), (80.0, 20.0), (7.9, 1.0), (8.0, 2.0), (0.3, 0.05)])
+def test_a_scale_bar_has_a_round_length(width, length):
+    assert bar_length(width) == pytest.approx(length)
+
+
+def test_a_box_is_as_large_as_its_block():
+    corners, triangles = box_mesh(_blocks((0.1, 0.1, -2.0), (0.1, 0.1, -1.7)))
+    assert (corners.min(axis=0).tolist(), corners.max(axis=0).tolist()) == ([0.0, 0.0, -2.0], [0.5, 0.5, -1.7])
+    assert triangles.max() == 7
+    assert len(triangles) == 12
+
+
+@pytest.mark.parametrize("ending", [".ply", ".pcd", ".bt", ".ot", ".pgm", ".tif", ".asc", ".png", ".mlsm"])
+def test_the_ending_tells_the_format(tmp_path, occupied, free, ending):
+    for module, endings in (("pyoctomap", (".bt", ".ot")), ("open3d", (".pcd",))):
+        if ending in endings:
+            pytest.importorskip(module)
+    path = tmp_path / f"map{ending}"
+    export(StoredMap("map", {Layer.SHOWN: occupied, Layer.FREE: free}), path, ExportOptions())
+    beginnings = {
+        ".png": b"\x89PNG",
+        ".tif": b"II*\0",
+        ".pgm": b"P5",
+        ".asc": b"ncols",
+        ".mlsm": b"MLSM",
+        ".ply": b"ply",
+    }
+    assert path.read_bytes().startswith(beginnings.get(ending, b"#"))
+    assert not [name for name in tmp_path.iterdir() if name.name.startswith(".")]
+
+
+def test_another_ending_is_refused_with_those_there_are(tmp_path, occupied):
+    with pytest.raises(ExportError, match=r"must end with one of \.ply \.pcd"):
+        export(StoredMap("map", {Layer.SHOWN: occupied}), tmp_path / "map.xyz", ExportOptions())
+
+
+def test_an_empty_map_is_not_exported(tmp_path):
+    with pytest.raises(ExportError, match="no blocks"):
+        export(StoredMap("map", {Layer.SHOWN: _blocks()}), tmp_path / "map.ply", ExportOptions())

@@ -1,0 +1,166 @@
+"""Maps as files: what is kept exactly, what is rounded, and that no other bytes are taken for a map."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_maps import content, random_map, random_points, stored_map
+from map_comparison import in_order, partition
+
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.files.array_file import ArrayFileError, decoded, encoded
+from mlsm_manager.surface_map.files.errors import MapFileError
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes, map_of_bytes, read_map, write_map
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+MUTATIONS = 1000
+
+
+def _loaded(blocks):
+    return map_of_bytes(map_bytes(StoredMap("map", {Layer.SHOWN: blocks}))).shown
+
+
+@given(st.integers(0, 2**31), st.integers(1, 400), st.sampled_from([0.1, 0.5, 3.0]))
+@settings(max_examples=30, deadline=None)
+def test_cell_bottom_top_and_number_of_points_are_kept_exactly(seed, count, resolution):
+    blocks = random_map(seed, count, resolution, extent=3.0).blocks
+    assert partition(_loaded(blocks)) == partition(blocks)
+
+
+def test_means_and_deviations_are_kept_to_a_part_of_a_cell():
+    blocks = random_map(count=20000, extent=4.0).blocks
+    loaded, blocks = _loaded(blocks), blocks.take(in_order(blocks))
+    np.testing.assert_allclose(loaded.mean[:, :2], blocks.mean[:, :2], rtol=0, atol=0.5 / 2**16)
+    depth = np.maximum(blocks.depth, 1e-12)
+    assert np.abs((loaded.mean[:, 2] - blocks.mean[:, 2]) / depth).max() < 2.0**-16
+    np.testing.assert_allclose(loaded.mean[:, 3], blocks.mean[:, 3], rtol=2**-23)
+    deviations = np.sqrt(loaded.variance) - np.sqrt(blocks.variance)
+    assert np.abs(deviations[:, :2]).max() < 0.25 / 2**16
+    assert np.abs(deviations[:, 2] / depth).max() < 2.0**-17
+    np.testing.assert_allclose(np.sqrt(loaded.variance[:, 3]), np.sqrt(blocks.variance[:, 3]), rtol=2**-22)
+
+
+def test_what_was_loaded_is_saved_as_it_was():
+    once = map_of_bytes(map_bytes(stored_map()))
+    assert content(map_of_bytes(map_bytes(once))) == content(once)
+
+
+def test_points_join_a_loaded_map_as_they_join_the_saved_one():
+    saved = random_map(count=3000, extent=3.0)
+    loaded = MultiLevelSurfaceMap(0.5)
+    loaded.insert_blocks(_loaded(saved.blocks))
+    for surface_map in (saved, loaded):
+        surface_map.insert(random_points(7, 3000, extent=3.0))
+    assert partition(loaded.blocks) == partition(saved.blocks)
+
+
+def test_a_file_holds_layers_frame_calibration_time_and_arrays(tmp_path):
+    stored = stored_map()
+    write_map(tmp_path / "basin.mlsm", stored)
+    read = read_map(tmp_path / "basin.mlsm")
+    assert set(read.layers) == {Layer.SHOWN, Layer.FREE}
+    assert (read.frame, read.made, read.calibration) == (stored.frame, stored.made, stored.calibration)
+    assert read.shown.resolution == 0.5
+    assert read.arrays["place"].tolist() == [1.0, 2.0, 0.3]
+
+
+def test_crossings_are_kept():
+    blocks = random_map(count=50).blocks
+    crossed = np.arange(len(blocks), dtype=np.uint16)
+    loaded = _loaded(Blocks(blocks.rows, blocks.resolution, crossed))
+    assert loaded.crossed.tolist() == crossed[in_order(blocks)].tolist()
+
+
+def test_an_empty_map_is_a_file_too():
+    assert len(_loaded(MultiLevelSurfaceMap(0.5).blocks)) == 0
+
+
+def test_cells_at_the_ends_of_the_grid_are_kept():
+    surface_map = MultiLevelSurfaceMap(0.01, limit=1e6)
+    surface_map.insert(np.array([[x, y, 0.0, 1.0] for x in (-1e6, 1e6) for y in (-1e6, 1e6)]))
+    assert partition(_loaded(surface_map.blocks)) == partition(surface_map.blocks)
+
+
+@pytest.mark.parametrize("extent", [2.0, 30.0])
+def test_a_block_takes_at_most_40_bytes_however_many_points_it_holds(extent):
+    blocks = random_map(count=60000, extent=extent).blocks
+    assert len(map_bytes(StoredMap("map", {Layer.SHOWN: blocks}))) < 40 * len(blocks) + 4000
+
+
+@pytest.fixture(scope="module")
+def file_bytes():
+    return map_bytes(stored_map(count=300))
+
+
+def test_no_mutated_file_is_taken_for_another_map(file_bytes):
+    right, rng = content(map_of_bytes(file_bytes)), np.random.RandomState(1)
+    read = [_read_or_refused(_mutated(file_bytes, rng)) for _ in range(MUTATIONS)]
+    assert {type(stored) for stored in read} <= {ArrayFileError, StoredMap}
+    assert all(content(stored) == right for stored in read if isinstance(stored, StoredMap))
+    assert sum(isinstance(stored, ArrayFileError) for stored in read) > 0.99 * MUTATIONS
+
+
+def test_columns_that_no_map_has_are_refused_even_with_a_right_checksum(file_bytes):
+    words, arrays = decoded(file_bytes)
+    rng = np.random.RandomState(2)
+    names = [name for name in arrays if name.startswith("shown/")]
+    for _ in range(300):
+        changed = dict(arrays)
+        name = names[rng.randint(len(names))]
+        kind = rng.choice(["<f8", "<i4", "<u2"])
+        with np.errstate(invalid="ignore"):
+            changed[name] = rng.choice([np.nan, -1.0, 0.0, 1e9], arrays[name].shape).astype(kind)[: rng.randint(9)]
+        if rng.randint(2):
+            del changed[names[rng.randint(len(names))]]
+        with pytest.raises(ArrayFileError, match=r"^.*$"):
+            map_of_bytes(encoded(words, changed))
+
+
+def _read_or_refused(data):
+    """Return the map, or the error that says why the bytes are none."""
+    try:
+        return map_of_bytes(data)
+    except ArrayFileError as error:
+        return error
+
+
+def _mutated(data, rng):
+    """Return the bytes with one of the things done to them that disks, transfers and people do to files."""
+    changed = bytearray(data)
+    kind, place = rng.randint(6), rng.randint(len(data))
+    if kind == 0:
+        changed[place] ^= 1 << rng.randint(8)
+    elif kind == 1:
+        del changed[place:]
+    elif kind == 2:
+        del changed[place : place + rng.randint(1, 50)]
+    elif kind == 3:
+        changed[place:place] = rng.bytes(rng.randint(1, 50))
+    elif kind == 4:
+        length = min(rng.randint(1, 600), len(data) - place)
+        changed[place : place + length] = bytes(length)
+    else:
+        other = rng.randint(len(data))
+        length = min(rng.randint(1, 600), len(data) - max(place, other))
+        changed[place : place + length] = data[other : other + length]
+    return bytes(changed)
+
+
+@pytest.mark.parametrize(
+    ("data", "reason"),
+    [
+        (b"", "not a map of this package"),
+        (b"ply\nformat ascii 1.0\n", "not a map of this package"),
+        (b"MLSM\r\n\x1a\n", "cut short"),
+    ],
+)
+def test_other_files_are_refused_in_one_line_with_their_path(tmp_path, data, reason):
+    path = tmp_path / "basin.mlsm"
+    path.write_bytes(data)
+    with pytest.raises(MapFileError, match=f"{path}: {reason}"):
+        read_map(path)
+
+
+def test_a_file_of_a_later_version_is_refused(file_bytes):
+    with pytest.raises(ArrayFileError, match="version 2, must be 1"):
+        map_of_bytes(file_bytes[:8] + b"\x02\x00" + file_bytes[10:])
