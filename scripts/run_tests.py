@@ -37,7 +37,7 @@ class Step:
 def steps() -> List[Step]:
     """Return all steps, quick ones first."""
     unit_report, recordings_report = RESULTS / "unit.xml", RESULTS / "recordings.xml"
-    installation_report = RESULTS / "installation.xml"
+    installation_report, stopping_report = RESULTS / "installation.xml", RESULTS / "stopping.xml"
     pytest = ["python3", "-m", "pytest"]
     found = [
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
@@ -47,6 +47,7 @@ def steps() -> List[Step]:
         Step("recordings", [*pytest, "test/recordings", f"--junitxml={recordings_report}"], recordings_report),
         *oldest_versions(),
         Step("installation", [*pytest, "test/installation", f"--junitxml={installation_report}"], installation_report),
+        Step("stopping", [*pytest, "test/stopping", f"--junitxml={stopping_report}"], stopping_report),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):
         folder = RESULTS / test.stem
