@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Callable, List, Optional
 from xml.etree import ElementTree as ET
 
+from oldest.run import HOW_TO_GET_ONE, find_python38
+
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "build/test_results"
 STEP_TIMEOUT = 400.0
@@ -43,6 +45,7 @@ def steps() -> List[Step]:
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
         Step("unit tests", [*pytest, "-n", "auto", "--dist", "loadfile", f"--junitxml={unit_report}"], unit_report),
         Step("recordings", [*pytest, "test/recordings", f"--junitxml={recordings_report}"], recordings_report),
+        *oldest_versions(),
         Step("installation", [*pytest, "test/installation", f"--junitxml={installation_report}"], installation_report),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):
@@ -50,6 +53,16 @@ def steps() -> List[Step]:
         command = ["rostest", "--results-filename=result.xml", str(test)]
         found.append(Step(f"rostest {test.stem}", command, folder))
     return found
+
+
+def oldest_versions() -> List[Step]:
+    """Return the step of the unit tests with the oldest versions, none where no Python 3.8 is found."""
+    if find_python38() is None:
+        print(f"       left out: oldest versions: {HOW_TO_GET_ONE}", flush=True)
+        return []
+    report = RESULTS / "oldest.xml"
+    command = ["python3", "scripts/oldest/run.py", "-n", "auto", "--dist", "loadfile", f"--junitxml={report}"]
+    return [Step("oldest versions", command, report)]
 
 
 def run_step(step: Step) -> Outcome:

@@ -1,5 +1,8 @@
 """Insertion into the map, and the map's markers."""
 
+import time
+from functools import partial
+from importlib.util import find_spec
 from io import BytesIO
 from typing import Dict, List
 
@@ -8,6 +11,7 @@ from std_msgs.msg import Header
 
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5
@@ -24,9 +28,11 @@ def scan(rng: np.random.Generator, center: np.ndarray, points: int) -> np.ndarra
     return result
 
 
-def grown_map(blocks: int, extent: float, rng: np.random.Generator) -> MultiLevelSurfaceMap:
+def grown_map(
+    blocks: int, extent: float, rng: np.random.Generator, kernel: InsertionKernel = InsertionKernel.NUMPY
+) -> MultiLevelSurfaceMap:
     """Return a map of at least `blocks` blocks."""
-    surface_map = MultiLevelSurfaceMap(RESOLUTION)
+    surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=kernel)
     while len(surface_map) < blocks:
         surface_map.insert(scan(rng, rng.uniform(-extent, extent, 2), 20_000))
     return surface_map
@@ -53,6 +59,31 @@ def insertion_rows() -> List[Row]:
     ]
 
 
+def compiled_rows() -> List[Row]:
+    """Measure insertion by compiled loops against numpy in turn, on points all over a disc and on few cells."""
+    if find_spec("numba") is None:
+        return [("insertion by compiled loops", "not measured: no numba", "1.6-10 million points/s")]
+    rows = []
+    for name, radius in (
+        ("nearly every point its own block", SCAN_RADIUS),
+        ("20 points to a block", SCAN_RADIUS / 8.0),
+    ):
+        seconds: Dict[InsertionKernel, List[float]] = {kernel: [] for kernel in InsertionKernel}
+        rng = np.random.default_rng(3)
+        maps = {kernel: grown_map(SMALL, 0.0, np.random.default_rng(1), kernel) for kernel in InsertionKernel}
+        points = 60_000
+        for _ in range(11):
+            new = scan(rng, np.zeros(2), points)
+            new[:, :2] *= radius / SCAN_RADIUS
+            for kernel, surface_map in maps.items():
+                call = partial(surface_map.insert, new)
+                seconds[kernel].append(median_seconds(call, repeats=1, clock=time.process_time))
+        for kernel, values in seconds.items():
+            rate = f"{points / float(np.median(values)) / 1e6:.2f} million points/s of a core"
+            rows.append((f"insert by {kernel.value.lower()}, {name}", rate, "C++: 1.6-10"))
+    return rows
+
+
 def marker_rows() -> List[Row]:
     """Measure one publication of 20,000 blocks."""
     rng = np.random.default_rng(2)
@@ -70,4 +101,4 @@ def marker_rows() -> List[Row]:
 
 def rows() -> List[Row]:
     """Return the figures of the map."""
-    return insertion_rows() + marker_rows()
+    return insertion_rows() + compiled_rows() + marker_rows()

@@ -13,7 +13,7 @@ from mlsm_manager.localisation.sensor_model import SensorModel, at_beam_edge
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.offline.beam_width_calibration import half_width_of, roughness
 from mlsm_manager.offline.calibration import Calibrator
-from mlsm_manager.offline.echo_shape import echo_form_of, suited
+from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.ros.bag_recording import BagNames, read_recording
@@ -56,8 +56,8 @@ def _error_row(name: str, error: Dict[str, float], wanted: str) -> Row:
 def _calibration_rows(bag: Path) -> List[Row]:
     """Return the residuals that decide the sensor model; the truth is not read."""
     recording = read_recording(bag, BagNames("/sonar/raw", "odom", "base_link", None))
-    form = echo_form_of([placed.beam for placed in recording.beams])
-    parameters = suited(ReplayParameters(range_scale_deviation=0.0), form, held=())
+    form = echo_shape_of([placed.beam for placed in recording.beams])
+    parameters = suited(ReplayParameters(range_scale_deviation=0.0), form, fixed=())
     scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
     width = half_width_of(scans)
     result: List[Row] = []

@@ -18,7 +18,7 @@ from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 STARTS = 100
 _NEAR, _NEAR_YAW = 0.5, np.radians(3.0)
-_HELD = 1e-3
+_FIXED = 1e-3
 _WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0)), "candidates": 12}
 
 
@@ -66,7 +66,7 @@ def _start(
     scan = maker.scan(still(pose), still(pose), seed=1000 + seed)
     bearing = rng.uniform(-np.pi, np.pi)
     expected = pose + np.array([distance * np.cos(bearing), distance * np.sin(bearing), rng.choice([-angle, angle])])
-    deviations = np.array([distance / 1.5, distance / 1.5, angle / 1.5, _HELD, _HELD, _HELD / 10.0, _HELD, _HELD])
+    deviations = np.array([distance / 1.5, distance / 1.5, angle / 1.5, _FIXED, _FIXED, _FIXED / 10.0, _FIXED, _FIXED])
     prior = Prior(composed(expected, inverse(pose)), np.zeros(3), np.zeros(2), np.diag(deviations**2))
     begin = time.thread_time()
     result = matcher.match(scan, target, prior)

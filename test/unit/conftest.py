@@ -9,4 +9,6 @@ sys.path.insert(0, str(ROOT / "scripts"))
 sys.path.append(str(ROOT / "test" / "rostest"))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
+# For a second run of all tests with other versions, see scripts/oldest.
+settings.register_profile("few", settings.get_profile("repeatable"), max_examples=20)
 settings.load_profile("repeatable")

@@ -10,7 +10,7 @@ from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Track
 from node_support.geometry.planar import composed, inverse, transformed
 
-# A cloud comes within a few scans of its own; a slow head takes a minute for eight.
+# A cloud comes within a scan or two of its own; eight turns of a head are two minutes.
 _MOST_STRETCHES = 8
 
 

@@ -8,9 +8,10 @@ import numpy as np
 
 from mlsm_manager.matching.problem.prediction import Belief, advanced, advanced_path
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.scan_path import POSE
+from mlsm_manager.matching.problem.state import POSE
 from node_support.geometry.planar import composed, inverse, wrapped
 
+# Of the odometry: a minute at 60 per second, longer than a scan and its match take.
 _MOST_SAMPLES = 4000
 _IDENTITY = np.zeros(3)
 
@@ -18,7 +19,7 @@ _IDENTITY = np.zeros(3)
 class LiveCorrection:
     """Follows the odometry from the last belief to now. A new belief is approached within `blend_time` seconds.
 
-    Safe to use from several threads: beliefs come from that of the scans, samples from a timer.
+    Safe to use from several threads: one gives it beliefs, another asks for samples.
     """
 
     def __init__(self, blend_time: float) -> None:

@@ -13,7 +13,7 @@ from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.sensor_model import without_doubtful_points
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track

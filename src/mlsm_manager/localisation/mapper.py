@@ -8,16 +8,16 @@ import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.matchers.matcher import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, held_to_heading, predicted, prior_of
-from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.matchers.matcher_table import Matcher
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
+from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.scan_path import ERRORS
-from mlsm_manager.matching.problem.undistort import corrected_points
+from mlsm_manager.matching.problem.state import ERRORS
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
+# Clouds: with one per scan, more than a matcher is ever behind.
 _MOST_WAITING = 8
 _NOTHING = InsertReport(0, 0, 0)
 
@@ -161,7 +161,7 @@ class Mapper:
         if scan.reference_time <= self.belief.time:
             return self.belief
         belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
-        return held_to_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
+        return updated_by_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""

@@ -4,8 +4,7 @@ from dataclasses import dataclass, fields
 from typing import Type, TypeVar
 
 from mlsm_manager.localisation.sensor_model import BeamEdge
-from mlsm_manager.matching.matchers.matcher import Matcher
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
+from mlsm_manager.matching.matchers.matcher_table import MATCHERS, Matcher, MatcherName
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters, SegmentsMatcherParameters
 from node_support.parameters import ParameterSet, parameter
 
@@ -30,7 +29,7 @@ class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, Be
         """Return those that belong to one of the sets that this one is made of."""
         return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
 
-    def as_wide_as_heard(self: Self) -> Self:
+    def with_effective_beam_width(self: Self) -> Self:
         """Return these with a beam at least as wide as the edges at which it hears surfaces."""
         return self.changed({"beam_width": max(self.beam_width, 2.0 * self.edge_half_width)})
 
@@ -41,4 +40,4 @@ class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, Be
     def build_matcher(self) -> Matcher:
         """Return the matcher; it knows that echoes come from as wide a beam as hears them."""
         kind = MATCHERS[self.matcher]
-        return kind.build(self.as_wide_as_heard().part(kind.parameters))
+        return kind.build(self.with_effective_beam_width().part(kind.parameters))

@@ -3,14 +3,17 @@
 import numpy as np
 
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.state import YAW, X, Y
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import composed, inverse
 
+# Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
+# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.
 _EVERYWHERE = {
     "search_distance": 500.0, "search_angle": np.pi, "search_cell": 1.0, "candidates": 80, "min_gain_over_second": 6.0
 }  # fmt: skip
@@ -27,7 +30,7 @@ def relocalised(scan: Scan, target: Blocks, matcher: Matcher, errors: OdometryEr
     low, high = centers.min(axis=0), centers.max(axis=0)
     middle = np.append((low + high) / 2.0, scan.reference_pose[2])
     covariance = errors.covariance()
-    covariance[0, 0] = covariance[1, 1] = (float((high - low).max()) / 4.0 + 1.0) ** 2
-    covariance[2, 2] = np.pi**2
+    covariance[X, X] = covariance[Y, Y] = (float((high - low).max()) / 4.0 + 1.0) ** 2
+    covariance[YAW, YAW] = np.pi**2
     correction = composed(middle, inverse(scan.reference_pose))
     return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))

@@ -11,12 +11,18 @@ from node_support.geometry.planar import inverse, rotated, transformed
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
 
+# Echoes that make the line of a surface.
 _NEIGHBOURS = 10
+# m: how far they may lie from each other, or this share of their range where that is more.
 _REACH = 4.0
 _REACH_OF_RANGE = 0.2
+# Two more than any line needs.
 _FEWEST = 5
+# Variance across the line over that along it: a corner has 1, a rough wall 0.1.
 _FLATNESS = 0.3
+# The second takes the normals of points that were turned already.
 _PASSES = 2
+# m: an error of a tenth of the half width then stays below the noise of a range.
 _MOST_SHIFT = 0.8
 
 

@@ -4,7 +4,7 @@ from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from node_support.health import Health
 
 
-def tell_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
+def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     """Count a scan and show what its match found."""
     health.show("matching", "on" if matching else "off")
     result = update.result
@@ -24,7 +24,7 @@ def tell_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
         health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction stay")
 
 
-def tell_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:
+def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:
     """Count a cloud and warn of points that did not get into the map."""
     if update.waiting:
         health.count("clouds waiting for their match")

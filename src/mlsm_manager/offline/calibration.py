@@ -12,10 +12,11 @@ from typing import Collection, Iterator, List, Tuple
 import numpy as np
 
 from mlsm_manager.localisation.sensor_model import SensorModel
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.state import ERRORS, POSE
 from mlsm_manager.offline.beam_width_calibration import half_width_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -32,20 +33,20 @@ _LAG = 6
 _OUTLIER = 3.0
 
 
-def calibrated(scans: List[Scan], parameters: ReplayParameters, held: Collection[str]) -> ReplayParameters:
+def calibrated(scans: List[Scan], parameters: ReplayParameters, fixed: Collection[str]) -> ReplayParameters:
     """Return `parameters` with those of the sensor model and `scale_deviation` estimated from raw `scans`.
 
-    Those that are `held` stay. Only the leading edge of an echo lies beside the axis of a wide beam; its peak does not.
-    Where odometry and sonar disagree by more than both may be off, `scale_deviation` is raised to match.
+    Those that are `fixed` stay. Only the leading edge of an echo lies beside the axis of a wide beam; its peak does
+    not. Where odometry and sonar disagree by more than both may be off, `scale_deviation` is raised to match.
     """
     model = parameters.sensor_model()
-    if "edge_half_width" not in held and parameters.mode is ExtractionMode.LEADING_EDGE:
+    if "edge_half_width" not in fixed and parameters.mode is ExtractionMode.LEADING_EDGE:
         model = model.changed({"edge_half_width": half_width_of(scans)})
     # A fit that takes the scale of its ranges for unknown would not show it.
     comparing = parameters.changed({**model.to_mapping(), "range_scale_deviation": 0.0}).for_few_scans()
     calibrator = Calibrator(comparing.build_matcher(), parameters.part(OdometryErrors), parameters.match_resolution)
-    model, scale = calibrator.calibrated(scans, model, held)
-    if "scale_deviation" not in held and calibrator.contradicts(scale):
+    model, scale = calibrator.calibrated(scans, model, fixed)
+    if "scale_deviation" not in fixed and calibrator.contradicts(scale):
         parameters = parameters.changed({"scale_deviation": abs(scale.value)})
     return parameters.changed(model.to_mapping())
 
@@ -73,13 +74,13 @@ class Calibrator:
     errors: OdometryErrors
     resolution: float
 
-    def calibrated(self, scans: List[Scan], model: SensorModel, held: Collection[str]) -> Tuple[SensorModel, Estimate]:
-        """Return `model` with delay and scale, where they are not `held`, estimated from raw `scans`; and `scale`."""
-        if "sonar_delay" not in held:
+    def calibrated(self, scans: List[Scan], model: SensorModel, fixed: Collection[str]) -> Tuple[SensorModel, Estimate]:
+        """Return `model` with delay and scale, where they are not `fixed`, estimated from raw `scans`; and `scale`."""
+        if "sonar_delay" not in fixed:
             found = self.delay([model.applied(scan) for scan in scans])
             model = model.changed({"sonar_delay": model.sonar_delay + found.shrunk(_DELAY_DEVIATION)})
         scale = self.scale([model.applied(scan) for scan in scans])
-        if "range_scale" not in held and not self.contradicts(scale):
+        if "range_scale" not in fixed and not self.contradicts(scale):
             model = model.changed({"range_scale": model.range_scale / (1.0 + self._share_of_sonar(scale))})
         return model, scale
 
@@ -131,9 +132,9 @@ class Calibrator:
 
     def _prior(self) -> Prior:
         covariance = self.errors.covariance()
-        covariance[:3, :3] = np.diag([_PLACE_DEVIATION, _PLACE_DEVIATION, _HEADING_DEVIATION]) ** 2
-        covariance[3:] *= 1e-3
-        covariance[:, 3:] *= 1e-3
+        covariance[POSE, POSE] = np.diag([_PLACE_DEVIATION, _PLACE_DEVIATION, _HEADING_DEVIATION]) ** 2
+        covariance[ERRORS] *= 1e-3
+        covariance[:, ERRORS] *= 1e-3
         return Prior(np.zeros(3), np.zeros(3), np.zeros(2), covariance)
 
 

@@ -9,10 +9,11 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from sonar_processing.beams.beam import Beam
 from sonar_processing.filters.echo_extraction import ExtractionMode
 
+# Share of non-zero strengths that equal the strongest.
 _BINARY = 0.9
 
 
-class EchoForm(Enum):
+class EchoShape(Enum):
     """What an echo looks like along a beam.
 
     PEAK: strengths differ; an echo has a peak, and noise has no sharp edge. PLATEAU: strengths only say "something" or
@@ -24,20 +25,20 @@ class EchoForm(Enum):
 
 
 _SUITED = {
-    EchoForm.PEAK: {"mode": ExtractionMode.MATCHED_FILTER, "match_resolution": 0.5},
-    EchoForm.PLATEAU: {"mode": ExtractionMode.LEADING_EDGE, "match_resolution": 1.0},
+    EchoShape.PEAK: {"mode": ExtractionMode.MATCHED_FILTER, "match_resolution": 0.5},
+    EchoShape.PLATEAU: {"mode": ExtractionMode.LEADING_EDGE, "match_resolution": 1.0},
 }
 
 
-def echo_form_of(beams: Sequence[Beam]) -> EchoForm:
+def echo_shape_of(beams: Sequence[Beam]) -> EchoShape:
     """Return PLATEAU where nearly all echoes are as strong as any, else PEAK."""
     counts = np.sum([np.bincount(beam.intensities, minlength=256) for beam in beams], axis=0)[1:]
     if not counts.any():
-        return EchoForm.PEAK
+        return EchoShape.PEAK
     strongest = counts[np.flatnonzero(counts)[-1]]
-    return EchoForm.PLATEAU if strongest >= _BINARY * counts.sum() else EchoForm.PEAK
+    return EchoShape.PLATEAU if strongest >= _BINARY * counts.sum() else EchoShape.PEAK
 
 
-def suited(parameters: ReplayParameters, form: EchoForm, held: Collection[str]) -> ReplayParameters:
-    """Return `parameters` with those that suit the form of the echoes, but for those that are `held`."""
-    return parameters.changed({name: value for name, value in _SUITED[form].items() if name not in held})
+def suited(parameters: ReplayParameters, shape: EchoShape, fixed: Collection[str]) -> ReplayParameters:
+    """Return `parameters` with those that suit the shape of the echoes, but for those that are `fixed`."""
+    return parameters.changed({name: value for name, value in _SUITED[shape].items() if name not in fixed})

@@ -6,8 +6,9 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.matching.problem.result import corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.undistort import corrected_points
+from mlsm_manager.matching.problem.state import POSE
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 
@@ -38,7 +39,7 @@ def keyframes_of(updates: List[ScanUpdate]) -> List[Keyframe]:
 
 
 def _keyframe(update: ScanUpdate) -> Keyframe:
-    scan, pose = update.scan, update.belief.theta[:3]
+    scan, pose = update.scan, update.belief.theta[POSE]
     if update.result is None:
         points = transformed(composed(pose, inverse(scan.reference_pose)), scan.points)
     else:

@@ -9,9 +9,10 @@ from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
+from mlsm_manager.matching.problem.state import MOTION, POSE
 from mlsm_manager.offline.keyframes import Keyframe
 from mlsm_manager.offline.pose_graph import RelativePoses
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -87,7 +88,7 @@ def _edge(
     result = matching.matcher.match(keyframes[second].scan, surfaces.blocks, prior)
     if not result.accepted:
         return None
-    pose, information = measured_alone(result, poses[second], prior.covariance[:3, :3])
+    pose, information = measured_alone(result, poses[second], prior.covariance[POSE, POSE])
     turn = np.eye(3)
     turn[:2, :2] = rotated(np.eye(2), -poses[first, 2]).T
     return first, second, composed(inverse(poses[first]), pose), turn @ information @ turn.T
@@ -95,8 +96,8 @@ def _edge(
 
 def _prior(keyframe: Keyframe, pose: np.ndarray, matching: ScanMatching) -> Prior:
     covariance = matching.errors.covariance()
-    covariance[:3, :3] = np.diag([_PLACE_DEVIATION, _PLACE_DEVIATION, _HEADING_DEVIATION]) ** 2
-    covariance[6:, 6:] *= 0.1
+    covariance[POSE, POSE] = np.diag([_PLACE_DEVIATION, _PLACE_DEVIATION, _HEADING_DEVIATION]) ** 2
+    covariance[MOTION, MOTION] *= 0.1
     correction = composed(pose, inverse(keyframe.scan.reference_pose))
     return Prior(correction, np.zeros(3), matching.motion, covariance)
 
@@ -109,7 +110,7 @@ def measured_alone(
     Directions of which the points say nothing keep the expected pose and no information.
     """
     prior = np.linalg.inv(prior_covariance)
-    posterior = np.linalg.inv(result.state_covariance[:3, :3])
+    posterior = np.linalg.inv(result.state_covariance[POSE, POSE])
     values, vectors = np.linalg.eigh(posterior - prior)
     values = np.maximum(values, _LEAST_INFORMATION)
     step = result.pose - expected

@@ -38,7 +38,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(_pair(text, parser) for text in options.set)
-    options.held = frozenset(values)
+    options.fixed = frozenset(values)
     if options.matcher:
         values["matcher"] = options.matcher
     options.parameters = ReplayParameters.from_mapping(values)

@@ -15,7 +15,7 @@ from node_support.geometry.planar import composed, inverse, rotated, wrapped
 
 _MOST_ITERATIONS = 30
 _LAST_STEP = 1e-6
-_HELD = 1e12
+_FIXED = 1e12
 _KERNEL = 2.0
 
 
@@ -38,7 +38,7 @@ class RelativePoses:
 
 
 @dataclass(frozen=True)
-class Beliefs:
+class UnaryFactors:
     """What is known without the edges.
 
     headings: (k,) rad from the compass; heading_information: 1/rad^2 of each of them, 0 without a compass.
@@ -59,12 +59,12 @@ class Smoothed:
     cost: float
 
 
-def smoothed(poses: np.ndarray, edges: RelativePoses, beliefs: Beliefs) -> Smoothed:
+def smoothed(poses: np.ndarray, edges: RelativePoses, unary: UnaryFactors) -> Smoothed:
     """Return the most likely poses (k, 3), starting from `poses`; edges that disagree with the rest count less."""
     state = np.append(np.asarray(poses, dtype=np.float64).ravel(), [0.0, 0.0])
     cost = np.inf
     for _ in range(_MOST_ITERATIONS):
-        information, gradient, cost = _normal(state, edges, beliefs)
+        information, gradient, cost = _normal(state, edges, unary)
         step = -spsolve(information, gradient)
         state = state + step
         if np.abs(step).max() < _LAST_STEP:
@@ -72,13 +72,15 @@ def smoothed(poses: np.ndarray, edges: RelativePoses, beliefs: Beliefs) -> Smoot
     return Smoothed(state[:-2].reshape(-1, 3), state[-2:], cost)
 
 
-def _normal(state: np.ndarray, edges: RelativePoses, beliefs: Beliefs) -> Tuple[sparse.csc_matrix, np.ndarray, float]:
+def _normal(
+    state: np.ndarray, edges: RelativePoses, unary: UnaryFactors
+) -> Tuple[sparse.csc_matrix, np.ndarray, float]:
     residual, jacobian = _edges(state, edges)
     squared = np.einsum("ea,eab,eb->e", residual, edges.information, residual)
     weight = 1.0 / (1.0 + squared / (3.0 * _KERNEL**2))
     whitening = sparse.block_diag(list(edges.information * weight[:, np.newaxis, np.newaxis]), format="csr")
     weighted = jacobian.T @ whitening
-    diagonal, gradient = _unary(state, beliefs)
+    diagonal, gradient = _unary(state, unary)
     information = (weighted @ jacobian + sparse.diags(diagonal)).tocsc()
     robust_cost = 1.5 * _KERNEL**2 * np.log1p(squared / (3.0 * _KERNEL**2)).sum()
     return information, weighted @ residual.ravel() + gradient, float(robust_cost)
@@ -127,16 +129,16 @@ def _jacobian(
     return sparse.csr_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=(3 * count, states))
 
 
-def _unary(state: np.ndarray, beliefs: Beliefs) -> Tuple[np.ndarray, np.ndarray]:
+def _unary(state: np.ndarray, unary: UnaryFactors) -> Tuple[np.ndarray, np.ndarray]:
     """Return information (states,) and gradient (states,) of what is known without the edges."""
     diagonal, gradient = np.zeros(state.size), np.zeros(state.size)
-    diagonal[2:-2:3] = beliefs.heading_information
-    gradient[2:-2:3] = beliefs.heading_information * wrapped(state[2:-2:3] - beliefs.headings)
-    diagonal[-2:] = beliefs.motion_information
-    gradient[-2:] = beliefs.motion_information * state[-2:]
-    diagonal[:2] = _HELD
-    if beliefs.heading_information == 0.0:
-        diagonal[2] = _HELD
+    diagonal[2:-2:3] = unary.heading_information
+    gradient[2:-2:3] = unary.heading_information * wrapped(state[2:-2:3] - unary.headings)
+    diagonal[-2:] = unary.motion_information
+    gradient[-2:] = unary.motion_information * state[-2:]
+    diagonal[:2] = _FIXED
+    if unary.heading_information == 0.0:
+        diagonal[2] = _FIXED
     return diagonal, gradient
 
 

@@ -16,6 +16,7 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 from sonar_processing.scans.revolution_collector import RevolutionCollector
 
+# s of odometry around the end of a scan: the slowest turn of a head, and the largest sonar_delay.
 _BEFORE = 60.0
 _AFTER = 10.0
 

@@ -5,12 +5,13 @@ from typing import Callable, List
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.matcher import Matcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.matching.problem.state import MOTION
 from mlsm_manager.offline.keyframes import Keyframe, keyframes_of, path_through
 from mlsm_manager.offline.loops import ScanMatching, scan_edges
-from mlsm_manager.offline.pose_graph import Beliefs, RelativePoses, joined, smoothed
+from mlsm_manager.offline.pose_graph import RelativePoses, UnaryFactors, joined, smoothed
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.surface_map.blocks import Blocks
@@ -39,13 +40,13 @@ def refine(recording: Recording, replayed: Replayed, matcher: Matcher, on_match:
     if len(keyframes) < 2:
         return Refined(replayed.corrected, mapper.shown.blocks, 0)
     poses = np.array([keyframe.pose for keyframe in keyframes])
-    motion = replayed.updates[-1].belief.theta[6:]
+    motion = replayed.updates[-1].belief.theta[MOTION]
     matching = ScanMatching(matcher, mapper.errors, mapper.settings.match_resolution, motion)
     edges = scan_edges(keyframes, poses, matching, on_match)
     times = np.array([keyframe.time for keyframe in keyframes])
     by_odometry = odometry_edges(times, recording.track, mapper.errors)
-    beliefs = _beliefs(times, recording.track, mapper.errors)
-    found = smoothed(poses, joined([by_odometry, edges]), beliefs)
+    unary = _unary_factors(times, recording.track, mapper.errors)
+    found = smoothed(poses, joined([by_odometry, edges]), unary)
     path = path_through(found.poses, times, found.motion, recording.track)
     blocks = rebuilt(keyframes, Track(recording.track.times, path), mapper.settings.resolution)
     return Refined(path, blocks, len(edges))
@@ -64,14 +65,14 @@ def odometry_edges(times: np.ndarray, track: Track, errors: OdometryErrors) -> R
     return RelativePoses(first, first + 1, relative, information, np.ones(len(seconds), dtype=bool))
 
 
-def _beliefs(times: np.ndarray, track: Track, errors: OdometryErrors) -> Beliefs:
+def _unary_factors(times: np.ndarray, track: Track, errors: OdometryErrors) -> UnaryFactors:
     information = 0.0
     if errors.heading_deviation > 0.0:
         # Neighbouring keyframes share the compass's error: together they say no more than one of them.
         together = max(_HEADING_LASTS / max(float(np.median(np.diff(times))), 1e-3), 1.0)
         information = 1.0 / (errors.heading_deviation**2 * together)
     motion = np.maximum([errors.scale_deviation, errors.direction_deviation], 1e-6) ** -2.0
-    return Beliefs(track.at(times)[:, 2], information, motion)
+    return UnaryFactors(track.at(times)[:, 2], information, motion)
 
 
 def rebuilt(keyframes: List[Keyframe], path: Track, resolution: float) -> Blocks:

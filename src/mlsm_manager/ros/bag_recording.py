@@ -19,9 +19,10 @@ from node_support.ros.conversions import matrix_from_message
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.ros.conversions import beam_from_message
-from sonar_processing.scans.moving_state import Motion
+from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
+# s: longer than any recording; tf must not forget its beginning.
 _FOR_EVER = 1_000_000_000
 _TF_TOPICS = ("/tf", "/tf_static")
 _VELOCITY_TOPIC = "/cmd_vel"
@@ -106,13 +107,13 @@ def _track(buffer: tf2_py.BufferCore, stamps: np.ndarray, path: Path, names: Bag
 
 
 def _beams(bag: rosbag.Bag, buffer: tf2_py.BufferCore, path: Path, names: BagNames) -> Tuple[List[PlacedBeam], int]:
-    motion, parameters = Motion(), SonarToCloudParameters()
+    moving_state, parameters = MovingState(), SonarToCloudParameters()
     velocities = iter(_messages(bag, _VELOCITY_TOPIC))
     velocity = next(velocities, None)
     placed, unplaced, reason = [], 0, ""
     for time, message in _messages(bag, names.beams):
         while velocity is not None and velocity[0] <= time:
-            _take_velocity(motion, velocity[1])
+            _take_velocity(moving_state, velocity[1])
             velocity = next(velocities, None)
         beam = _beam(message)
         matrix = None
@@ -121,7 +122,7 @@ def _beams(bag: rosbag.Bag, buffer: tf2_py.BufferCore, path: Path, names: BagNam
         if matrix is None:
             unplaced += 1
         else:
-            placed.append(PlacedBeam(beam, matrix, motion.is_moving(parameters)))
+            placed.append(PlacedBeam(beam, matrix, moving_state.is_moving(parameters)))
     if not placed:
         raise RecordingError(f"{path}: none of {unplaced} beams could be placed in {names.odom_frame}: {reason}")
     return sorted(placed, key=lambda one: one.beam.stamp_ns), unplaced
@@ -134,11 +135,11 @@ def _beam(message: Any) -> Optional[Beam]:
         return None
 
 
-def _take_velocity(motion: Motion, message: Any) -> None:
+def _take_velocity(moving_state: MovingState, message: Any) -> None:
     twist = message if isinstance(message, Twist) or hasattr(message, "linear") else message.twist
     linear, angular = twist.linear, twist.angular
     with suppress(RefusedInput):
-        motion.take((linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
+        moving_state.take((linear.x, linear.y, linear.z), (angular.x, angular.y, angular.z))
 
 
 def _matrix(buffer: tf2_py.BufferCore, target: str, source: str, stamp_ns: int) -> Tuple[Optional[np.ndarray], str]:

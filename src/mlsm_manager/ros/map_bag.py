@@ -9,7 +9,7 @@ from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.calibration import calibrated
-from mlsm_manager.offline.echo_shape import echo_form_of, suited
+from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
@@ -33,7 +33,7 @@ def run_map_bag() -> None:
         sys.exit(f"map_bag: {error.filename or 'output'}: {error.strerror or error}")
     except KeyboardInterrupt:
         sys.exit("map_bag: interrupted")
-    print("\n".join(_told(summary, options)))
+    print("\n".join(_report(summary, options)))
 
 
 def map_bag(options: Namespace) -> Dict[str, Any]:
@@ -66,8 +66,8 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
 def _fitted_to_echoes(recording: Recording, options: Namespace) -> ReplayParameters:
     if not options.calibrate:
         return options.parameters
-    form = echo_form_of([placed.beam for placed in recording.beams])
-    return suited(options.parameters, form, options.held)
+    form = echo_shape_of([placed.beam for placed in recording.beams])
+    return suited(options.parameters, form, options.fixed)
 
 
 def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
@@ -85,7 +85,7 @@ def _calibrated(scans: List[Scan], parameters: ReplayParameters, options: Namesp
     if not options.calibrate:
         return parameters
     with _bar(None, "", "calibrate"):
-        return calibrated(scans, parameters, options.held)
+        return calibrated(scans, parameters, options.fixed)
 
 
 def _calibration(parameters: ReplayParameters) -> Dict[str, Any]:
@@ -118,7 +118,7 @@ def _run(replayed: Replayed, refined: Optional[Refined]) -> Run:
     return Run(replayed.times, poses, blocks, {**counts, "blocks": len(blocks)})
 
 
-def _told(summary: Dict[str, Any], options: Namespace) -> List[str]:
+def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
     lines = [
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
         f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time"

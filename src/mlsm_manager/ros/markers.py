@@ -18,6 +18,7 @@ COLORS: Dict[BlockType, ColorRGBA] = {
     BlockType.HORIZONTAL: ColorRGBA(r=0.75, g=0.16, b=0.10, a=1.0),
     BlockType.VERTICAL: ColorRGBA(r=1.0, g=0.87, b=0.40, a=1.0),
 }
+# Four lengths of 4 bytes and the flag; behind the points follow the other three and the flag.
 _EMPTY_LISTS_BYTES = 17
 _AFTER_STAMP_BYTES = 16
 """Of a message: sequence, seconds, nanoseconds and the length of the frame's name."""

@@ -10,7 +10,7 @@ from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.localisation.update_report import tell_cloud, tell_scan
+from mlsm_manager.localisation.update_report import report_cloud, report_scan
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.ros.fix_publisher import FixPublisher
 from mlsm_manager.ros.map_publisher import MapPublisher
@@ -99,7 +99,7 @@ class MlsmCore:
             guarded(self.health, self._match)(cloud)
         if parameters.map_input is MapInput.CLEANED:
             with self.health.timed():
-                self._tell_map(self._inserted(cloud), cloud.stamp_ns)
+                self._report_cloud(self._inserted(cloud), cloud.stamp_ns)
 
     def _inserted(self, cloud: IntensityCloud) -> CloudUpdate:
         if cloud.frame_id == self._live.current.map_frame:
@@ -118,8 +118,8 @@ class MlsmCore:
             return
         taken = self._localiser.take_scan(scan)
         for update in taken.clouds:
-            self._tell_map(update, cloud.stamp_ns)
-        tell_scan(self.health, taken.scan, self._localiser.matching)
+            self._report_cloud(update, cloud.stamp_ns)
+        report_scan(self.health, taken.scan, self._localiser.matching)
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
     def _check_header(self, cloud: IntensityCloud) -> None:
@@ -142,9 +142,9 @@ class MlsmCore:
             return None
         return Scan.from_stamps(cloud.points, cloud.time_stamps, time, track)
 
-    def _tell_map(self, update: CloudUpdate, stamp_ns: int) -> None:
+    def _report_cloud(self, update: CloudUpdate, stamp_ns: int) -> None:
         self._map.change(stamp_ns)
-        tell_cloud(self.health, update, self._localiser.block_count, self._live.current.map_limit)
+        report_cloud(self.health, update, self._localiser.block_count, self._live.current.map_limit)
 
     def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
         if update.result is not None and update.accepted:

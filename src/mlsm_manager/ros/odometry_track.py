@@ -10,8 +10,11 @@ from node_support.headers import DAY
 from node_support.health import Health
 from node_support.ros.tf_buffer import TfBuffer, stamp_of
 
+# s that tf remembers: three slow turns of the head.
 _CACHE = 180.0
+# s to wait for odometry that is on its way; then the scan is given up.
 _PATIENCE = 1.0
+# Times of a track besides those of the beams: four a second in a turn of 16 s.
 _STEADY = 65
 
 

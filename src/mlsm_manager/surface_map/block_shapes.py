@@ -14,6 +14,7 @@ from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
 
+# Power of two: a sixteenth of a cell is the thinnest box that still shows.
 THINNEST = -4
 
 

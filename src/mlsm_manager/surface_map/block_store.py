@@ -49,6 +49,10 @@ class BlockStore:
         """Return all blocks of cells with keys `cells` (n,) at `slots` (n,)."""
         return self._intervals(*self._followed(cells, self._index.heads[slots]))
 
+    def chains(self, slots: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Return views of all rows and of the row that follows each in its cell, and the first rows of cells (n,)."""
+        return self._rows, self._next, self._index.heads[slots]
+
     def find(self, cells: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return row numbers (m,) of all blocks of cells with keys `cells` (n,), and whose they are, (m,) indices."""
         owners, rows = self._followed(np.arange(len(cells)), self._index.find(cells))
@@ -78,8 +82,12 @@ class BlockStore:
         data[:, COUNT] = intervals.count
         data[:, BOTTOM] = intervals.bottom
         data[:, TOP] = intervals.top
+        self.write_rows(rows, data, intervals.crossed)
+
+    def write_rows(self, rows: np.ndarray, data: np.ndarray, crossed: np.ndarray) -> None:
+        """Write data (n, ROW_WIDTH) and crossings (n,), or one number for all, into `rows` (n,)."""
         self._rows[rows] = data
-        self._crossed[rows] = intervals.crossed
+        self._crossed[rows] = crossed
 
     def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks at `rows` (n,), none twice."""

@@ -3,7 +3,9 @@
 import numpy as np
 
 _EMPTY = np.iinfo(np.int64).min
+# Share of the table in use: from there on probing takes longer than growing.
 _MAX_LOAD = 0.6
+# The golden ratio times 2^64 and a prime of xxHash: they spread neighbouring cells over the table.
 _MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
 _MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
 NO_BLOCK = -1

@@ -9,15 +9,8 @@ from mlsm_manager.surface_map.block_store import BlockStore
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
-from mlsm_manager.surface_map.linkage import (
-    Intervals,
-    concatenated,
-    group_points,
-    intervals_of,
-    link,
-    linked_alone,
-    merge,
-)
+from mlsm_manager.surface_map.insertion import InsertionKernel, insert_groups, point_inserter
+from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
 
 
 @dataclass(frozen=True)
@@ -35,12 +28,22 @@ class MultiLevelSurfaceMap:
     The cost of inserting a scan depends on the scan and on the blocks of the cells it touches, not on the map.
     """
 
-    def __init__(self, resolution: float, limit: float = 10000.0, expected_blocks: int = 0) -> None:
-        """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted."""
+    def __init__(
+        self,
+        resolution: float,
+        limit: float = 10000.0,
+        expected_blocks: int = 0,
+        kernel: InsertionKernel = InsertionKernel.NUMPY,
+    ) -> None:
+        """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted.
+
+        Raises ImportError for a kernel that is not installed.
+        """
         self.resolution = resolution
         self.limit = limit
         self._store = BlockStore(expected_blocks)
         self._changed = ChangedTiles()
+        self._insert_points = point_inserter(kernel)
 
     def __len__(self) -> int:
         """Return the number of blocks."""
@@ -121,7 +124,8 @@ class MultiLevelSurfaceMap:
         keep = finite & inside
         kept = points if keep.all() else points[keep]
         if len(kept):
-            self._insert_groups(group_points(kept, cell_keys(cells_of(kept, self.resolution)), self.resolution))
+            keys = cell_keys(cells_of(kept, self.resolution))
+            self._changed.note(self._insert_points(self._store, kept, keys, self.resolution))
         not_finite = len(points) - int(np.count_nonzero(finite))
         return InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
 
@@ -137,7 +141,8 @@ class MultiLevelSurfaceMap:
         kept = blocks.take(reach <= self.limit)
         if len(kept):
             cells = cell_keys(cells_of(kept.mean, self.resolution))
-            self._insert_groups(linked_alone(intervals_of(kept, cells), self.resolution))
+            groups = linked_alone(intervals_of(kept, cells), self.resolution)
+            self._changed.note(insert_groups(self._store, groups, self.resolution))
         inserted = int(kept.count.sum())
         return InsertReport(inserted, 0, int(blocks.count.sum()) - inserted)
 
@@ -151,30 +156,3 @@ class MultiLevelSurfaceMap:
         keys = ((x << 32)[:, np.newaxis] + y).ravel()
         rows, _ = self._store.find(keys)
         return self._store.blocks(np.sort(rows), self.resolution)
-
-    def _insert_groups(self, groups: Intervals) -> None:
-        cells = groups.cell[np.flatnonzero(np.append(True, groups.cell[1:] != groups.cell[:-1]))]
-        slots = self._store.slots(cells)
-        if not len(self._store):
-            rows = self._store.take(len(groups))
-            self._store.write(rows, groups)
-        else:
-            rows, groups = self._joined(groups, cells, slots)
-        self._store.chain(rows, groups.cell, slots)
-        self._changed.note(cells)
-
-    def _joined(self, groups: Intervals, cells: np.ndarray, slots: np.ndarray) -> Tuple[np.ndarray, Intervals]:
-        """Write what `groups` and the blocks of their cells make together; return all that the cells hold now."""
-        elements = concatenated(groups, self._store.stored(cells, slots))
-        starts = link(elements, self.resolution)
-        merged = merge(elements, starts)
-        size = np.diff(np.append(starts, len(elements)))
-        fused = (elements.row >= 0) & (elements.row != np.repeat(merged.row, size))
-        if fused.any():
-            self._store.release(elements.row[fused])
-        rows = merged.row.copy()
-        new = rows < 0
-        rows[new] = self._store.take(int(np.count_nonzero(new)))
-        changed = new | (size > 1)
-        self._store.write(rows[changed], merged.take(changed))
-        return rows, merged

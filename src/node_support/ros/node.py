@@ -1,10 +1,14 @@
 """The start, the guarded callbacks and the diagnostics that all nodes share."""
 
+import logging
+import os
+import signal
 import sys
 import threading
 import time
 import traceback
-from typing import Any, Callable, Protocol, Sequence
+from contextlib import suppress
+from typing import Any, Callable, NoReturn, Protocol, Sequence
 
 import rospy
 from diagnostic_updater import DiagnosticStatusWrapper, Updater
@@ -15,6 +19,7 @@ from node_support.parameters import ParameterError
 
 DIAGNOSTICS_PERIOD = 1.0  # s: as often as diagnostic aggregators expect it
 _SPIN_STEP = 0.05  # s: soon enough to end a node at once, seldom enough to cost nothing
+_END_STEP = 0.01  # s: roslaunch waits for every node
 
 
 class StartError(Exception):
@@ -28,32 +33,66 @@ class Node(Protocol):
     """Of all stages that the node hosts, for /diagnostics."""
 
 
-def run(name: str, make_node: Callable[[], Node]) -> None:
-    """Initialise the node, make it, publish its diagnostics and spin until Ctrl-C.
+def run(name: str, make_node: Callable[[], Node]) -> NoReturn:
+    """Initialise the node, make it, publish its diagnostics, wait for Ctrl-C and end the process.
 
     ParameterError and StartError end it with one line and status 1.
     """
-    rospy.init_node(name)
+    interrupt = _Interrupt()
+    try:
+        status = _run(name, make_node, interrupt)
+    except (KeyboardInterrupt, rospy.ROSInterruptException):
+        status = 0
+    _end(status)
+
+
+def _run(name: str, make_node: Callable[[], Node], interrupt: "_Interrupt") -> int:
+    rospy.init_node(name, disable_signals=True)
     try:
         node = make_node()
         publish_diagnostics(node.healths)
     except (ParameterError, StartError) as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
-        sys.exit(1)
-    except rospy.ROSInterruptException:
-        return
-    _spin()
-    del node
-
-
-def _spin() -> None:
-    """Wait for the end; rospy.spin notices it up to half a second late, and roslaunch ends nodes one by one.
-
-    No threading.Event: the handler of Ctrl-C runs in this thread too, and would wait for ever for the Event's lock when
-    it comes while this thread holds it.
-    """
-    while not rospy.is_shutdown():
+        return 1
+    while not rospy.is_shutdown() and not interrupt.came:
         time.sleep(_SPIN_STEP)
+    return 0
+
+
+class _Interrupt:
+    """Takes Ctrl-C and SIGTERM in rospy's place.
+
+    rospy unregisters the node inside the signal handler. When the signal comes while the main thread itself talks to
+    the master, as it does while the node starts, the handler waits for ever for the lock that this very thread holds.
+    """
+
+    def __init__(self) -> None:
+        self.came = False
+        for number in (signal.SIGINT, signal.SIGTERM):
+            signal.signal(number, self._take)
+
+    def _take(self, *_: Any) -> None:
+        self.came = True
+        raise KeyboardInterrupt
+
+
+def _end(status: int) -> NoReturn:
+    """Unregister, run what waits for the shutdown, and end the process with `status`.
+
+    The process ends at once then: rospy's threads would take another half second to notice the shutdown.
+    """
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, signal.SIG_IGN)
+    # An interrupted call leaves its connection unusable for one more call, which must not be the one that unregisters.
+    with suppress(Exception):
+        rospy.get_master().getPid()
+    threading.Thread(target=rospy.signal_shutdown, args=("the node ends",), daemon=True).start()
+    while not rospy.is_shutdown():
+        time.sleep(_END_STEP)
+    logging.shutdown()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(status)
 
 
 def make_health(name: str) -> Health:

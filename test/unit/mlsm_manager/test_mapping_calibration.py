@@ -51,10 +51,10 @@ def test_too_few_scans_change_nothing():
 
 def test_only_leading_edges_are_turned():
     scans = heard(path(), half_width=0.06)
-    held = ("sonar_delay", "range_scale")
+    fixed = ("sonar_delay", "range_scale")
     edges = PARAMETERS.changed({"mode": ExtractionMode.LEADING_EDGE})
-    assert calibrated(scans, edges, held).edge_half_width == pytest.approx(0.06, abs=0.02)
-    assert calibrated(scans, PARAMETERS, held).edge_half_width == 0.0
+    assert calibrated(scans, edges, fixed).edge_half_width == pytest.approx(0.06, abs=0.02)
+    assert calibrated(scans, PARAMETERS, fixed).edge_half_width == 0.0
 
 
 def test_an_odometry_that_no_speed_of_sound_explains_is_contradicted():

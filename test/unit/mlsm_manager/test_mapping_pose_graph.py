@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.offline.pose_graph import Beliefs, RelativePoses, joined, smoothed
+from mlsm_manager.offline.pose_graph import RelativePoses, UnaryFactors, joined, smoothed
 from node_support.geometry.planar import composed, inverse, rotated, wrapped
 
 SIDE = 10
@@ -45,7 +45,7 @@ def dead_reckoned(odometry):
 
 
 def nothing_known(count, motion=(1e6, 1e6)):
-    return Beliefs(np.zeros(count), 0.0, np.array(motion))
+    return UnaryFactors(np.zeros(count), 0.0, np.array(motion))
 
 
 def distance(poses, truth):
@@ -90,7 +90,7 @@ def test_scale_and_direction_of_the_odometry_come_out():
 def test_a_compass_holds_the_headings():
     truth = square()
     odometry = odometry_of(truth, deviation=(0.01, 0.01, 0.05))
-    compass = Beliefs(truth[:, 2], 0.01**-2, np.array([1e6, 1e6]))
+    compass = UnaryFactors(truth[:, 2], 0.01**-2, np.array([1e6, 1e6]))
     found = smoothed(dead_reckoned(odometry), odometry, compass)
     assert np.abs(wrapped(found.poses[:, 2] - truth[:, 2])).max() < 0.02
 

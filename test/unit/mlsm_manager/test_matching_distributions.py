@@ -8,8 +8,7 @@ from made_scans import DEVIATIONS, at_velocity, harbour, map_of, prior_of_pose, 
 
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.result import MatchStatus
-from mlsm_manager.matching.problem.undistort import corrected_points
+from mlsm_manager.matching.problem.result import MatchStatus, corrected_points
 
 FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 
@@ -94,7 +93,7 @@ def test_along_a_single_wall_a_scan_is_ambiguous():
     scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
     result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.5, 0.3, 0.02])
     assert result.status is MatchStatus.AMBIGUOUS
-    assert "worst direction" in result.reason
+    assert "least certain direction" in result.reason
 
 
 def test_along_a_single_wall_the_deviation_is_that_of_the_prior_and_across_it_that_of_the_match():

@@ -12,11 +12,11 @@ from geometry_msgs.msg import Quaternion, Transform, Vector3
 from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as numpy_st
-from scipy.spatial.transform import Rotation
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
+from node_support.geometry.matrices import pose_matrix, quaternion_of
 from node_support.ros.conversions import matrix_from_message
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import (
@@ -260,11 +260,18 @@ def test_big_endian_data_are_refused():
 
 @given(st.tuples(*[st.floats(-3.0, 3.0)] * 3), st.tuples(*[st.floats(-100.0, 100.0)] * 3))
 def test_a_transform_is_its_matrix(rotation, shift):
-    expected = Rotation.from_euler("xyz", rotation)
-    matrix = matrix_from_message(Transform(Vector3(*shift), Quaternion(*expected.as_quat())))
-    np.testing.assert_allclose(matrix[:3, :3], expected.as_matrix(), atol=1e-12)
+    expected = pose_matrix(shift, rotation)
+    matrix = matrix_from_message(Transform(Vector3(*shift), Quaternion(*quaternion_of(expected))))
+    np.testing.assert_allclose(matrix[:3, :3], expected[:3, :3], atol=1e-12)
     assert matrix[:3, 3].tolist() == list(shift)
     assert matrix[3].tolist() == [0, 0, 0, 1]
+
+
+@pytest.mark.parametrize("axis", range(3))
+def test_half_a_turn_has_a_quaternion(axis):
+    turned = -np.eye(3)
+    turned[axis, axis] = 1.0
+    np.testing.assert_allclose(np.abs(quaternion_of(turned)), np.eye(4)[axis])
 
 
 @pytest.mark.parametrize(

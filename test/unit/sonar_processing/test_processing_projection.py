@@ -7,8 +7,8 @@ import pytest
 from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy.spatial.transform import Rotation
 
+from node_support.geometry.matrices import pose_matrix
 from node_support.geometry.planar import wrapped
 from sonar_processing.beams.projection import project_beam
 
@@ -17,10 +17,7 @@ SHIFTS = st.tuples(*[st.floats(-100.0, 100.0)] * 3)
 
 
 def _pose(shift=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)):
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_euler("xyz", rotation).as_matrix()
-    matrix[:3, 3] = shift
-    return matrix
+    return pose_matrix(shift, rotation)
 
 
 def _projected(beam, pose=None, sides=1, width=0.0436):

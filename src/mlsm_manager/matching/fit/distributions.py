@@ -16,15 +16,24 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.surface_map.blocks import Blocks
 
+# Blocks that make one distribution: 16 fill the broad window where blocks lie as close as cells allow.
 _NEIGHBOURS = 16
+# The window reaches to the second neighbour: with the block itself three, the fewest that show a line.
 _WINDOW_NEIGHBOUR = 2
+# m: above the diagonal of a cell of 0.5 m, below the distance of two jetties.
 _LEAST_WINDOW = 0.7
 _GREATEST_WINDOW = 2.5
+# Times the information that a window itself makes up along a wall.
 _ALONG_MARGIN = 3.0
+# The typical thickness of surfaces counts as this many points more.
 _PRIOR_POINTS = 2.0
+# m: range resolution of 50 m in 500 bins.
 _LEAST_DEVIATION = 0.1
+# m: a block without neighbours may be anything within its cell.
 _LONE_DEVIATION = 0.5
+# m: what is thicker is clutter and no surface.
 _SURFACE_DEVIATION = 0.4
+# m: free to slide along a wall.
 _UNBOUNDED = 100.0
 
 
@@ -44,7 +53,7 @@ class LocalDistributions:
         window = np.clip(distances[:, min(_WINDOW_NEIGHBOUR, count - 1)], _LEAST_WINDOW, _GREATEST_WINDOW)
         self.window = window
         near = np.exp(-0.5 * (distances / window[:, np.newaxis]) ** 2)
-        self.support = (near * blocks.count[neighbours]).sum(axis=1)
+        self.point_count = (near * blocks.count[neighbours]).sum(axis=1)
         close, broad = (_Window.around(blocks, distances, neighbours, width) for width in (window, 2.0 * window))
         self.mean = close.mean
         self.deviation, self.covariance, thickness = _structure(close, broad)

@@ -5,26 +5,32 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlsm_manager.matching.fit.distributions import LocalDistributions
-from mlsm_manager.matching.fit.normal_equations import Normal, PointEquations, support
+from mlsm_manager.matching.fit.normal_equations import Normal, PointEquations, log_likelihood_gain
 from mlsm_manager.matching.fit.residual_covariance import PointEvidence, residual_covariance
-from mlsm_manager.matching.problem.scan_path import POSE, PlanarMotion
+from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import POSE
 
+# Standard deviations at which the robust kernel bends: wide enough for a start one search cell off, narrow at the end.
 SCALES = (8.0, 4.0, 2.5)
 _ITERATIONS_PER_SCALE = 4
+# m: echoes of one surface within this distance are compared with the same window of the map and err alike.
 _CLUSTER = 3.0
+# 150 echoes of five clusters are worth five points at least.
 _GREATEST_INFLATION = 30.0
+# Standard deviations: a smaller step changes nothing that a fix tells.
 _LAST_STEP = 0.1
-_LEAST_IMPORTANCE = 1e-9
+# Keeps an average defined where no point has a weight.
+_LEAST_WEIGHT = 1e-9
 
 
 @dataclass(frozen=True)
 class PriorState:
-    """Mean (8,) and information (8, 8) of the state before the scan, as in planar_motion."""
+    """Mean (8,) and information (8, 8) of the state before the scan, as in scan_path."""
 
     mean: np.ndarray
     information: np.ndarray
 
-    def objection(self, theta: np.ndarray) -> float:
+    def prior_cost(self, theta: np.ndarray) -> float:
         """Return half the squared Mahalanobis distance of a state from the mean."""
         difference = theta - self.mean
         return float(difference @ self.information @ difference) / 2.0
@@ -34,25 +40,25 @@ class PriorState:
 class Fit:
     """Where Gauss-Newton ended.
 
-    theta: (8,). covariance: (8, 8), prior included. support: by how many nats the points, taken as independent, prefer
-    this place to one where they meet nothing; `inflation` of them are worth one. objection: nats by which the prior
-    argues against it. inliers: (n,) bool, points that lie on a surface of the map. distances: (n,) m from the nearest
+    theta: (8,). covariance: (8, 8), prior included. log_likelihood_gain: nat, of the points over no correspondences,
+    where points are taken as independent; `inflation` of them are worth one. prior_cost: nat, minus the prior's
+    log-likelihood. inliers: (n,) bool, points that lie on a surface of the map. distances: (n,) m from the nearest
     block. converged: whether the last step was small.
     """
 
     theta: np.ndarray
     covariance: np.ndarray
-    support: float
+    log_likelihood_gain: float
     inflation: float
-    objection: float
+    prior_cost: float
     inliers: np.ndarray
     distances: np.ndarray
     iterations: int
     converged: bool
 
     def gain(self, inflation: float) -> float:
-        """Return the nats for this place; fits are compared with one `inflation` for all of them."""
-        return self.support / inflation - self.objection
+        """Return the log-posterior gain [nat]; fits are compared with one `inflation` for all of them."""
+        return self.log_likelihood_gain / inflation - self.prior_cost
 
 
 class Refiner:
@@ -101,10 +107,10 @@ class Refiner:
 
     def gains(self, fit: Fit, moves: np.ndarray) -> np.ndarray:
         """Return (k,) what `fit.gain` would be if it had ended at its state moved by `moves` (k, 3)."""
-        supports = self._points.supports(fit.theta, moves, SCALES[-1])
+        log_likelihood_gains = self._points.log_likelihood_gains(fit.theta, moves, SCALES[-1])
         moved = np.tile(fit.theta, (len(moves), 1))
         moved[:, POSE] += moves
-        return supports / fit.inflation - np.array([self._prior.objection(theta) for theta in moved])
+        return log_likelihood_gains / fit.inflation - np.array([self._prior.prior_cost(theta) for theta in moved])
 
     def world(self, theta: np.ndarray) -> np.ndarray:
         """Return the points (n, 2) in map when the state is `theta`."""
@@ -115,7 +121,7 @@ class Refiner:
         normal = self._points.normal(fit.theta, SCALES[-1])
         gain, _ = self._points.scale_gain(normal, fit.inflation)
         evidence = PointEvidence(
-            *self._points.evidence(normal, gain, fit.inflation), _clusters(normal.meeting.world),
+            *self._points.evidence(normal, gain, fit.inflation), _clusters(normal.correspondences.world),
             self._hidden_share(normal),
         )  # fmt: skip
         return residual_covariance(
@@ -131,11 +137,11 @@ class Refiner:
         A map of t scans averages the noise of its points, and the residuals show s^2 (1 + 1/t) per point. The error of
         the pose at which it was laid stays that of one scan, s^2: (1 - 1/t) of it are hidden.
         """
-        shares = self._points.map_share(normal.meeting.nearest)
-        return max(2.0 * float(np.average(shares, weights=normal.importance + _LEAST_IMPORTANCE)) - 1.0, 0.0)
+        shares = self._points.map_share(normal.correspondences.nearest)
+        return max(2.0 * float(np.average(shares, weights=normal.weight + _LEAST_WEIGHT)) - 1.0, 0.0)
 
     def _design_effect(self, normal: Normal) -> float:
-        cluster = _clusters(normal.meeting.world)
+        cluster = _clusters(normal.correspondences.world)
         sums = np.stack([np.bincount(cluster, weights=column) for column in normal.gradient.T], axis=1)
         whitening = np.linalg.inv(normal.information + self._prior.information)
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
@@ -146,8 +152,8 @@ class Refiner:
         inflation = self._design_effect(normal)
         covariance = np.linalg.inv(self._points.weighed(normal, inflation)[0] + self._prior.information)
         return Fit(
-            theta, covariance, support(normal, SCALES[-1]), inflation,
-            self._prior.objection(theta), normal.on_surface, normal.meeting.distances, iterations, converged,
+            theta, covariance, log_likelihood_gain(normal, SCALES[-1]), inflation,
+            self._prior.prior_cost(theta), normal.on_surface, normal.correspondences.distances, iterations, converged,
         )  # fmt: skip
 
 

@@ -8,18 +8,21 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.fit.distributions import LocalDistributions
-from mlsm_manager.matching.fit.robust import geman_mcclure, geman_mcclure_cost
-from mlsm_manager.matching.problem.scan_path import STATES, PlanarMotion
+from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import POSITION, STATES
 from node_support.geometry.planar import rotated
 
+# Standard deviations: of a planar Gaussian, 99 % lie within three.
 INLIER = 3.0
+# m per standard deviation of the kernel: no block of another surface within a gate of 6 m at first, 1.9 m at last.
 _GATE = 0.75
+# Points of a scan that can share one window of the map: a window of 2.5 m holds five of a wall on either side.
 _NEIGHBOURS = 12
 
 
 @dataclass(frozen=True)
-class Meeting:
-    """How points meet the map.
+class Correspondences:
+    """The block of the map that each point is compared with, and how far it lies from it.
 
     world: (n, 2) places in map. arms: (n, 2) m from the vehicle to them. nearest: (n,) their blocks, at `distances`
     (n,) m. metric: (n, 2, 2) inverse covariance. residual: (n, 2) m. squared: (n,) the residuals' squared Mahalanobis
@@ -39,27 +42,27 @@ class Meeting:
 class Normal:
     """Normal equations of the points at a state, where nothing is known of the ranges' scale but that it is 1.
 
-    gradient: (n, 8) of each point. jacobian: (n, 2, 8) derivative of each place. lever: (n, 2, 8) the same times the
-    weighted metric. pull: (n, 2) the arms, which are the derivative by the scale, times the weighted metric.
-    importance: (n,) what each point is worth before the robust kernel.
+    gradient: (n, 8) of each point. jacobian: (n, 2, 8) derivative of each place by the state. weighted_jacobian:
+    (n, 2, 8) the same times the weighted metric. weighted_arms: (n, 2) the derivative by the ranges' scale, which is
+    the arms, times the weighted metric. weight: (n,) of each point before the robust kernel.
     """
 
-    meeting: Meeting
+    correspondences: Correspondences
     gradient: np.ndarray
     jacobian: np.ndarray
-    lever: np.ndarray
-    pull: np.ndarray
-    importance: np.ndarray
+    weighted_jacobian: np.ndarray
+    weighted_arms: np.ndarray
+    weight: np.ndarray
 
     @cached_property
     def information(self) -> np.ndarray:
         """The points' information (8, 8) of the state."""
-        return np.tensordot(self.jacobian, self.lever, axes=([0, 1], [0, 1]))
+        return np.tensordot(self.jacobian, self.weighted_jacobian, axes=([0, 1], [0, 1]))
 
     @property
     def on_surface(self) -> np.ndarray:
         """(n,) bool: points that lie on a surface of the map."""
-        return (self.meeting.squared < INLIER**2) & (self.importance > 0.0)
+        return (self.correspondences.squared < INLIER**2) & (self.weight > 0.0)
 
 
 class PointEquations:
@@ -85,33 +88,34 @@ class PointEquations:
         spots = motion.points(motion.path(expected))
         self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
 
-    def meeting(self, theta: np.ndarray) -> Meeting:
-        """Return how the points meet the map when the state is `theta` (8,)."""
+    def correspondences(self, theta: np.ndarray) -> Correspondences:
+        """Return the correspondences of the points when the state is `theta` (8,)."""
         path = self._motion.path(theta)
         world = self._motion.points(path)
-        return self._meeting(world, self._motion.arms(world, path))
+        return self._correspondences(world, self._motion.arms(world, path))
 
     def normal(self, theta: np.ndarray, scale: float) -> Normal:
         """Return the normal equations at `theta` with a robust kernel of `scale` standard deviations."""
-        meeting = self.meeting(theta)
-        importance = self._importance(meeting, scale)
-        weighted = meeting.metric * (importance * geman_mcclure(meeting.squared, scale))[:, np.newaxis, np.newaxis]
-        jacobian = self._motion.point_jacobian(meeting.arms, theta)
-        lever = weighted @ jacobian
-        gradient = np.einsum("nas,na->ns", lever, meeting.residual)
-        pull = np.einsum("nab,nb->na", weighted, meeting.arms)
-        return Normal(meeting, gradient, jacobian, lever, pull, importance)
+        correspondences = self.correspondences(theta)
+        weight = self._weights(correspondences, scale)
+        robust = weight * geman_mcclure(correspondences.squared, scale)
+        weighted = correspondences.metric * robust[:, np.newaxis, np.newaxis]
+        jacobian = self._motion.point_jacobian(correspondences.arms, theta)
+        weighted_jacobian = weighted @ jacobian
+        gradient = np.einsum("nas,na->ns", weighted_jacobian, correspondences.residual)
+        weighted_arms = np.einsum("nab,nb->na", weighted, correspondences.arms)
+        return Normal(correspondences, gradient, jacobian, weighted_jacobian, weighted_arms, weight)
 
     def matched_shares(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
         """Return (k,) which share of the points lies on a surface when `theta` is moved by `moves` (k, 3)."""
-        meeting = self._moved(theta, moves)
-        matched = (meeting.squared < INLIER**2) & (meeting.distances < _GATE * scale)
+        correspondences = self._moved(theta, moves)
+        matched = (correspondences.squared < INLIER**2) & (correspondences.distances < _GATE * scale)
         return matched.reshape(len(moves), -1).mean(axis=1)
 
-    def supports(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
-        """Return (k,) by how many nats the points prefer `theta`, moved by `moves` (k, 3), to meeting nothing."""
-        meeting = self._moved(theta, moves)
-        each = self._importance(meeting, scale) * _saved(meeting.squared, scale)
+    def log_likelihood_gains(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+        """Return (k,) log-likelihood gain [nat] over no correspondences, when `theta` is moved by `moves` (k, 3)."""
+        correspondences = self._moved(theta, moves)
+        each = self._weights(correspondences, scale) * _saved(correspondences.squared, scale)
         return each.reshape(len(moves), -1).sum(axis=1)
 
     def weighed(self, normal: Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
@@ -122,10 +126,13 @@ class PointEquations:
 
     def scale_gain(self, normal: Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
         """Return (8,) how far the scale's error moves the state's gradient, and (8,) what they have in common."""
-        mixed = np.einsum("nas,na->s", normal.lever, normal.meeting.arms) / inflation
+        mixed = np.einsum("nas,na->s", normal.weighted_jacobian, normal.correspondences.arms) / inflation
         if self._range_scale_deviation == 0.0:
             return np.zeros_like(mixed), mixed
-        known = float((normal.pull * normal.meeting.arms).sum()) / inflation + self._range_scale_deviation**-2
+        known = (
+            float((normal.weighted_arms * normal.correspondences.arms).sum()) / inflation
+            + self._range_scale_deviation**-2
+        )
         return mixed / known, mixed
 
     def evidence(self, normal: Normal, gain: np.ndarray, inflation: float) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -134,20 +141,27 @@ class PointEquations:
         gain: (8,) as of scale_gain. All are 1 / `inflation` of what independent points would say; their sums are those
         of `weighed`.
         """
-        gradient, jacobian, lever, of_scale = normal.gradient, normal.jacobian, normal.lever, np.zeros((STATES, STATES))
+        gradient, jacobian, weighted_jacobian, of_scale = (
+            normal.gradient,
+            normal.jacobian,
+            normal.weighted_jacobian,
+            np.zeros((STATES, STATES)),
+        )
         if self._range_scale_deviation > 0.0:
             gradient = gradient - _scale_gradient(normal)[:, np.newaxis] * gain
-            jacobian = jacobian - normal.meeting.arms[:, :, np.newaxis] * gain
-            lever = lever - normal.pull[:, :, np.newaxis] * gain
+            jacobian = jacobian - normal.correspondences.arms[:, :, np.newaxis] * gain
+            weighted_jacobian = weighted_jacobian - normal.weighted_arms[:, :, np.newaxis] * gain
             of_scale = np.outer(gain, gain) / self._range_scale_deviation**2
-        return gradient / inflation, jacobian.transpose(0, 2, 1) @ lever / inflation, of_scale
+        return gradient / inflation, jacobian.transpose(0, 2, 1) @ weighted_jacobian / inflation, of_scale
 
     def gradient(self, theta: np.ndarray, scale: float, gain: np.ndarray) -> np.ndarray:
         """Return the gradient (8,) of all points at `theta`, less `gain` (8,) times that by the ranges' scale."""
-        meeting = self.meeting(theta)
-        weights = self._importance(meeting, scale) * geman_mcclure(meeting.squared, scale)
-        force = np.einsum("nab,nb->na", meeting.metric, meeting.residual) * weights[:, np.newaxis]
-        return self._motion.gradient_of(force, meeting.arms, theta) - gain * float((force * meeting.arms).sum())
+        correspondences = self.correspondences(theta)
+        weights = self._weights(correspondences, scale) * geman_mcclure(correspondences.squared, scale)
+        force = np.einsum("nab,nb->na", correspondences.metric, correspondences.residual) * weights[:, np.newaxis]
+        return self._motion.gradient_of(force, correspondences.arms, theta) - gain * float(
+            (force * correspondences.arms).sum()
+        )
 
     def map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return the share of the points' information that is left after the map's own noise.
@@ -158,34 +172,36 @@ class PointEquations:
         """
         window = self._target.window[nearest][:, np.newaxis]
         apart = np.tile(self._apart, (len(nearest) // len(self._apart), 1))
-        scan_support = np.exp(-0.5 * (apart / window) ** 2).sum(axis=1)
-        map_support = self._target.support[nearest]
-        return map_support / (map_support + scan_support)
+        scan_points = np.exp(-0.5 * (apart / window) ** 2).sum(axis=1)
+        map_points = self._target.point_count[nearest]
+        return map_points / (map_points + scan_points)
 
-    def _moved(self, theta: np.ndarray, moves: np.ndarray) -> Meeting:
-        """Return how the points meet the map when the pose is moved by `moves` (k, 3): k times n points in a row."""
+    def _moved(self, theta: np.ndarray, moves: np.ndarray) -> Correspondences:
+        """Return the correspondences when the pose is moved by `moves` (k, 3): of k times n points in a row."""
         path = self._motion.path(theta)
         world = self._motion.points(path)
         turn = moves[:, np.newaxis, 2]
-        turned = rotated(world - theta[:2], turn) + theta[:2] + moves[:, np.newaxis, :2]
-        return self._meeting(turned.reshape(-1, 2), rotated(self._motion.arms(world, path), turn).reshape(-1, 2))
+        turned = rotated(world - theta[POSITION], turn) + theta[POSITION] + moves[:, np.newaxis, :2]
+        return self._correspondences(
+            turned.reshape(-1, 2), rotated(self._motion.arms(world, path), turn).reshape(-1, 2)
+        )
 
-    def _meeting(self, world: np.ndarray, arms: np.ndarray) -> Meeting:
+    def _correspondences(self, world: np.ndarray, arms: np.ndarray) -> Correspondences:
         distances, nearest = self._target.nearest(world)
         residual = world - self._target.mean[nearest]
         metric = _inverse(self._target.covariance[nearest] + self._motion.point_covariance(arms))
         squared = np.einsum("na,nab,nb->n", residual, metric, residual)
-        return Meeting(world, arms, nearest, distances, metric, residual, squared)
+        return Correspondences(world, arms, nearest, distances, metric, residual, squared)
 
-    def _importance(self, meeting: Meeting, scale: float) -> np.ndarray:
-        places = len(meeting.nearest) // len(self._point_weights)
-        share = self._target.weight[meeting.nearest] * self.map_share(meeting.nearest)
-        return np.tile(self._point_weights, places) * share * (meeting.distances < _GATE * scale)
+    def _weights(self, correspondences: Correspondences, scale: float) -> np.ndarray:
+        places = len(correspondences.nearest) // len(self._point_weights)
+        share = self._target.weight[correspondences.nearest] * self.map_share(correspondences.nearest)
+        return np.tile(self._point_weights, places) * share * (correspondences.distances < _GATE * scale)
 
 
-def support(normal: Normal, scale: float) -> float:
-    """Return by how many nats the points prefer this place to one where they meet nothing."""
-    return float((normal.importance * _saved(normal.meeting.squared, scale)).sum())
+def log_likelihood_gain(normal: Normal, scale: float) -> float:
+    """Return the log-likelihood gain [nat] over no correspondences."""
+    return float((normal.weight * _saved(normal.correspondences.squared, scale)).sum())
 
 
 def _saved(squared: np.ndarray, scale: float) -> np.ndarray:
@@ -193,7 +209,7 @@ def _saved(squared: np.ndarray, scale: float) -> np.ndarray:
 
 
 def _scale_gradient(normal: Normal) -> np.ndarray:
-    return (normal.pull * normal.meeting.residual).sum(axis=1)
+    return (normal.weighted_arms * normal.correspondences.residual).sum(axis=1)
 
 
 def _inverse(matrices: np.ndarray) -> np.ndarray:
@@ -203,3 +219,16 @@ def _inverse(matrices: np.ndarray) -> np.ndarray:
     result[:, 0, 0], result[:, 1, 1] = d, a
     result[:, 0, 1] = result[:, 1, 0] = -b
     return result / (a * d - b * b)[:, np.newaxis, np.newaxis]
+
+
+def geman_mcclure(squared: np.ndarray, scale: float) -> np.ndarray:
+    """Return Gauss-Newton weights (n,) of squared normalised residuals (n,): 1 at 0, 1/4 at `scale`, towards 0.
+
+    Geman and McClure (1985).
+    """
+    return (1.0 + squared / scale**2) ** -2
+
+
+def geman_mcclure_cost(squared: np.ndarray, scale: float) -> np.ndarray:
+    """Return costs (n,) whose slope the weights are: half the square near 0, never above half of `scale` squared."""
+    return 0.5 * squared / (1.0 + squared / scale**2)

@@ -5,10 +5,10 @@ each point is given serves to weigh the points, not to say how far off the fix i
 in the scan at hand:
 
 - noise: the sums of the gradients over clusters of neighbouring points, which err alike. A fit makes the residuals of
-  what it leans on too small; each cluster is corrected by its own leverage (Bell and McCaffrey 2002, "CR2"). A place
-  may hang on one small object: what few clusters say of a direction is drawn to what the points say of it one by one,
-  times by how much clusters vary more than points everywhere; and what few points say to what all say. It is never
-  less than a tenth of the points' deviations, about a centimetre: no map of cells is finer.
+  what it leans on too small; each cluster is corrected by its own leverage (Bell and McCaffrey 2002, "CR2"). Where few
+  clusters tell of a direction, their estimate is shrunk towards that of the single points, scaled by how much more
+  clusters vary than points in all directions; where few points do, theirs is shrunk towards that of all points. It is
+  never less than a tenth of the points' deviations, about a centimetre: no map of cells is finer.
 - curvature: how the gradient changes over the two standard deviations in which the fit may lie. A point that is moved
   meets another block, so that this is less than the points' information.
 - the map: its points were laid by a scan like this one, with the error of that scan's pose, which all of them share.
@@ -22,14 +22,20 @@ from typing import Callable, Tuple
 import numpy as np
 from scipy.linalg import eigh
 
-from mlsm_manager.matching.problem.scan_path import POSE, STATES
+from mlsm_manager.matching.problem.state import POSE, STATES
 
+# CR2 divides by the root of one minus the leverage, which must not vanish.
 _GREATEST_LEVERAGE = 0.95
+# Square of a tenth: noise is never less than that of the points' deviations, see above.
 _LEAST_SCALE = 0.01
+# A gradient that hardly changes is a matter of few neighbours: it inflates a deviation ten times at most.
 _LEAST_CURVATURE = 0.1
+# Standard deviations to either side over which the gradient is differenced.
 _SPAN = 2.0
 _LEAST_SPAN = 0.1
+# Share of all information: keeps a matrix invertible where no point tells anything.
 _LEAST_INFORMATION = 1e-6
+# Share of the information: where the prior tells more, the points' curvature is noise.
 _TOLD_BY_PRIOR = 0.95
 Gradient = Callable[[np.ndarray], np.ndarray]
 """From a state (8,) to the gradient (8,) of all points."""
@@ -101,21 +107,21 @@ def _noise(basis: _Basis, points: PointEvidence) -> Tuple[np.ndarray, float]:
     leverage = basis.vectors.T @ points.information @ basis.vectors
     single = gradient + np.einsum("nab,nb->na", leverage, gradient) / 2.0
     single_scale = max(_mean_scale(basis, single), _LEAST_SCALE)
-    of_points = _drawn(single_scale * np.diag(basis.share), single, leverage)
+    of_points = _shrunk(single_scale * np.diag(basis.share), single, leverage)
     leverage = points.summed(leverage)
     values, vectors = np.linalg.eigh(leverage)
     stretch = (1.0 - np.clip(values, 0.0, _GREATEST_LEVERAGE)) ** -0.5
     sums = np.einsum("kab,kb,kcb,kc->ka", vectors, stretch, vectors, points.summed(gradient), optimize=True)
     scale = max(_mean_scale(basis, sums), single_scale)
-    return _drawn(of_points * scale / single_scale, sums, leverage), scale
+    return _shrunk(of_points * scale / single_scale, sums, leverage), scale
 
 
 def _mean_scale(basis: _Basis, gradients: np.ndarray) -> float:
     return float((gradients**2).sum() / max(basis.share.sum(), 1e-9))
 
 
-def _drawn(expected: np.ndarray, gradients: np.ndarray, leverage: np.ndarray) -> np.ndarray:
-    """Return (8, 8) what the `gradients` (k, 8) vary by, drawn to what is `expected` (8, 8) where few tell.
+def _shrunk(expected: np.ndarray, gradients: np.ndarray, leverage: np.ndarray) -> np.ndarray:
+    """Return (8, 8) what the `gradients` (k, 8) vary by, shrunk towards what is `expected` (8, 8) where few tell.
 
     leverage: (k, 8, 8). As many of them as there are states count half.
     """

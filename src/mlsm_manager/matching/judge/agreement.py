@@ -11,9 +11,13 @@ from typing import Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+# About a beam's width each.
 _DIRECTIONS = 128
+# The farthest tenth of the echoes is chance: what lies beyond the others need not be heard.
 _REACH_QUANTILE = 0.9
+# m beyond the farthest echo that the map counts as known.
 _BEYOND = 2.0
+# m, and rad as seen from the sonar (a beam's width): an echo nearer to a block than both is of that block.
 _NEAR_DISTANCE = 1.0
 _NEAR_ANGLE = 0.04
 

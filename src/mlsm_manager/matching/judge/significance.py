@@ -8,9 +8,13 @@ from typing import Callable
 
 import numpy as np
 
+# Other places: with 48 the standard deviation of their shares is known to a tenth.
 _PLACES = 48
+# m: beyond what a wall is thick, within what a scan sees.
 _SHIFT = 8.0
+# Of a share of 150 echoes: three of them.
 _LEAST_DEVIATION = 0.02
+# m: nearer places are the same fit; farther ones than 10 m no beam of a scan confuses.
 _LEAST_SHIFT = 1.5
 _GREATEST_SHIFT = 10.0
 _SHIFT_STEP = 0.5

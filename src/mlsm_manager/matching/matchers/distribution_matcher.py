@@ -13,19 +13,28 @@ from mlsm_manager.matching.judge.significance import lead_along, significance
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.matching.problem.scan_path import MOTION, POSE, RATE, STATES, PlanarMotion
+from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW
 from mlsm_manager.matching.search.correlative_search import YAW_STEP, SearchWindow, search, separation
 from mlsm_manager.matching.search.score_field import ScoreField
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import wrapped
 
+# Standard deviations of the prior that the search covers.
 _WINDOW_DEVIATIONS = 3.0
-_OBJECTION_SHARE = 0.01
+# Of a score from 0 to 1 per squared standard deviation of the prior: echoes that travel with the vehicle cannot win.
+_PRIOR_COST_SHARE = 0.01
+# Errors of the yaw rate that are tried: the next one costs a ninth more time.
 _MOST_RATES = 9
+# Keeps the covariance of a prior with fixed states invertible.
 _LEAST_VARIANCE = 1e-12
+# Width of the field in search cells: a basin reaches over the nearest grid poses.
 _FIELD_CELLS = 2.0
+# m: neighbours that make the distributions at the edge of the reach.
 _MARGIN = 15.0
+# Of what keeps two candidates of the search apart.
 _APART = 0.5
+# Standard deviations at which a covariance claims to exclude a place.
 _EXCLUDED = 4.0
 
 
@@ -63,54 +72,54 @@ class DistributionMatcher:
         field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
         pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
         found = search(
-            motion, weights, field, state.mean, window, _OBJECTION_SHARE * pose_information, parameters.candidates
+            motion, weights, field, state.mean, window, _PRIOR_COST_SHARE * pose_information, parameters.candidates
         )
         refiner = Refiner(motion, weights, LocalDistributions(target), state, parameters.range_scale_deviation)
         fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
-        inflation = max(fits, key=lambda fit: fit.support).inflation
+        inflation = max(fits, key=lambda fit: fit.log_likelihood_gain).inflation
         return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
 
     def _window(self, motion: PlanarMotion, state: PriorState) -> SearchWindow:
         deviations = _WINDOW_DEVIATIONS * np.sqrt(np.diag(np.linalg.inv(state.information)))
         seconds = max(motion.beam_times[-1] - motion.beam_times[0], 1e-3)
         step = 2.0 * YAW_STEP / seconds
-        rates = min(int(np.ceil(deviations[5] / step - 0.5)), _MOST_RATES // 2)
+        rates = min(int(np.ceil(deviations[RATE_YAW] / step - 0.5)), _MOST_RATES // 2)
         return SearchWindow(
-            distance=min(float(deviations[:2].max()), self.parameters.search_distance),
-            angle=min(float(deviations[2]), self.parameters.search_angle),
+            distance=min(float(deviations[POSITION].max()), self.parameters.search_distance),
+            angle=min(float(deviations[YAW]), self.parameters.search_angle),
             yaw_rates=np.arange(-rates, rates + 1) * step,
         )
 
     def _judge(self, best: Fit, refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
         parameters = self.parameters
         if not best.converged:
-            return MatchStatus.DIVERGED, f"no end after {best.iterations} iterations"
+            return MatchStatus.DIVERGED, f"not converged after {best.iterations} iterations"
         used = int(np.count_nonzero(best.inliers))
         if used < parameters.min_points:
             return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {parameters.min_points} or more"
         certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
         if certainty < parameters.min_significance:
             return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
-        jump = float(np.sqrt(2.0 * state.objection(best.theta)))
+        jump = float(np.sqrt(2.0 * state.prior_cost(best.theta)))
         if jump > parameters.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
-        agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[:2], target.mean[:, :2])
+        agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[POSITION], target.mean[:, :2])
         if agreed < parameters.min_agreement:
-            return MatchStatus.DIVERGED, f"scan and map agree by {agreed:.2f} only, another place perhaps"
+            return MatchStatus.DIVERGED, f"scan and map agree by only {agreed:.2f}: perhaps another place"
         return self._judge_certainty(best)
 
     def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
         parameters = self.parameters
-        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[:2, :2])[-1]))
+        position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[POSITION, POSITION])[-1]))
         if position > parameters.max_position_deviation:
-            return MatchStatus.AMBIGUOUS, f"standard deviation {position:.2f} m in the worst direction"
-        yaw = float(np.sqrt(best.covariance[2, 2]))
+            return MatchStatus.AMBIGUOUS, f"standard deviation of {position:.2f} m in the least certain direction"
+        yaw = float(np.sqrt(best.covariance[YAW, YAW]))
         if yaw > parameters.max_yaw_deviation:
-            return MatchStatus.AMBIGUOUS, f"standard deviation {yaw:.3f} rad of the heading"
+            return MatchStatus.AMBIGUOUS, f"heading has a standard deviation of {yaw:.3f} rad"
         return MatchStatus.CONVERGED, ""
 
     def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
-        """Refuse a fix whose covariance excludes a place that fits nearly as well."""
+        """Reject a fix whose covariance excludes a pose that fits nearly as well."""
         least = self.parameters.min_gain_over_second
         if least == 0.0:
             return MatchStatus.CONVERGED, ""
@@ -118,30 +127,33 @@ class DistributionMatcher:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
                 return MatchStatus.AMBIGUOUS, f"the second-best pose is only {lead:.1f} nats worse"
-        values, vectors = np.linalg.eigh(best.covariance[:2, :2])
+        values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
-            return MatchStatus.AMBIGUOUS, f"a pose beside it, in the worst direction, is only {lead:.1f} nats worse"
+            return (
+                MatchStatus.AMBIGUOUS,
+                f"a pose beside it, in the least certain direction, is only {lead:.1f} nats worse",
+            )
         return MatchStatus.CONVERGED, ""
 
 
 def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
-    """Return the blocks that points of the scan can meet: a match takes no longer in the map of a whole survey."""
-    offsets = motion.points(motion.path(state.mean)) - state.mean[:2]
+    """Return the blocks within reach of the scan, so that the time of a match does not grow with the map."""
+    offsets = motion.points(motion.path(state.mean)) - state.mean[POSITION]
     reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
-    distances = np.linalg.norm(target.mean[:, :2] - state.mean[:2], axis=1)
+    distances = np.linalg.norm(target.mean[:, :2] - state.mean[POSITION], axis=1)
     return Blocks(target.rows[distances < reach], target.resolution)
 
 
 def _excluded(fit: Fit, theta: np.ndarray) -> bool:
     difference = (theta - fit.theta)[POSE]
-    difference[2] = wrapped(difference[2])
+    difference[YAW] = wrapped(difference[YAW])
     return bool(difference @ np.linalg.solve(fit.covariance[POSE, POSE], difference) > _EXCLUDED**2)
 
 
 def prior_state(prior: Prior, scan: Scan) -> PriorState:
-    """Return the prior over the eight states of planar_motion; states without variance are held."""
+    """Return the prior over the eight states of scan_path; states without variance are fixed."""
     covariance = prior.covariance + _LEAST_VARIANCE * np.eye(STATES)
     mean = np.concatenate([prior.pose(scan), prior.rate, prior.motion])
     return PriorState(mean, np.linalg.inv(covariance))

@@ -1,14 +1,26 @@
-"""The table of matchers; a new one is one line here."""
+"""What a matcher is, and the table of those there are; a new one is one line here."""
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Callable, Dict, Type
+from typing import Callable, Dict, Protocol, Type
 
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.matcher import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters, SegmentsMatcherParameters
 from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
+from mlsm_manager.matching.problem.result import MatchResult, Prior
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.blocks import Blocks
 from node_support.parameters import ParameterSet
+
+
+class Matcher(Protocol):
+    """Finds where a scan lies among blocks."""
+
+    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+        """Return where the scan was taken; never raises for a scan or a target that cannot be matched.
+
+        `target` holds the blocks around the vehicle in map; a matcher may leave out those beyond the scan's reach.
+        """
 
 
 class MatcherName(Enum):

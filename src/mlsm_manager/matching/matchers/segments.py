@@ -9,6 +9,7 @@ from typing import List, Tuple
 
 import numpy as np
 
+# Two times always lie on a line, and show no error of it.
 _FEWEST_TIMES = 3
 
 

@@ -17,6 +17,7 @@ from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import composed, transformed, wrapped
 
+# The same as a line through times needs.
 _FEWEST_POINTS = 3
 
 

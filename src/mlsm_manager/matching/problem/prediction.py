@@ -8,11 +8,29 @@ import numpy as np
 
 from mlsm_manager.matching.problem.result import Prior
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.scan_path import MOTION, POSE, RATE, STATES
+from mlsm_manager.matching.problem.state import (
+    DIRECTION,
+    ERRORS,
+    MOTION,
+    POSE,
+    POSITION,
+    RATE,
+    RATE_X,
+    RATE_XY,
+    RATE_Y,
+    RATE_YAW,
+    SCALE,
+    STATES,
+    YAW,
+    X,
+    Y,
+)
 from node_support.geometry.planar import composed, inverse, rotated, wrapped
 from node_support.parameters import ParameterSet, parameter
 
+# Times at which the odometry is read between two scans, about one a second.
 _NODES = 17
+# Of each state, for differences: small against a bend of the path, large against rounding.
 _DIFFERENCE = 1e-6
 
 
@@ -59,7 +77,7 @@ class OdometryErrors(ParameterSet):
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known at a time. theta: (8,) [pose, rate, motion] as in planar_motion. covariance: (8, 8)."""
+    """What is known at a time. theta: (8,) [pose, rate, motion] as in scan_path. covariance: (8, 8)."""
 
     time: float
     theta: np.ndarray
@@ -83,13 +101,13 @@ def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors)
     return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
 
 
-def held_to_heading(belief: Belief, heading: float, deviation: float) -> Belief:
+def updated_by_heading(belief: Belief, heading: float, deviation: float) -> Belief:
     """Return the belief after a compass said `heading` [rad] with standard `deviation`; 0 stands for no compass."""
     if deviation == 0.0:
         return belief
-    gain = belief.covariance[:, 2] / (belief.covariance[2, 2] + deviation**2)
-    theta = belief.theta + gain * float(wrapped(heading - belief.theta[2]))
-    return Belief(belief.time, theta, belief.covariance - np.outer(gain, belief.covariance[2]))
+    gain = belief.covariance[:, YAW] / (belief.covariance[YAW, YAW] + deviation**2)
+    theta = belief.theta + gain * float(wrapped(heading - belief.theta[YAW]))
+    return Belief(belief.time, theta, belief.covariance - np.outer(gain, belief.covariance[YAW]))
 
 
 def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
@@ -105,11 +123,11 @@ def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarr
     relative = composed(inverse(poses[0]), poses)
     middle = (nodes[1:] + nodes[:-1]) / 2.0 - start
     heading = (relative[1:, 2] + relative[:-1, 2]) / 2.0
-    steps = (1.0 + theta[6]) * rotated(np.diff(relative[:, :2], axis=0), theta[7])
-    steps = steps + np.diff(nodes)[:, np.newaxis] * rotated(np.broadcast_to(theta[3:5], (len(times), 2)), heading)
-    shifts = np.cumsum(rotated(steps, theta[5] * middle), axis=0)
-    position = theta[:2] + rotated(shifts, theta[2])
-    return np.column_stack([position, theta[2] + relative[1:, 2] + theta[5] * (times - start)])
+    steps = (1.0 + theta[SCALE]) * rotated(np.diff(relative[:, :2], axis=0), theta[DIRECTION])
+    steps = steps + np.diff(nodes)[:, np.newaxis] * rotated(np.broadcast_to(theta[RATE_XY], (len(times), 2)), heading)
+    shifts = np.cumsum(rotated(steps, theta[RATE_YAW] * middle), axis=0)
+    position = theta[POSITION] + rotated(shifts, theta[YAW])
+    return np.column_stack([position, theta[YAW] + relative[1:, 2] + theta[RATE_YAW] * (times - start)])
 
 
 def advanced(theta: np.ndarray, seconds: float, before: np.ndarray, after: np.ndarray) -> np.ndarray:
@@ -118,12 +136,12 @@ def advanced(theta: np.ndarray, seconds: float, before: np.ndarray, after: np.nd
     The same in plain numbers, for whoever follows every message of the odometry.
     """
     turned = math.remainder(after[2] - before[2], math.tau)
-    step_x, step_y = _turned(after[0] - before[0], after[1] - before[1], theta[7] - before[2])
-    rate_x, rate_y = _turned(theta[3], theta[4], turned / 2.0)
-    along = (1.0 + theta[6]) * step_x + seconds * rate_x
-    aside = (1.0 + theta[6]) * step_y + seconds * rate_y
-    x, y = _turned(along, aside, theta[2] + theta[5] * seconds / 2.0)
-    return np.array([theta[0] + x, theta[1] + y, theta[2] + turned + theta[5] * seconds])
+    step_x, step_y = _turned(after[0] - before[0], after[1] - before[1], theta[DIRECTION] - before[2])
+    rate_x, rate_y = _turned(theta[RATE_X], theta[RATE_Y], turned / 2.0)
+    along = (1.0 + theta[SCALE]) * step_x + seconds * rate_x
+    aside = (1.0 + theta[SCALE]) * step_y + seconds * rate_y
+    x, y = _turned(along, aside, theta[YAW] + theta[RATE_YAW] * seconds / 2.0)
+    return np.array([theta[X] + x, theta[Y] + y, theta[YAW] + turned + theta[RATE_YAW] * seconds])
 
 
 def _turned(x: float, y: float, angle: float) -> Tuple[float, float]:
@@ -133,4 +151,4 @@ def _turned(x: float, y: float, angle: float) -> Tuple[float, float]:
 
 def _advanced(theta: np.ndarray, start: float, track: Track, end: float) -> np.ndarray:
     times = np.linspace(start, end, _NODES)[1:]
-    return np.concatenate([advanced_path(theta, start, track, times)[-1], theta[3:]])
+    return np.concatenate([advanced_path(theta, start, track, times)[-1], theta[ERRORS]])

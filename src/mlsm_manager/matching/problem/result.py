@@ -6,7 +6,7 @@ from enum import Enum
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
-from node_support.geometry.planar import composed, inverse, wrapped
+from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 
 class MatchStatus(Enum):
@@ -29,7 +29,7 @@ class Prior:
     motion: (2,) relative error of the distances that the odometry reports, and error of their direction [rad]:
         the vehicle went 1 + motion[0] times as far, turned by motion[1] counter-clockwise.
     covariance: (8, 8) of [pose, rate, motion]; pose: x y [m] in map, yaw [rad] of base_link at the reference time.
-        A state without variance is held.
+        A state without variance is fixed.
     """
 
     correction: np.ndarray
@@ -80,3 +80,9 @@ class MatchResult:
         correction = composed(self.pose, inverse(scan.reference_pose))
         correction[2] = wrapped(correction[2])
         return correction
+
+
+def corrected_points(scan: Scan, result: MatchResult) -> np.ndarray:
+    """Return (n, 4) points in map: each taken from the odometry's pose to the matched pose at its own beam's time."""
+    path = np.stack([np.interp(scan.times, result.beam_times, column) for column in result.beam_poses.T], axis=-1)
+    return transformed(composed(path, inverse(scan.track.at(scan.times))), scan.points)

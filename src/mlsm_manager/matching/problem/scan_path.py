@@ -21,13 +21,23 @@ from typing import Tuple
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.state import (
+    DIRECTION,
+    POSITION,
+    RATE,
+    RATE_X,
+    RATE_XY,
+    RATE_Y,
+    RATE_YAW,
+    SCALE,
+    STATES,
+    YAW,
+    X,
+    Y,
+)
 from node_support.geometry.planar import composed, inverse, rotated
 
-POSE = slice(0, 3)
-RATE = slice(3, 6)
-MOTION = slice(6, 8)
-ERRORS = slice(3, 8)
-STATES = 8
+# Two a second in a turn of 16 s, where a scan has fewer echoes than that.
 _LEAST_NODES = 33
 
 
@@ -58,8 +68,8 @@ class PlanarMotion:
         """Return T_map_base (b, 3) at the beam times."""
         turn, by_odometry, by_rate = self._steps(theta)
         offsets = _sum_to_end(rotated(by_odometry + by_rate, turn))
-        position = theta[:2] + rotated(offsets, theta[2])
-        return np.column_stack([position, theta[2] + self._heading + theta[5] * self._tau])
+        position = theta[POSITION] + rotated(offsets, theta[YAW])
+        return np.column_stack([position, theta[YAW] + self._heading + theta[RATE_YAW] * self._tau])
 
     def jacobian(self, theta: np.ndarray) -> np.ndarray:
         """Return the derivative (b, 3, 8) of `path`."""
@@ -67,21 +77,21 @@ class PlanarMotion:
         middle = (self._tau[1:] + self._tau[:-1]) / 2.0
         steps = rotated(by_odometry + by_rate, turn)
         along = self._seconds[:, np.newaxis] * _unit(turn + self._middle_heading())
-        scaled = rotated(self._step, turn + theta[7])
+        scaled = rotated(self._step, turn + theta[DIRECTION])
         columns = {
-            2: steps,
-            3: along,
-            4: _quarter_turn(along),
-            5: middle[:, np.newaxis] * _quarter_turn(steps),
-            6: scaled,
-            7: (1.0 + theta[6]) * _quarter_turn(scaled),
+            YAW: steps,
+            RATE_X: along,
+            RATE_Y: _quarter_turn(along),
+            RATE_YAW: middle[:, np.newaxis] * _quarter_turn(steps),
+            SCALE: scaled,
+            DIRECTION: (1.0 + theta[SCALE]) * _quarter_turn(scaled),
         }
         result = np.zeros((len(self.beam_times), 3, STATES))
         for column, change in columns.items():
-            result[:, :2, column] = rotated(_sum_to_end(change), theta[2])
-        result[:, :2, 2] = _quarter_turn(result[:, :2, 2])
-        result[:, 0, 0] = result[:, 1, 1] = result[:, 2, 2] = 1.0
-        result[:, 2, 5] = self._tau
+            result[:, POSITION, column] = rotated(_sum_to_end(change), theta[YAW])
+        result[:, POSITION, YAW] = _quarter_turn(result[:, POSITION, YAW])
+        result[:, X, X] = result[:, Y, Y] = result[:, YAW, YAW] = 1.0
+        result[:, YAW, RATE_YAW] = self._tau
         return result
 
     def points(self, path: np.ndarray) -> np.ndarray:
@@ -97,7 +107,7 @@ class PlanarMotion:
         """Return the derivative (n, 2, 8) of `points` by the state; `arms` are those of `theta`."""
         jacobian = self.jacobian(theta)
         across = _quarter_turn(arms)
-        return jacobian[self.beam, :2] + across[:, :, np.newaxis] * jacobian[self.beam, 2][:, np.newaxis, :]
+        return jacobian[self.beam, POSITION] + across[:, :, np.newaxis] * jacobian[self.beam, YAW][:, np.newaxis, :]
 
     def gradient_of(self, force: np.ndarray, arms: np.ndarray, theta: np.ndarray) -> np.ndarray:
         """Return the (8,) sum over the points of `force` (n, 2) times the derivative of their places by the state.
@@ -116,22 +126,22 @@ class PlanarMotion:
 
     def velocity(self, theta: np.ndarray) -> np.ndarray:
         """Return the (3,) body velocity at the reference time."""
-        linear = (1.0 + theta[6]) * rotated(self._velocity[:2], theta[7]) + theta[3:5]
-        return np.append(linear, self._velocity[2] + theta[5])
+        linear = (1.0 + theta[SCALE]) * rotated(self._velocity[:2], theta[DIRECTION]) + theta[RATE_XY]
+        return np.append(linear, self._velocity[2] + theta[RATE_YAW])
 
     def velocity_jacobian(self, theta: np.ndarray) -> np.ndarray:
         """Return the derivative (3, 8) of `velocity`."""
         result = np.zeros((3, STATES))
         result[:, RATE] = np.eye(3)
-        turned = rotated(self._velocity[:2], theta[7])
-        result[:2, 6] = turned
-        result[:2, 7] = (1.0 + theta[6]) * _quarter_turn(turned)
+        turned = rotated(self._velocity[:2], theta[DIRECTION])
+        result[POSITION, SCALE] = turned
+        result[POSITION, DIRECTION] = (1.0 + theta[SCALE]) * _quarter_turn(turned)
         return result
 
     def _steps(self, theta: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        turn = theta[5] * (self._tau[1:] + self._tau[:-1]) / 2.0
-        by_odometry = (1.0 + theta[6]) * rotated(self._step, theta[7])
-        by_rate = self._seconds[:, np.newaxis] * rotated(theta[3:5], self._middle_heading())
+        turn = theta[RATE_YAW] * (self._tau[1:] + self._tau[:-1]) / 2.0
+        by_odometry = (1.0 + theta[SCALE]) * rotated(self._step, theta[DIRECTION])
+        by_rate = self._seconds[:, np.newaxis] * rotated(theta[RATE_XY], self._middle_heading())
         return turn, by_odometry, by_rate
 
     def _middle_heading(self) -> np.ndarray:

@@ -6,11 +6,15 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.matching.problem.scan_path import PlanarMotion
+from mlsm_manager.matching.problem.state import POSE, POSITION, RATE_YAW, YAW
 from mlsm_manager.matching.search.score_field import ScoreField
 from node_support.geometry.planar import rotated, wrapped
 
+# rad: a point 20 m away moves by two search cells of 0.5 m.
 YAW_STEP = np.radians(2.75)
+# A scan has about 150 echoes; a dense one is thinned, so that it takes no longer.
 _MOST_POINTS = 160
+# m and rad: nearer candidates end in the same fit.
 _APART = 2.0
 _APART_YAW = np.radians(8.0)
 
@@ -29,7 +33,7 @@ class SearchWindow:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A state (8,) as in planar_motion, and its score, 0 to 1, less the prior's objection."""
+    """A state (8,) as in scan_path, and its score, 0 to 1, less the prior's cost."""
 
     theta: np.ndarray
     score: float
@@ -55,15 +59,15 @@ def search(
     steps = int(np.ceil(window.angle / YAW_STEP))
     yaws = np.arange(-steps, steps + 1) * YAW_STEP
     offsets = np.arange(-reach, reach + 1) * field.cell
-    objection = _objections(offsets, yaws, penalty)
+    prior_cost = _prior_costs(offsets, yaws, penalty)
     scores = np.empty((len(window.yaw_rates), len(yaws), len(offsets), len(offsets)), dtype=np.float32)
     for number, rate in enumerate(window.yaw_rates):
         theta = center.copy()
-        theta[5] += rate
-        arms = motion.points(motion.path(theta))[chosen] - center[:2]
+        theta[RATE_YAW] += rate
+        arms = motion.points(motion.path(theta))[chosen] - center[POSITION]
         for index, yaw in enumerate(yaws):
-            points = center[:2] + rotated(arms, yaw)
-            scores[number, index] = field.shifted_sums(points, weights, reach) - objection[index]
+            points = center[POSITION] + rotated(arms, yaw)
+            scores[number, index] = field.shifted_sums(points, weights, reach) - prior_cost[index]
     return _peaks(scores, center, window.yaw_rates, yaws, offsets, count)
 
 
@@ -71,7 +75,7 @@ def _thinned(count: int) -> np.ndarray:
     return np.unique(np.linspace(0, count - 1, min(count, _MOST_POINTS)).astype(np.int64))
 
 
-def _objections(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> np.ndarray:
+def _prior_costs(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> np.ndarray:
     yaw, y, x = np.meshgrid(yaws, offsets, offsets, indexing="ij")
     difference = np.stack([x, y, yaw], axis=-1)
     return np.einsum("...a,ab,...b->...", difference, penalty, difference).astype(np.float32)
@@ -88,8 +92,8 @@ def _peaks(
         if not np.isfinite(best[index]):
             break
         theta = np.array(center, dtype=np.float64)
-        theta[:3] += offsets[index[2]], offsets[index[1]], yaws[index[0]]
-        theta[5] += rates[best_rate[index]]
+        theta[POSE] += offsets[index[2]], offsets[index[1]], yaws[index[0]]
+        theta[RATE_YAW] += rates[best_rate[index]]
         found.append(Candidate(theta, float(best[index])))
         _clear_around(best, index, yaws, offsets)
     return found
@@ -103,5 +107,5 @@ def _clear_around(best: np.ndarray, index: tuple, yaws: np.ndarray, offsets: np.
 
 def separation(first: np.ndarray, second: np.ndarray) -> float:
     """Return how far apart two states are: 1 where they differ by what keeps two candidates apart."""
-    distance = np.hypot(*(first[:2] - second[:2])) / _APART
-    return float(max(distance, abs(float(wrapped(first[2] - second[2]))) / _APART_YAW))
+    distance = np.hypot(*(first[POSITION] - second[POSITION])) / _APART
+    return float(max(distance, abs(float(wrapped(first[YAW] - second[YAW]))) / _APART_YAW))

@@ -7,6 +7,7 @@ from scipy.ndimage import gaussian_filter
 
 from mlsm_manager.surface_map.blocks import Blocks
 
+# Times the field's width: what is as dense over four widths is clutter.
 _BROAD = 4.0
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.offline.echo_shape import EchoForm, echo_form_of, suited
+from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from sonar_processing.beams.beam import Beam
 from sonar_processing.filters.echo_extraction import ExtractionMode
@@ -15,22 +15,22 @@ def beams(strengths):
 
 @pytest.mark.parametrize("strongest", [1, 127, 255])
 def test_strengths_that_say_something_or_nothing_are_plateaus(strongest):
-    assert echo_form_of(beams([0, 0, strongest, strongest, strongest, 0])) is EchoForm.PLATEAU
+    assert echo_shape_of(beams([0, 0, strongest, strongest, strongest, 0])) is EchoShape.PLATEAU
 
 
 def test_strengths_that_differ_are_peaks():
-    assert echo_form_of(beams([0, 3, 60, 127, 127, 80, 5, 0])) is EchoForm.PEAK
+    assert echo_shape_of(beams([0, 3, 60, 127, 127, 80, 5, 0])) is EchoShape.PEAK
 
 
 def test_a_recording_of_silence_has_no_plateaus():
-    assert echo_form_of(beams([0, 0, 0])) is EchoForm.PEAK
+    assert echo_shape_of(beams([0, 0, 0])) is EchoShape.PEAK
 
 
 def test_plateaus_are_taken_where_they_begin_and_matched_coarsely():
-    parameters = suited(ReplayParameters(), EchoForm.PLATEAU, held=())
+    parameters = suited(ReplayParameters(), EchoShape.PLATEAU, fixed=())
     assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.LEADING_EDGE, 1.0)
 
 
 def test_what_the_user_set_is_held():
-    parameters = suited(ReplayParameters(match_resolution=0.7), EchoForm.PLATEAU, held=("match_resolution",))
+    parameters = suited(ReplayParameters(match_resolution=0.7), EchoShape.PLATEAU, fixed=("match_resolution",))
     assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.LEADING_EDGE, 0.7)

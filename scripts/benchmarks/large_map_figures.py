@@ -1,0 +1,114 @@
+"""Files of a million blocks; insertion, fetching and publishing in a map of ten million."""
+
+import time
+from io import BytesIO
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Callable, List, Tuple
+
+import numpy as np
+from std_msgs.msg import Header
+
+from benchmarks.table import Row, median_seconds
+from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map, write_map
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+RESOLUTION = 0.5
+MILLION = 1_000_000
+_POINTS_PER_BLOCK = 4
+_ECHOES = 400
+_RADIUS = 50.0
+_REACH = 70.0
+_SCANS = 20
+
+
+def sea_floor(blocks: int, rng: np.random.Generator, points_per_block: int = 1) -> MultiLevelSurfaceMap:
+    """Return a map of a floor in a square, one block per cell, so many points in each."""
+    side = int(np.ceil(np.sqrt(blocks)))
+    surface_map = MultiLevelSurfaceMap(RESOLUTION)
+    for rows in np.array_split(np.arange(side), max(blocks // MILLION, 1)):
+        x, y = (axis.ravel() for axis in np.meshgrid(rows, np.arange(side), indexing="ij"))
+        cells = np.repeat(np.column_stack([x, y]) - side // 2, points_per_block, axis=0)
+        places = (cells + rng.uniform(0.0, 1.0, cells.shape)) * RESOLUTION
+        depth = -10.0 + np.sin(places[:, 0] / 30.0) + rng.normal(0.0, 0.05, len(places))
+        surface_map.insert(np.column_stack([places, depth, rng.uniform(0.0, 127.0, len(places))]))
+    return surface_map
+
+
+def echoes(rng: np.random.Generator) -> np.ndarray:
+    """Return the points (n, 4) of one scan around the map's middle: echoes at wandering ranges."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _ECHOES, endpoint=False)
+    reach = _RADIUS * (0.6 + 0.3 * np.sin(3.0 * angle + rng.uniform(0.0, 6.0))) + rng.normal(0.0, 0.2, _ECHOES)
+    return np.column_stack(
+        [reach * np.cos(angle), reach * np.sin(angle), np.full(_ECHOES, -2.0), np.full(_ECHOES, 60.0)]
+    )
+
+
+def file_rows() -> List[Row]:
+    """Measure saving and loading, up to a map that takes points, and the bytes."""
+    blocks = sea_floor(MILLION, np.random.default_rng(1), _POINTS_PER_BLOCK).blocks
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "floor.mlsm"
+        wall, cpu = _seconds(lambda: write_map(path, StoredMap("map", {Layer.SHOWN: blocks})))
+        rows = [(f"save {len(blocks)} blocks", f"{wall:.2f} s ({cpu:.2f} s of a core)", "< 2 s")]
+        size = path.stat().st_size / len(blocks)
+
+        def load() -> None:
+            MultiLevelSurfaceMap(RESOLUTION).insert_blocks(read_map(path).shown)
+
+        wall, cpu = _seconds(load)
+    rows.append((f"load {len(blocks)} blocks into a map", f"{wall:.2f} s ({cpu:.2f} s of a core)", "< 2 s"))
+    return [*rows, ("size of the file", f"{size:.1f} bytes/block", "<= 40")]
+
+
+def size_rows() -> List[Row]:
+    """Measure what a scan costs in a small map and in one of ten million blocks."""
+    rng = np.random.default_rng(2)
+    rows = []
+    for blocks in (MILLION // 100, 10 * MILLION):
+        surface_map = sea_floor(blocks, rng)
+        rows += [(f"{name}, map of {len(surface_map)} blocks", *rest) for name, *rest in _scan_rows(surface_map, rng)]
+    return rows
+
+
+def _scan_rows(surface_map: MultiLevelSurfaceMap, rng: np.random.Generator) -> List[Row]:
+    markers, header, sizes = BlockMarkers(), Header(frame_id="map"), []
+    surface_map.take_changed_tiles()
+    inserted, published, fetched = [], [], []
+    for _ in range(_SCANS):
+        points = echoes(rng)
+        inserted.append(_seconds(lambda points=points: surface_map.insert(points))[1])
+        published.append(_seconds(lambda: sizes.append(_published(surface_map, markers, header)))[1])
+        box = np.full(2, _REACH)
+        fetched.append(median_seconds(lambda box=box: surface_map.in_box(-box, box), 1, time.process_time))
+    return [
+        (f"insert {_ECHOES} echoes", f"{1e3 * np.median(inserted):.1f} ms", "no slower"),
+        ("markers of a scan's change", f"{1e3 * np.median(published):.1f} ms", "< 20 ms"),
+        ("their size", f"{max(sizes) / 1e6:.2f} MB", "< 1 MB"),
+        (
+            f"fetch {2 * _REACH:.0f} m x {2 * _REACH:.0f} m for a match",
+            f"{1e3 * np.median(fetched):.1f} ms",
+            "<= 17 ms",
+        ),
+        ("memory", f"{surface_map.nbytes / len(surface_map):.0f} bytes/block", "<= 156"),
+    ]
+
+
+def _published(surface_map: MultiLevelSurfaceMap, markers: BlockMarkers, header: Header) -> int:
+    tiles = surface_map.take_changed_tiles()
+    buffer = BytesIO()
+    markers.changed(surface_map.in_tiles(tiles), map(tuple, tiles.tolist()), header).serialize(buffer)
+    return len(buffer.getvalue())
+
+
+def _seconds(call: Callable[[], object]) -> Tuple[float, float]:
+    """Return the seconds of wall time and of a core that a call takes."""
+    wall, cpu = time.perf_counter(), time.process_time()
+    call()
+    return time.perf_counter() - wall, time.process_time() - cpu
+
+
+def rows() -> List[Row]:
+    """Return the figures of map files and of large maps."""
+    return file_rows() + size_rows()

@@ -1,0 +1,200 @@
+"""The compiled loops themselves: sorting by cell, grouping by height, merging with what is stored.
+
+An interval is a row as `blocks` describes it. Raises ImportError, which says what to install, without numba.
+"""
+
+import numpy as np
+
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP
+from mlsm_manager.surface_map.cell_index import NO_BLOCK
+
+try:
+    from numba import njit
+except ImportError:
+    raise ImportError("insertion = NUMBA needs numba; install it with: apt install python3-numba") from None
+
+_VALUES = 4
+"""Mean of x y z and strength, then as many sums of squares: the first columns of a row."""
+_FEW = 24
+"""Up to so many points insertion sort is the fastest."""
+_FIBONACCI = np.uint64(0x9E3779B97F4A7C15)
+
+
+@njit(cache=True)
+def sorted_by_cell(cell, z):
+    """Return the keys (c,) in `cell` (n,), sorted; the order (n,) of the points by cell, height and place in the array;
+    and where each cell begins in that order (c + 1,).
+    """
+    number = len(cell)
+    bits = 10
+    while (1 << bits) < 2 * number:
+        bits += 1
+    mask, shift = (1 << bits) - 1, np.uint64(64 - bits)
+    table = np.full(1 << bits, -1, dtype=np.int64)
+    keys, local, sizes = np.empty(number, np.int64), np.empty(number, np.int64), np.zeros(number + 1, np.int64)
+    found = 0
+    for point in range(number):
+        key = cell[point]
+        place = np.int64((np.uint64(key) * _FIBONACCI) >> shift)
+        while table[place] >= 0 and keys[table[place]] != key:
+            place = (place + 1) & mask
+        if table[place] < 0:
+            table[place] = found
+            keys[found] = key
+            found += 1
+        local[point] = table[place]
+        sizes[table[place]] += 1
+    by_key = np.argsort(keys[:found])
+    starts = np.zeros(found + 1, np.int64)
+    fill = np.empty(found, np.int64)
+    for rank in range(found):
+        fill[by_key[rank]] = starts[rank]
+        starts[rank + 1] = starts[rank] + sizes[by_key[rank]]
+    order = np.empty(number, np.int64)
+    for point in range(number):
+        order[fill[local[point]]] = point
+        fill[local[point]] += 1
+    for rank in range(found):
+        _sort_by_height(order, starts[rank], starts[rank + 1], z)
+    return keys[:found][by_key], order, starts
+
+
+@njit(cache=True)
+def _sort_by_height(order, start, end, z):
+    """Sort order[start:end] by z; equal ones stay in their order."""
+    if end - start > _FEW:
+        part = order[start:end].copy()
+        order[start:end] = part[np.argsort(z[part], kind="mergesort")]
+        return
+    for place in range(start + 1, end):
+        point = order[place]
+        below = place - 1
+        while below >= start and z[order[below]] > z[point]:
+            order[below + 1] = order[below]
+            below -= 1
+        order[below + 1] = point
+
+
+@njit(cache=True)
+def grouped(points, order, starts, resolution):
+    """Return the intervals (g, ROW_WIDTH) that points (n, 4) make by themselves, and indices of their cells (g,)."""
+    rows, owner = np.empty((len(order), ROW_WIDTH)), np.empty(len(order), np.int64)
+    groups = 0
+    for cell in range(len(starts) - 1):
+        start = starts[cell]
+        for place in range(starts[cell] + 1, starts[cell + 1] + 1):
+            if place < starts[cell + 1] and points[order[place], 2] - points[order[place - 1], 2] < resolution:
+                continue
+            _write_group(points, order, start, place, rows[groups])
+            owner[groups] = cell
+            groups += 1
+            start = place
+    return rows[:groups], owner[:groups]
+
+
+@njit(cache=True)
+def _write_group(points, order, start, end, row):
+    count = np.float64(end - start)
+    for column in range(_VALUES):
+        first, total, squares = points[order[start], column], 0.0, 0.0
+        for place in range(start, end):
+            total += points[order[place], column] - first
+        mean = first + total / count
+        for place in range(start, end):
+            deviation = points[order[place], column] - mean
+            squares += deviation * deviation
+        row[column], row[_VALUES + column] = mean, squares
+    row[COUNT] = count
+    row[BOTTOM], row[TOP] = points[order[start], 2], points[order[end - 1], 2]
+
+
+@njit(cache=True)
+def merged(groups, group_cell, stored_rows, following, heads, resolution):
+    """Return what the cells hold after the groups (g, ROW_WIDTH) went into cells with first rows `heads` (c,).
+
+    Blocks (m, ROW_WIDTH), their row numbers (m,), -1 where new, the index of their cell (m,), which of them changed
+    (m,), and the row numbers (f,) of stored ones that are part of others now.
+    """
+    most = len(groups)
+    for cell in range(len(heads)):
+        row = heads[cell]
+        while row != NO_BLOCK:
+            most += 1
+            row = following[row]
+    blocks, numbers, owner = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
+    changed, fused = np.empty(most, np.bool_), np.empty(most, np.int64)
+    run, run_rows, stored = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
+    made, gone, group = 0, 0, 0
+    for cell in range(len(heads)):
+        held = _stored_by_bottom(heads[cell], following, stored_rows, stored)
+        new_top, old_top, length, next_stored = -np.inf, -np.inf, 0, 0
+        while True:
+            has_group = group < len(groups) and group_cell[group] == cell
+            has_stored = next_stored < held
+            if has_group and has_stored:
+                take_group = groups[group, BOTTOM] <= stored_rows[stored[next_stored], BOTTOM]
+            else:
+                take_group = has_group
+            is_end = not has_group and not has_stored
+            bottom = 0.0
+            if not is_end:
+                bottom = groups[group, BOTTOM] if take_group else stored_rows[stored[next_stored], BOTTOM]
+            if length and (is_end or bottom - max(new_top, old_top) >= resolution):
+                gone = _write_run(run, run_rows, length, blocks[made], numbers, made, fused, gone)
+                owner[made] = cell
+                changed[made] = length > 1 or run_rows[0] < 0
+                made += 1
+                length = 0
+            if is_end:
+                break
+            if take_group:
+                run[length], run_rows[length] = groups[group], -1
+                new_top = groups[group, TOP]
+                group += 1
+            else:
+                run[length], run_rows[length] = stored_rows[stored[next_stored]], stored[next_stored]
+                old_top = stored_rows[stored[next_stored], TOP]
+                next_stored += 1
+            length += 1
+    return blocks[:made], numbers[:made], owner[:made], changed[:made], fused[:gone]
+
+
+@njit(cache=True)
+def _stored_by_bottom(head, following, stored_rows, stored):
+    """Write the row numbers of a cell into `stored`, sorted by bottom, and return how many there are."""
+    held, row = 0, head
+    while row != NO_BLOCK:
+        place = held
+        while place > 0 and stored_rows[stored[place - 1], BOTTOM] > stored_rows[row, BOTTOM]:
+            stored[place] = stored[place - 1]
+            place -= 1
+        stored[place] = row
+        held += 1
+        row = following[row]
+    return held
+
+
+@njit(cache=True)
+def _write_run(run, run_rows, length, block, numbers, made, fused, gone):
+    """Write the block that `length` intervals make together and its row; return how many rows are free by now."""
+    count, top, kept = 0.0, -np.inf, np.int64(-1)
+    for part in range(length):
+        count += run[part, COUNT]
+        top = max(top, run[part, TOP])
+        kept = max(kept, run_rows[part])
+    for column in range(_VALUES):
+        first, total, squares = run[0, column], 0.0, 0.0
+        for part in range(length):
+            total += (run[part, column] - first) * run[part, COUNT]
+        mean = first + total / count
+        for part in range(length):
+            shift = run[part, column] - mean
+            squares += run[part, _VALUES + column] + shift * shift * run[part, COUNT]
+        block[column], block[_VALUES + column] = mean, squares
+    block[COUNT], block[BOTTOM], block[TOP] = count, run[0, BOTTOM], top
+    numbers[made] = kept
+    for part in range(length):
+        if run_rows[part] >= 0 and run_rows[part] != kept:
+            fused[gone] = run_rows[part]
+            gone += 1
+    return gone

@@ -1,0 +1,66 @@
+"""Starts a launch file on a master of its own, waits until all its nodes run, and measures how long Ctrl-C takes."""
+
+import os
+import signal
+import socket
+import subprocess
+import time
+import xmlrpc.client
+from pathlib import Path
+from typing import List, Set
+
+PACKAGE = "underwater_map_construction"
+START_TIMEOUT = 60.0
+STOP_TIMEOUT = 30.0
+
+
+def seconds_to_stop(launch_file: str, arguments: List[str], log: Path) -> float:
+    """Return the seconds from SIGINT until roslaunch and all its nodes have ended. Raises AssertionError."""
+    port = _free_port()
+    command = ["roslaunch", "-p", str(port), PACKAGE, launch_file, *arguments]
+    environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(log.parent)}
+    with log.open("wb") as output:
+        launch = subprocess.Popen(command, env=environment, stdout=output, stderr=output, start_new_session=True)
+    try:
+        _wait_for(_nodes(launch_file, arguments), port, launch, log)
+        start = time.monotonic()
+        launch.send_signal(signal.SIGINT)
+        launch.wait(STOP_TIMEOUT)
+        return time.monotonic() - start
+    finally:
+        if launch.poll() is None:
+            launch.kill()
+
+
+def _free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("localhost", 0))
+        return probe.getsockname()[1]
+
+
+def _nodes(launch_file: str, arguments: List[str]) -> Set[str]:
+    command = ["roslaunch", "--nodes", PACKAGE, launch_file, *arguments]
+    return set(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split())
+
+
+def _wait_for(nodes: Set[str], port: int, launch: "subprocess.Popen[bytes]", log: Path) -> None:
+    """Wait until every node has registered something besides its log, which is the first thing that a node does."""
+    master = xmlrpc.client.ServerProxy(f"http://localhost:{port}")
+    deadline = time.monotonic() + START_TIMEOUT
+    registered: Set[str] = set()
+    while not nodes <= registered:
+        assert launch.poll() is None, log.read_text(errors="replace")
+        assert time.monotonic() < deadline, f"not there: {nodes - registered}\n{log.read_text(errors='replace')}"
+        time.sleep(0.1)
+        registered = _registered(master)
+
+
+def _registered(master: xmlrpc.client.ServerProxy) -> Set[str]:
+    try:
+        _, _, (publishers, subscribers, services) = master.getSystemState("/stopwatch")
+    except OSError:
+        return set()
+    states = [*publishers, *subscribers, *services]
+    return {
+        node for name, nodes in states for node in nodes if not name.endswith(("rosout", "_loggers", "logger_level"))
+    }
