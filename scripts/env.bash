@@ -8,8 +8,11 @@ if [ ! -f "$_umc_root/build/workspace/devel/setup.bash" ]; then
 fi
 _umc_nounset=$(set +o | grep nounset)
 set +u
-source "$_umc_root/build/workspace/devel/setup.bash"
+# In a function, or catkin's setup would take the arguments of the script that sources this one for its own.
+_umc_setup() { source "$_umc_root/build/workspace/devel/setup.bash"; }
+_umc_setup
 eval "$_umc_nounset"
 export PATH="$_umc_root/build/venv/bin:$PATH"
 export ROS_PYTHON_VERSION=3
 unset _umc_root _umc_nounset
+unset -f _umc_setup

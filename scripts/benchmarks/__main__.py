@@ -13,6 +13,7 @@ from benchmarks import (
     shape_figures,
     simulation_figures,
     survey_figures,
+    tour_figures,
     vehicle_figures,
 )
 from benchmarks.table import Row, print_table
@@ -27,6 +28,7 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "vehicle": vehicle_figures.rows,
     "shapes": shape_figures.rows,
     "survey": survey_figures.rows,
+    "tours": tour_figures.rows,
 }
 
 

@@ -106,6 +106,14 @@ class BadClouds(unittest.TestCase):
         self.inputs["thresholder"].publish(message(wall() + np.float32([100, 0, 0, 0])))
         self.map.wait_for(lambda cloud: np.any(np.frombuffer(cloud.data, np.float32).reshape(-1, 7)[:, 0] > 99.0))
 
+    def test_8_ten_scans_in_a_row_that_lose_every_point_are_noticed(self) -> None:
+        """Otsu times 1.4 lies above the strongest echo here."""
+        points = wall()
+        points[:, 3] = np.where(np.arange(len(points)) % 2, 100, 101)
+        for _ in range(10):
+            self.inputs["thresholder"].publish(message(points))
+        self.diagnostics.wait_for("thresholder", "rows of scans left without a point", 1)
+
 
 if __name__ == "__main__":
     rospy.init_node("bad_clouds")

@@ -66,7 +66,7 @@ class Marina(unittest.TestCase):
         self.assertLess(np.abs(wrapped(errors[:, 2])).max(), SAME_HEADING)
 
     def test_the_map_that_is_shown_is_the_one_of_map_bag(self) -> None:
-        """Made of the echoes that are matched: the cleaned clouds of a head that says 0 or 127 are empty."""
+        """Made of the echoes that are matched, not of the cleaned clouds."""
         expected = self.replayed.mapper.shown.blocks.mean[:, :2]
         distances, _ = cKDTree(expected).query(self.map[:, :2])
         self.assertAlmostEqual(len(self.map) / len(expected), 1.0, delta=0.05)

@@ -19,9 +19,9 @@ from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
 
-# Scans and odometry come on different ways and overtake each other by seconds; a bag that starts again jumps by more.
+# s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
-# tf remembers three minutes of odometry: the belief is brought forward long before they are over.
+# s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over.
 _LONGEST_SILENCE = 60.0
 
 
@@ -98,7 +98,7 @@ class LocaliserSettings:
 
 @dataclass(frozen=True)
 class Taken:
-    """What became of a scan, and of the clouds that could be inserted after it."""
+    """What was done with a scan, and with the clouds that could be inserted after it."""
 
     scan: ScanUpdate
     clouds: List[CloudUpdate]

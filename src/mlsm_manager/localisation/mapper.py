@@ -1,4 +1,4 @@
-"""Scans in, a map and the vehicle's place in it out: the orchestration without ROS (thesis 6.5.6)."""
+"""Matches scan by scan with the map of the scans before, and keeps that map and the pose in it (thesis 6.5.6)."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -24,7 +24,11 @@ _NOTHING = InsertReport(0, 0, 0)
 
 @dataclass(frozen=True)
 class MapSettings:
-    """The grids: side of a cell [m] of the map that is shown and of the one that is matched with, limit and reserve."""
+    """The grids of the map that is shown and of the map that is matched with.
+
+    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
+    of blocks to reserve memory for. fewest_blocks: of a map that can be matched with.
+    """
 
     resolution: float
     match_resolution: float
@@ -35,7 +39,10 @@ class MapSettings:
 
 @dataclass(frozen=True)
 class ScanUpdate:
-    """What became of a scan. result: None when it was not matched. accepted: whether it is in the map now."""
+    """What was done with a scan.
+
+    result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
+    """
 
     scan: Scan
     result: Optional[MatchResult]
@@ -45,7 +52,11 @@ class ScanUpdate:
 
 @dataclass(frozen=True)
 class CloudUpdate:
-    """What became of a cloud. waiting: until the scan of its time is matched. unplaced: points without a place."""
+    """What was done with a cloud.
+
+    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
+    not inserted because the scan of their time was rejected.
+    """
 
     report: InsertReport
     waiting: bool
@@ -55,9 +66,9 @@ class CloudUpdate:
 class Mapper:
     """Keeps the map, what is known of the pose, and the errors of the odometry.
 
-    Scans of echoes are matched and make the map that is matched with; clouds make the map that is shown. Where both are
-    the same points, give them to both. A scan that is not matched because `matching` is off, or because there is no
-    map yet, is placed by the odometry as corrected so far, and makes the map: its pose is then certain in it.
+    Scans of echoes are matched and inserted into the map that is matched with; clouds are inserted into the map that is
+    shown. A scan that is not matched, because `matching` is off or because there is no map yet, is placed by the
+    odometry as corrected so far and inserted; its pose is then certain.
     """
 
     def __init__(self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher) -> None:
@@ -68,14 +79,14 @@ class Mapper:
         self.clear()
 
     def clear(self) -> None:
-        """Forget the map and the place in it."""
+        """Delete the map, and forget the pose in it."""
         settings = self.settings
         self.shown = MultiLevelSurfaceMap(settings.resolution, settings.limit, settings.expected_blocks)
         self.matched = MultiLevelSurfaceMap(settings.match_resolution, settings.limit)
         self.forget_place()
 
     def forget_place(self) -> None:
-        """Keep the map but forget where the vehicle is, because time jumped."""
+        """Keep the map but forget the pose, because time jumped."""
         self.belief: Optional[Belief] = None
         self.correction = np.zeros(3)
         self._history = CorrectionHistory()
@@ -105,7 +116,7 @@ class Mapper:
         return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
-        """Take a match as the truth: the scan goes into the map, its pose into the belief."""
+        """Accept a match: insert the scan into the map, and take its pose over into the belief."""
         theta = np.concatenate([result.pose, result.rate, result.motion])
         self.belief = Belief(scan.reference_time, theta, result.state_covariance)
         self.correction = result.correction(scan)
@@ -134,7 +145,7 @@ class Mapper:
         return self.take_cloud(self._waiting.popleft())
 
     def follow(self, track: Track, time: float) -> None:
-        """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
+        """Predict the belief at a later `time` by the odometry, after a long time without scans."""
         if self.belief is not None and time > self.belief.time:
             self.belief = predicted(self.belief, track, time, self.errors)
 

@@ -1,4 +1,4 @@
-"""Which matcher runs, and what it is told: the same for a live vehicle and for a recording."""
+"""Parameters that choose and configure a matcher, for a live vehicle and for a recording."""
 
 from dataclasses import dataclass, fields
 from typing import Type, TypeVar
@@ -17,27 +17,27 @@ class NamedMatcher(ParameterSet):
     """The matcher by its name."""
 
     matcher: MatcherName = parameter(
-        MatcherName.DISTRIBUTIONS, "the default matcher, or the thesis's to compare with", tunable=False
+        MatcherName.DISTRIBUTIONS, "the default matcher, or that of the thesis for comparison", tunable=False
     )
 
 
 @dataclass(frozen=True)
 class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, BeamEdge, NamedMatcher):
-    """A matcher, and the parameters of all there are."""
+    """The choice of a matcher, and the parameters of all matchers."""
 
     def part(self, kind: Type[Part]) -> Part:
-        """Return those that belong to one of the sets that this one is made of."""
+        """Return the parameters of one of the sets that this one is made of."""
         return kind(**{field.name: getattr(self, field.name) for field in fields(kind)})
 
     def with_effective_beam_width(self: Self) -> Self:
-        """Return these with a beam at least as wide as the edges at which it hears surfaces."""
+        """Return these parameters with a beam that is at least as wide as its edges."""
         return self.changed({"beam_width": max(self.beam_width, 2.0 * self.edge_half_width)})
 
     def for_few_scans(self: Self) -> Self:
-        """Return these for a map of one scan or some, which lacks much of what another sees and is no other place."""
+        """Return these parameters for a map of a few scans, which lacks much of what another scan sees there."""
         return self.changed({"min_agreement": 0.0, "min_gain_over_second": 0.0})
 
     def build_matcher(self) -> Matcher:
-        """Return the matcher; it knows that echoes come from as wide a beam as hears them."""
+        """Return the chosen matcher with the effective width of the beam."""
         kind = MATCHERS[self.matcher]
         return kind.build(self.with_effective_beam_width().part(kind.parameters))

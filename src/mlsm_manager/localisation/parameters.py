@@ -25,7 +25,7 @@ class MatchInput(Enum):
 
 @dataclass(frozen=True)
 class MapParameters(ParameterSet):
-    """The grids of the map, and how fast its fixes are followed."""
+    """The grids of the map, and how fast map -> odom follows a fix."""
 
     resolution: float = parameter(
         0.5, "side of a cell of the map that is shown and saved", unit="m", low=0.01, high=100.0, tunable=False,
@@ -53,7 +53,7 @@ class LocaliserParameters(MatcherChoice, OdometryErrors, MapParameters):
         return Localiser(mapper, settings)
 
     def localiser_settings(self) -> LocaliserSettings:
-        """Return what a localiser can be told while it runs."""
+        """Return the settings that a localiser can take over while it runs."""
         anywhere = relocaliser(self.with_effective_beam_width().part(DistributionMatcherParameters))
         return LocaliserSettings(
             self.build_matcher(), anywhere, self.edge_half_width, self.blend_time, self.chosen_map_input
@@ -83,7 +83,7 @@ class LocaliserParameters(MatcherChoice, OdometryErrors, MapParameters):
 
 @dataclass(frozen=True)
 class MlsmNodeParameters(ParameterSet):
-    """What only the live node knows: its inputs, its frames, and how often it sends what."""
+    """What only the live node needs: inputs, frames and rates."""
 
     match_input: MatchInput = parameter(
         MatchInput.ECHOES, "points that are matched: sonar/scan/echoes or sonar/scan/cleaned", tunable=False

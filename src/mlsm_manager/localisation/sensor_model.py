@@ -1,4 +1,4 @@
-"""What a sonar does to a scan, and how to take it back: late stamps, and beams that hear sideways."""
+"""Corrects a scan for late stamps, for a wrong speed of sound, and for beams that hear surfaces beside their axis."""
 
 from dataclasses import dataclass, replace
 from typing import Tuple
@@ -28,10 +28,10 @@ _MOST_SHIFT = 0.8
 
 @dataclass(frozen=True)
 class BeamEdge(ParameterSet):
-    """How far to its sides a beam hears surfaces."""
+    """Half of the width within which a beam hears surfaces."""
 
     edge_half_width: float = parameter(
-        0.0, "angle from a beam's axis at which it begins to hear a surface; 0 where points lie on the axis",
+        0.0, "angle from the beam's axis to the edge that hears a surface first; 0: points lie on the axis",
         unit="rad", low=0.0, high=0.25, tunable=False,
     )  # fmt: skip
 
@@ -81,8 +81,8 @@ def at_beam_edge(scan: Scan, half_width: float) -> Scan:
 def without_doubtful_points(scan: Scan, half_width: float) -> Scan:
     """Return what `at_beam_edge` does, without the points whose place stays doubtful.
 
-    A beam does not tell where within it a lone echo lies; and what would shift a point by more than a metre off its
-    surface hangs too much on a half width that is never quite the same for strong and for weak echoes.
+    Where within its beam a lone echo lies is not known; and a shift of nearly a metre depends too much on the half
+    width, which is not quite the same for strong and for weak echoes.
     """
     turned, incidence, known = _turned(scan, half_width)
     places = scan.track.at(scan.times)

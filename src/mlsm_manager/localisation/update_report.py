@@ -1,4 +1,4 @@
-"""Tells the diagnostics what became of scans and clouds."""
+"""Reports to the diagnostics what was done with scans and clouds."""
 
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from node_support.health import Health
@@ -21,7 +21,7 @@ def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     health.show("odometry scale error", f"{result.motion[0]:.3f}")
     health.show("odometry direction error [rad]", f"{result.motion[1]:.4f}")
     if not update.accepted:
-        health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction stay")
+        health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction are kept")
 
 
 def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:
@@ -32,7 +32,7 @@ def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float)
     health.count("points inserted", update.report.inserted)
     health.show("blocks", str(blocks))
     if update.unplaced:
-        health.count("points left out, their scan was not matched", update.unplaced)
+        health.count("points not inserted because their scan was not matched", update.unplaced)
     if update.report.outside:
         detail = f"{update.report.outside} beyond map_limit of {limit:g} m; check tf"
         health.problem("points outside the map", detail, update.report.outside)

@@ -1,4 +1,4 @@
-"""live.yaml: the parameters under which the live nodes do what map_bag did."""
+"""live.yaml: parameters with which the live nodes do what map_bag did."""
 
 from dataclasses import fields
 from pathlib import Path
@@ -24,7 +24,7 @@ _COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.la
 
 
 def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> Dict[str, Dict[str, Any]]:
-    """Return by node what it must be set to, so that it does what a replay with `parameters` did."""
+    """Return for each node the parameters with which it does what a replay with `parameters` did."""
     values = {name: _common(parameters.to_mapping(), name) for name in NODES}
     cloud = SonarToCloudParameters(target_frame=odom_frame)
     values["sonar_to_cloud"].update(

@@ -20,17 +20,17 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     """
     parser = argparse.ArgumentParser("map_bag", description="Map a recording without a ROS master.")
     parser.add_argument("bag", type=Path, help="recording with beams and tf (odom, base_link, sonar)")
-    parser.add_argument("--out", type=Path, required=True, help="output folder; created if it does not exist")
+    parser.add_argument("--out", type=Path, required=True, help="folder to write to; created if missing")
     parser.add_argument("--matcher", choices=[name.value for name in MatcherName], help="which matcher")
-    parser.add_argument("--truth", help="topic of the true position, to measure errors against")
+    parser.add_argument("--truth", help="topic of the true position, from which errors are measured")
     parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
     parser.add_argument(
         "--no-calibrate",
         dest="calibrate",
         action="store_false",
-        help="take sonar_delay, range_scale and edge_half_width as they are set, do not estimate them",
+        help="use sonar_delay, range_scale and edge_half_width as they are set instead of estimating them",
     )
-    parser.add_argument("--parameters", type=Path, help="yaml file (a live.yaml, too); --set overrides it")
+    parser.add_argument("--parameters", type=Path, help="yaml file, such as a live.yaml; --set overrides it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     parser.add_argument("--beams", default=f"/{topics.BEAMS}", help="topic of the beams (default: %(default)s)")
     parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")

@@ -20,6 +20,7 @@ class StageType:
 
     figures: what else the stage tells of its newest cloud; each is published as Float32 on ~name and shown in
     /diagnostics, unless it is None.
+    when_empty: what to do when it removes every point of scan after scan.
     """
 
     parameters: Type[ParameterSet]
@@ -27,6 +28,7 @@ class StageType:
     config_name: str
     input_topic: str
     output_topic: str
+    when_empty: str
     figures: Mapping[str, Callable[[Any], Optional[float]]] = field(default_factory=dict)
 
     @property
@@ -42,6 +44,7 @@ STAGES: Dict[str, StageType] = {
         "Thresholder",
         topics.SCANS,
         topics.THRESHOLDED,
+        "lower what makes its mode's threshold (otsu_multiplier in OTSU+PROPORTIONAL), or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),
     "outlier_remover": StageType(
@@ -50,6 +53,7 @@ STAGES: Dict[str, StageType] = {
         "OutlierRemover",
         topics.THRESHOLDED,
         topics.CLEANED,
+        "lower min_neighbors in RADIUS, raise stddev_multiplier in STATISTICAL, or set mode to NONE",
     ),
     "echo_extractor": StageType(
         EchoExtractorParameters,
@@ -57,6 +61,7 @@ STAGES: Dict[str, StageType] = {
         "EchoExtractor",
         topics.POLAR_SCANS,
         topics.ECHOES,
+        "lower min_contrast or min_height, or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),
 }

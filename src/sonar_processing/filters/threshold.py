@@ -87,7 +87,12 @@ class Thresholder:
             return cloud.select(valid & (cloud.points[:, 3] > threshold))
 
     def threshold(self, strengths: np.ndarray) -> float:
-        """Return the threshold for `strengths` (n,), n > 0, all finite."""
+        """Return the threshold for `strengths` (n,), n > 0, all finite.
+
+        OTSU and OTSU+PROPORTIONAL separate strong echoes from weak ones. Where all strengths above 0 are the same,
+        somebody has separated them already (a recording of detections): then their threshold is 0, or min_threshold if
+        that is higher, and all of them pass. FIXED and PROPORTIONAL make no such exception.
+        """
         parameters = self.parameters
         if parameters.mode is ThresholdMode.FIXED:
             value = parameters.fixed_threshold
@@ -100,5 +105,7 @@ class Thresholder:
         return max(float(value), parameters.min_threshold)
 
     def _otsu(self, strengths: np.ndarray) -> float:
-        echoes = strengths[strengths > 0] if self.parameters.otsu_nonzero else strengths
-        return otsu_threshold(echoes) if echoes.size else 0.0
+        echoes = strengths[strengths > 0]
+        if not echoes.size or echoes.min() == echoes.max():
+            return 0.0
+        return otsu_threshold(echoes if self.parameters.otsu_nonzero else strengths)

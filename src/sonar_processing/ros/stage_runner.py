@@ -9,6 +9,7 @@ from node_support.parameters import ParameterSet
 from node_support.ros.node import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.filters.emptied_scans import EmptiedScans
 from sonar_processing.filters.stage_table import STAGES
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
 from sonar_processing.ros.publishers import CloudPublisher, FigurePublisher
@@ -23,6 +24,7 @@ class StageRunner:
         self.health = make_health(name)
         self.healths = [self.health]
         self._type = STAGES[name]
+        self._emptied = EmptiedScans()
         self._live = ReconfigurableParameters(
             self._type.parameters, namespace, self._type.config_name, self.health, self._use_parameters
         )
@@ -72,9 +74,18 @@ class StageRunner:
             self.health.problem(
                 "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
             )
-        self.health.count("clouds out")
-        self.health.count("points out", int(np.count_nonzero(result.valid)))
+        self._count_out(cloud, result)
         self._publisher.publish(result)
         for figure in self._figures:
             figure.publish(self._type.figures[figure.name](stage))
         return result
+
+    def _count_out(self, cloud: IntensityCloud, result: IntensityCloud) -> None:
+        points = int(np.count_nonzero(result.valid))
+        self.health.count("clouds out")
+        self.health.count("points out", points)
+        emptied = self._emptied.take(int(np.count_nonzero(cloud.valid)), points)
+        if emptied:
+            self.health.problem(
+                "rows of scans left without a point", f"{emptied} scans in a row; {self._type.when_empty}"
+            )

@@ -1,7 +1,7 @@
 """Buoys and upright pipes: circles in a horizontal scan (thesis 6.5.5)."""
 
-from dataclasses import dataclass
-from typing import Callable, List, Optional
+from dataclasses import dataclass, replace
+from typing import Callable, Iterator, List, Optional
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -9,15 +9,28 @@ from scipy.spatial import cKDTree
 from node_support.parameters import ParameterError, parameter
 from sonar_processing.beams.beam_width import beam_width_parameter
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.shapes.beam_echoes import BeamEchoes, beam_echoes
-from sonar_processing.shapes.circle_fit import CircleSight, fitted_circle
+from sonar_processing.shapes.beam_echoes import beam_echoes
+from sonar_processing.shapes.circle_fit import CircleFit, CircleSight, fitted_circle
+from sonar_processing.shapes.lines import fitted_line
 from sonar_processing.shapes.ransac import RansacParameters, best_hypothesis
+from sonar_processing.shapes.sightings import Sightings, sightings
+from sonar_processing.shapes.wall_echoes import wall_echoes
 
 SonarPositions = Callable[[np.ndarray], np.ndarray]
 """Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s], NaN where it is not known."""
 
+# The next beam of a wall meets it at most so many times as far away as the last one, unless the wall is nearly in line
+# with the beams.
 _NEXT_BEAM = 1.5
+# One echo too near to a circle outweighs so many on it: more than beams that a small thing fills.
 _PENALTY = 4
+# Three echoes of a buoy at 10 m lie as nearly on a line as on the circle; from four on the better fit decides.
+_LINE_ECHOES = 4
+# Echoes of a near side bulge towards the sonar. Noise, and a vehicle that moves between them, makes them as hollow as
+# this, in metres; a niche or a corner of walls is deeper.
+_HOLLOW = 0.25
+# Radii tried for a pair of echoes; more tell nothing new, and clouds with few pairs need not be searched for long.
+_RADII_PER_PAIR = 100
 
 
 @dataclass(frozen=True)
@@ -31,6 +44,20 @@ class CircleDetectorParameters(RansacParameters):
     clearance: float = parameter(
         0.7,
         "a circle stands at least this far from all other echoes, or it is a piece of a wall",
+        unit="m",
+        low=0.0,
+        high=100.0,
+    )
+    line_distance: float = parameter(
+        0.2,
+        "an echo this near to a line through echoes of the neighbouring beams belongs to a wall",
+        unit="m",
+        low=0.0,
+        high=100.0,
+    )
+    max_residual: float = parameter(
+        0.2,
+        "root mean square difference of a circle's ranges from the measured ones, at most",
         unit="m",
         low=0.0,
         high=100.0,
@@ -61,15 +88,21 @@ class Circle:
 class CircleModel:
     """Circles as rows (center x, center y, radius, distance kept by all else) whose near side the sonar sees."""
 
-    def __init__(
-        self, points: np.ndarray, others: np.ndarray, towards: np.ndarray, parameters: CircleDetectorParameters
-    ) -> None:
-        """`others` (k, 2): echoes that belong to no new circle; `towards` (n, 2): unit vectors from the sonar."""
-        self.points = points
+    def __init__(self, seen: Sightings, others: np.ndarray, parameters: CircleDetectorParameters) -> None:
+        """`seen`: the echoes that may make a circle; `others` (k, 2) x y [m]: those that may not."""
+        self.points = seen.points
         self._others = others
-        self._towards = towards
+        self._towards = seen.towards
         self._parameters = parameters
-        self._pairs = cKDTree(points).query_pairs(2.0 * parameters.max_radius, output_type="ndarray")
+        self._pairs = cKDTree(seen.points).query_pairs(2.0 * parameters.max_radius, output_type="ndarray")
+        spacing = seen.step * seen.ranges
+        # Where a thing is narrower than the beams are apart, two echoes side by side come from two turns of the head.
+        self._next_beam = np.where(spacing > 2.0 * parameters.max_radius, _NEXT_BEAM * spacing, 0.0)
+
+    @property
+    def enough(self) -> int:
+        """Number of hypotheses after which others would be nearly the same."""
+        return _RADII_PER_PAIR * len(self._pairs)
 
     def hypotheses(self, number: int, rng: np.random.Generator) -> np.ndarray:
         """Return the circles of random allowed radius through two points each, behind them as the sonar sees it."""
@@ -85,7 +118,8 @@ class CircleModel:
         behind = np.column_stack([-half[:, 1], half[:, 0]]) / np.sqrt(square)[:, np.newaxis]
         behind *= np.sign(np.einsum("ij,ij->i", behind, self._towards[samples[possible, 0]]))[:, np.newaxis]
         centers = first[possible] + half + behind * np.sqrt(radius**2 - square)[:, np.newaxis]
-        apart = np.maximum(self._parameters.clearance, _NEXT_BEAM * 2.0 * np.sqrt(square))
+        next_beam = np.maximum(self._next_beam[samples[possible, 0]], _NEXT_BEAM * 2.0 * np.sqrt(square))
+        apart = np.maximum(self._parameters.clearance, next_beam)
         return np.column_stack([centers, radius, self._parameters.distance + apart])
 
     def scores(self, hypotheses: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -121,38 +155,66 @@ class CircleDetector:
     def __call__(self, cloud: IntensityCloud, sonar_positions: SonarPositions) -> List[Circle]:
         """Return the circles of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
-        rng = np.random.default_rng(self.parameters.seed)
         strong = echoes.strong(self.parameters.min_echo_share)
-        origins = sonar_positions(echoes.time_stamps) if len(strong) else np.empty((0, 2))
-        free = np.zeros(len(echoes), dtype=bool)
-        free[strong] = np.isfinite(origins[strong]).all(axis=1)
-        circles: List[Circle] = []
-        while len(circles) < self.parameters.n_circles and np.count_nonzero(free) >= self.parameters.min_inliers:
-            inliers = self._best_circle(echoes.points, origins, free, strong, rng)
-            if inliers is None:
-                break
-            if len(np.unique(echoes.time_stamps[inliers])) >= self.parameters.min_inliers:
-                circles.append(self._circle(echoes, origins, inliers))
-            free[inliers] = False
-        return circles
+        if not len(strong):
+            return []
+        origins = sonar_positions(echoes.time_stamps[strong])
+        known = np.isfinite(origins).all(axis=1)
+        strong, origins = strong[known], origins[known]
+        seen = sightings(echoes.points[strong], origins, echoes.time_stamps[strong], echoes.weights[strong])
+        found = []
+        for inliers in self._groups(seen):
+            fit = self._fit(seen.only(inliers))
+            if fit is not None:
+                members = echoes.members[np.isin(echoes.owner, strong[inliers])]
+                found.append(Circle(fit.center, fit.radius, members, len(inliers), fit.residual))
+        return found
 
-    def _best_circle(
-        self, points: np.ndarray, origins: np.ndarray, free: np.ndarray, strong: np.ndarray, rng: np.random.Generator
-    ) -> Optional[np.ndarray]:
-        left, taken = np.flatnonzero(free), strong[~free[strong]]
-        towards = points[left] - origins[left]
-        towards /= np.maximum(np.linalg.norm(towards, axis=1, keepdims=True), 1e-9)
-        model = CircleModel(points[left], points[taken], towards, self.parameters)
-        circle = best_hypothesis(model, self.parameters, rng)
+    def _groups(self, seen: Sightings) -> Iterator[np.ndarray]:
+        """Yield the indices of the echoes that stand together apart from all others, best group first."""
+        parameters, rng = self.parameters, np.random.default_rng(self.parameters.seed)
+        free = ~wall_echoes(seen, 2.0 * parameters.max_radius, parameters.line_distance)
+        for _ in range(parameters.n_circles):
+            if np.count_nonzero(free) < parameters.min_inliers:
+                return
+            inliers = self._best_group(seen, free, rng)
+            if inliers is None:
+                return
+            free[inliers] = False
+            yield inliers
+
+    def _best_group(self, seen: Sightings, free: np.ndarray, rng: np.random.Generator) -> Optional[np.ndarray]:
+        left = np.flatnonzero(free)
+        model = CircleModel(seen.only(left), seen.points[~free], self.parameters)
+        search = replace(self.parameters, max_iterations=max(min(self.parameters.max_iterations, model.enough), 1))
+        circle = best_hypothesis(model, search, rng)
         if circle is None or model.scores(circle[np.newaxis], model.points)[0] < self.parameters.min_inliers:
             return None
         return left[model.inliers(circle)]
 
-    def _circle(self, echoes: BeamEchoes, origins: np.ndarray, inliers: np.ndarray) -> Circle:
-        parameters = self.parameters
-        sight = CircleSight(
-            echoes.points[inliers], origins[inliers], echoes.weights[inliers].astype(float), parameters.beam_width
-        )
+    def _fit(self, seen: Sightings) -> Optional[CircleFit]:
+        """Return the circle of a group, or None where a line explains it better or the ranges contradict it."""
+        parameters, weights = self.parameters, seen.weights.astype(float)
+        if len(np.unique(seen.beams)) < parameters.min_inliers or hollow_depth(seen) > _HOLLOW:
+            return None
+        sight = CircleSight(seen.points, seen.origins, weights, parameters.beam_width)
         fit = fitted_circle(sight, parameters.min_radius, parameters.max_radius)
-        members = echoes.members[np.isin(echoes.owner, inliers)]
-        return Circle(fit.center, fit.radius, members, len(inliers), fit.residual)
+        if fit.residual > parameters.max_residual:
+            return None
+        is_line = len(weights) >= _LINE_ECHOES and line_residual(seen.points, weights) <= fit.residual
+        return None if is_line else fit
+
+
+def hollow_depth(seen: Sightings) -> float:
+    """Return how much farther than the outer two the echoes between them are, m; 0 with fewer than three."""
+    if len(seen.points) < 3:
+        return 0.0
+    outward = seen.towards.mean(axis=0)
+    depth = (seen.points @ outward)[np.argsort(seen.points @ np.array([-outward[1], outward[0]]))]
+    return float(depth[1:-1].mean() - depth[[0, -1]].mean())
+
+
+def line_residual(points: np.ndarray, weights: np.ndarray) -> float:
+    """Return the root mean square distance [m] of points (n, 2) from the line that fits them best."""
+    line = fitted_line(points, weights)
+    return float(np.sqrt(np.mean((points @ line[:2] - line[2]) ** 2)))

@@ -161,3 +161,29 @@ def test_what_was_seen_from_an_unknown_place_is_no_circle():
 def test_radii_in_the_wrong_order_are_refused():
     with pytest.raises(ParameterError, match="min_radius"):
         CircleDetectorParameters(min_radius=0.7)
+
+
+def _wall_seen_by_a_turning_sonar(step, beams, distance=8.0):
+    """Return the echoes of a wall at y = `distance` heard by a sonar at the origin, in the order of the beams."""
+    bearings = step * np.arange(beams)
+    hits = np.sin(bearings) > 0.2
+    return distance / np.tan(bearings[hits]), np.flatnonzero(hits), distance
+
+
+@pytest.mark.parametrize("distance", [8.0, 20.0])
+@pytest.mark.parametrize("step_deg", [2.2, 3.0, 3.8])
+def test_a_wall_seen_twice_while_the_vehicle_turns_is_no_row_of_circles(step_deg, distance):
+    x, beams, y = _wall_seen_by_a_turning_sonar(math.radians(step_deg), 150, distance)
+    noise = np.random.default_rng(0).normal(0.0, 0.05, len(x))
+    assert _circles(_cloud(np.column_stack([x, y + noise]), stamps=1.0 + beams)) == []
+
+
+def test_a_near_piece_of_a_wall_is_no_circle_because_a_line_fits_it_better():
+    x = np.arange(-0.5, 0.5, 0.08)
+    assert _circles(_cloud(np.column_stack([x, np.full(len(x), 1.6)]))) == []
+
+
+def test_echoes_from_the_far_side_of_a_circle_make_none():
+    bearings = np.linspace(-1.2, 1.2, 3)
+    hollow = np.array([8.0, 0.0]) + 0.6 * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    assert _circles(_cloud(hollow)) == []

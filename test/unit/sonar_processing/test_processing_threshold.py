@@ -151,3 +151,18 @@ def test_the_newest_threshold_can_be_read():
     assert thresholder.newest_threshold == 66
     thresholder(cloud_of([]))
     assert thresholder.newest_threshold is None
+
+
+@pytest.mark.parametrize("mode", ["OTSU", "OTSU+PROPORTIONAL"])
+@pytest.mark.parametrize("nonzero", [True, False])
+@pytest.mark.parametrize("strength", [1, 127, 255])
+def test_echoes_that_are_all_equally_strong_pass(mode, nonzero, strength):
+    assert _kept([0, strength, 0, strength], mode=mode, otsu_nonzero=nonzero) == [strength, strength]
+
+
+def test_echoes_that_are_all_equally_strong_do_not_pass_the_floor():
+    assert _kept([0, 40, 40], min_threshold=50) == []
+
+
+def test_two_strengths_above_zero_are_separated():
+    assert _kept([0, 10, 200], mode="OTSU") == [200]

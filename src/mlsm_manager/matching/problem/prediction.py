@@ -36,29 +36,38 @@ _DIFFERENCE = 1e-6
 
 @dataclass(frozen=True)
 class OdometryErrors(ParameterSet):
-    """How wrong the odometry may be: standard deviations, and how long an error lasts."""
+    """Errors of the odometry: standard deviations and correlation times."""
 
     scale_deviation: float = parameter(
-        0.2, "relative error of the distances it reports", low=0.0, high=2.0, tunable=False
+        0.2,
+        "standard deviation of the relative error of the distances that the odometry reports",
+        low=0.0,
+        high=2.0,
+        tunable=False,
     )
     direction_deviation: float = parameter(
-        0.05, "error of their direction, a sensor's mounting angle", unit="rad", low=0.0, high=1.0, tunable=False
+        0.05,
+        "standard deviation of the error of their direction, as from a sensor's mounting angle",
+        unit="rad",
+        low=0.0,
+        high=1.0,
+        tunable=False,
     )
     speed_deviation: float = parameter(
-        0.02, "error of the speed that does not grow with it, as of a current", unit="m/s", low=0.0, high=5.0,
-        tunable=False,
+        0.02, "standard deviation of an error of the speed that does not grow with it, as from a current",
+        unit="m/s", low=0.0, high=5.0, tunable=False,
     )  # fmt: skip
     turn_rate_deviation: float = parameter(
-        0.001, "error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
+        0.001, "standard deviation of the error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
     )
     rate_time: float = parameter(
-        60.0, "how long an error of speed or turn rate lasts", unit="s", low=0.1, high=1e6, tunable=False
+        60.0, "correlation time of the errors of speed and turn rate", unit="s", low=0.1, high=1e6, tunable=False
     )
     motion_time: float = parameter(
-        3600.0, "how long an error of scale or direction lasts", unit="s", low=0.1, high=1e9, tunable=False
+        3600.0, "correlation time of the errors of scale and direction", unit="s", low=0.1, high=1e9, tunable=False
     )
     heading_deviation: float = parameter(
-        0.0, "how far its heading may be off at any time, where a compass holds it; 0: it may drift away",
+        0.0, "standard deviation of a heading that comes from a compass; 0: no compass, the heading drifts",
         unit="rad", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
 
@@ -133,7 +142,7 @@ def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarr
 def advanced(theta: np.ndarray, seconds: float, before: np.ndarray, after: np.ndarray) -> np.ndarray:
     """Return T_map_base (3,) after one short step of the odometry from `before` to `after` (3,); see advanced_path.
 
-    The same in plain numbers, for whoever follows every message of the odometry.
+    The same in plain numbers, which is faster for a single message of the odometry.
     """
     turned = math.remainder(after[2] - before[2], math.tau)
     step_x, step_y = _turned(after[0] - before[0], after[1] - before[1], theta[DIRECTION] - before[2])

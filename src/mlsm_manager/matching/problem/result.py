@@ -1,4 +1,4 @@
-"""What a matcher is told beforehand and what it answers."""
+"""What a matcher takes besides scan and map, and what it returns."""
 
 from dataclasses import dataclass
 from enum import Enum
@@ -21,7 +21,7 @@ class MatchStatus(Enum):
 
 @dataclass(frozen=True)
 class Prior:
-    """What the odometry and earlier matches say before a scan is matched; its covariance must be honest.
+    """What odometry and earlier matches tell before a scan is matched; its covariance must be true.
 
     correction: (3,) planar T_map_odom at the scan's reference time; the pose it gives is T_map_odom * T_odom_base.
     rate: (3,) error of the odometry's velocity during the scan, m/s, m/s, rad/s in the vehicle's frame: the true
@@ -52,7 +52,7 @@ class MatchResult:
     rate, motion, state_covariance: as in `Prior`, after the match; the covariance is (8, 8) of [pose, rate, motion].
     error: mean distance of the used points from the map, m. seconds: time the match took.
     beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
-    reason: one line that tells why a match was not accepted, with the value that decided; empty when it was.
+    reason: one line that says why a match was not accepted, with the value that decided; empty when it was accepted.
     """
 
     status: MatchStatus

@@ -1,0 +1,45 @@
+"""Echoes together with the beams and places they were seen from."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Echoes in the order of their beams.
+
+    points: (n, 2) x y [m]. origins: (n, 2) where the sonar was. beams: (n,) number of the beam, growing.
+    weights: (n,) number of cloud points in each echo.
+    step: usual angle from beam to beam, rad, in the cloud's frame: a vehicle that turns with its head widens it.
+    """
+
+    points: np.ndarray
+    origins: np.ndarray
+    beams: np.ndarray
+    weights: np.ndarray
+    step: float
+
+    @property
+    def ranges(self) -> np.ndarray:
+        """(n,) distance from the sonar, m."""
+        return np.linalg.norm(self.points - self.origins, axis=1)
+
+    @property
+    def towards(self) -> np.ndarray:
+        """(n, 2) unit vectors from the sonar."""
+        return (self.points - self.origins) / np.maximum(self.ranges, 1e-9)[:, np.newaxis]
+
+    def only(self, chosen: np.ndarray) -> "Sightings":
+        """Return the echoes at indices `chosen`."""
+        parts = {name: getattr(self, name)[chosen] for name in ("points", "origins", "beams", "weights")}
+        return replace(self, **parts)
+
+
+def sightings(points: np.ndarray, origins: np.ndarray, times: np.ndarray, weights: np.ndarray) -> Sightings:
+    """Return the echoes (n, 2) [m] seen from origins (n, 2) [m] by beams that were taken at times (n,) [s]."""
+    _, first, beams = np.unique(times, return_index=True, return_inverse=True)
+    axes = (points - origins)[first]
+    steps = np.abs(np.diff(np.unwrap(np.arctan2(axes[:, 1], axes[:, 0]))))
+    steps = steps[steps > 0.0]
+    return Sightings(points, origins, beams, weights, float(np.median(steps)) if len(steps) else 0.0)
