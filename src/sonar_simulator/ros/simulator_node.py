@@ -1,4 +1,4 @@
-"""The simulator as a node: publishes /clock, odometry, tf and the beams of the sonar."""
+"""The simulator as a node: publishes /clock, odometry, tf and the sonar's beams."""
 
 import itertools
 import math
