@@ -6,12 +6,11 @@ from itertools import cycle
 from pathlib import Path
 from typing import Sequence
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
@@ -32,7 +31,9 @@ class Path2d:
 
 def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarray], paths: Sequence[Path2d]) -> None:
     """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m] and paths."""
-    figure, axes = plt.subplots(figsize=(14, 8), dpi=110)
+    figure = Figure(figsize=(14, 8), dpi=110)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(1, 1, 1)
     for index, outline in enumerate(outlines):
         label = "walls as they are" if index == 0 else None
         axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
@@ -47,11 +48,10 @@ def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarr
     figure.tight_layout()
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
-    plt.close(figure)
     write_whole(file, picture.getvalue())
 
 
-def _draw_blocks(axes: plt.Axes, blocks: Blocks) -> None:
+def _draw_blocks(axes: Axes, blocks: Blocks) -> None:
     for kind, color in _COLORS.items():
         if not np.any(blocks.type == kind):
             continue

@@ -45,7 +45,8 @@ def bin_length(rows: np.ndarray) -> float:
     """
     some = rows[:: max(len(rows) // _ROWS_MEASURED, 1), :, :3]
     lengths = np.linalg.norm(np.diff(some, axis=1), axis=2)
-    lengths = lengths[np.isfinite(lengths) & (lengths > 0.0)]
+    lengths = lengths[np.isfinite(lengths)]
+    lengths = lengths[lengths > 0.0]
     if lengths.size == 0:
         raise RefusedInput("clouds refused", "no two neighbouring bins are left; check min_range and height_limit")
     return float(np.median(lengths))

@@ -135,5 +135,6 @@ def _rows(bearings: np.ndarray) -> int:
 
 def _cut(ranges: np.ndarray, nothing_range: float) -> np.ndarray:
     """Replace ranges without a hit by inf; allows for the single precision of clouds."""
+    ranges = np.where(np.isnan(ranges), np.inf, ranges)
     hit = (ranges > 0.0) & (ranges < nothing_range * (1.0 - 1e-6) - 1e-6)
     return np.where(hit, ranges, np.inf)
