@@ -20,8 +20,8 @@ from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.headers import check_stamp
 from node_support.files import whole_file
+from node_support.headers import check_stamp
 from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
