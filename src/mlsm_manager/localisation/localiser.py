@@ -4,20 +4,22 @@ import threading
 import time as wall
 from dataclasses import dataclass
 from enum import Enum
-from typing import Callable, List, Optional, Protocol
+from typing import Any, Callable, Dict, List, Mapping, Optional, Protocol
 
 import numpy as np
 
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
+from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.sensor_model import without_doubtful_points
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
@@ -54,8 +56,18 @@ class ScanMapper(Protocol):
         """Number of those blocks, without a copy of them."""
 
     @property
-    def target(self) -> Blocks:
+    def target(self) -> BlockSource:
         """The map in which a lost vehicle is searched."""
+
+    @property
+    def layers(self) -> Dict[Layer, Blocks]:
+        """A copy of all maps, to be stored."""
+
+    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+        """Take stored maps in the place of the present ones; raises ValueError for other resolutions."""
+
+    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan, and keep the scan where that holds."""
@@ -117,6 +129,7 @@ class Localiser:
         self._live = LiveCorrection(settings.blend_time)
         self._newest: Optional[Scan] = None
         self._newest_came = 0.0
+        self._search = PlaceSearch()
         self.use(settings)
 
     def use(self, settings: LocaliserSettings) -> None:
@@ -161,8 +174,10 @@ class Localiser:
             self.notice_time(scan.reference_time)
             scan = without_doubtful_points(scan, self._settings.edge_half_width)
             self._newest, self._newest_came = scan, self._clock()
-            update = self.mapper.take_echoes(scan)
-            self._live.believe(update.belief)
+            update = self._found(scan) if self.is_lost else self.mapper.take_echoes(scan)
+            self._search.learn(update.accepted)
+            if update.belief is not None:
+                self._live.believe(update.belief)
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
                 clouds.append(self.mapper.take_cloud(TimedPoints.of_scan(scan)))
@@ -225,12 +240,49 @@ class Localiser:
             scan = self._newest
             if scan is None:
                 return None
-            result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
-            if not result.accepted:
-                return ScanUpdate(scan, result, False, self.mapper.belief)
-            update = self.mapper.adopt(scan, result)
-            self._live.believe(update.belief)
+            update = self._found(scan)
+            if update.accepted:
+                self._search.forget()
+                self._live.believe(update.belief)
         return update
+
+    def _found(self, scan: Scan) -> ScanUpdate:
+        """Search the whole map for a scan; where it is found it goes into the map."""
+        result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
+        return (
+            self.mapper.adopt(scan, result) if result.accepted else ScanUpdate(scan, result, False, self.mapper.belief)
+        )
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether a map was loaded, scans are matched, and the vehicle is not found in the map yet."""
+        return self._search.is_lost and self.mapper.matching
+
+    def stored(self, frame: str, calibration: Mapping[str, Any], made: float, run: str) -> StoredMap:
+        """Return a copy of the map and of the place in it, to be written; see StoredMap."""
+        with self._lock:
+            belief, layers = self.mapper.belief, self.mapper.layers
+            correction = self.mapper.correction.copy()
+        arrays = {} if belief is None else StoredPlace(correction, belief).arrays()
+        return StoredMap(frame, layers, calibration, made, arrays, run)
+
+    def restore(self, stored: StoredMap, same_odometry: bool) -> None:
+        """Take a stored map in the place of the present one.
+
+        With the odometry under which it was stored the vehicle is expected where the stored correction puts it, and is
+        searched everywhere when three scans do not match there; otherwise it is searched everywhere from the start.
+        Raises ValueError, and keeps the present map, for other resolutions than those of the parameters.
+        """
+        with self._lock:
+            self.mapper.restore(stored.layers)
+            self._live.clear()
+            self._newest = None
+            self._search.lose()
+            place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
+            if place is not None:
+                self.mapper.start_from(place.widened, place.correction)
+                self._live.start_from(place.correction)
+                self._search.expect()
 
     def clear(self) -> int:
         """Forget map and place; return how many blocks the map had."""
@@ -238,5 +290,6 @@ class Localiser:
             count = self.mapper.block_count
             self.mapper.clear()
             self._live.clear()
+            self._search.forget()
             self._newest = None
         return count

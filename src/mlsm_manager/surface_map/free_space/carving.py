@@ -32,14 +32,20 @@ _ENOUGH = 5
 class CarvingParameters(ParameterSet):
     """What crossing beams say."""
 
-    carve: bool = parameter(True, "mark space that beams crossed as free, and take blocks away that beams go through")
+    carve: bool = parameter(
+        True, "mark space that beams crossed as free, and take blocks away that beams go through", tunable=False
+    )
     fan_core: float = parameter(
         0.19, "vertical angle of the inner part of the fan, in which a beam surely hears what is there", unit="rad",
-        low=0.0, high=3.0,
+        low=0.0, high=3.0, tunable=False,
     )  # fmt: skip
     crossings_least: int = parameter(10, "so many beams in a row must cross a block before it goes", low=1, high=10000)
     crossings_per_point: float = parameter(
-        2.0, f"and so many more for each point that fell into it, up to {_MOST_POINTS}", low=0.0, high=1000.0
+        2.0,
+        f"and so many more for each point that fell into it, up to {_MOST_POINTS}",
+        low=0.0,
+        high=1000.0,
+        tunable=False,
     )
 
 
