@@ -46,7 +46,7 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class LocaliserParameters(MatcherChoice, OdometryErrors, MapParameters):
+class LocaliserParameters(MatcherChoice, OdometryErrors, CarvingParameters, MapParameters):
     """All that a localiser is made from."""
 
     def build_localiser(self) -> Localiser:
@@ -73,7 +73,7 @@ class LocaliserParameters(MatcherChoice, OdometryErrors, MapParameters):
     @property
     def carver(self) -> Optional[Carver]:
         """What marks free space in the map that is shown; None where that is not wanted."""
-        return None
+        return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
 
     @property
     def chosen_kernel(self) -> InsertionKernel:
@@ -157,7 +157,7 @@ class MlsmNodeParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, CarvingParameters, StampParameters):
+class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameters):
     """All of mlsm_core's parameters, in one namespace."""
 
     def check(self) -> None:
@@ -174,11 +174,6 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, CarvingParamet
     def matches_from_start(self) -> bool:
         """Whether scans are matched from the start."""
         return self.start_matching
-
-    @property
-    def carver(self) -> Optional[Carver]:
-        """What marks free space in the map that is shown; None where that is not wanted."""
-        return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
 
     @property
     def chosen_kernel(self) -> InsertionKernel:
