@@ -41,7 +41,7 @@ class MapServices(unittest.TestCase):
         shutil.rmtree(str(cls.folder), ignore_errors=True)
 
     def test_a_late_subscriber_sees_the_whole_map(self) -> None:
-        """The markers are latched, and they show true extents: 2.8 m of pillar."""
+        """Though nothing changes any more, and they show true extents: 2.8 m of pillar."""
         array = Inbox("/MLSM/Markers", MarkerArray).wait_for()
         vertical = [marker for marker in array.markers if marker.ns == "vertical"]
         horizontal = [marker for marker in array.markers if marker.ns == "horizontal"]
@@ -65,13 +65,13 @@ class MapServices(unittest.TestCase):
 
     def test_a_map_is_saved_in_the_folder_that_was_named(self) -> None:
         """The file holds the blocks."""
-        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar")
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar.ply", False)
         self.assertTrue(answer.success, answer.message)
         self.assertEqual(sorted(read_ply(self.folder / "pillar.ply").count), [1, 15])
 
     def test_a_name_that_leaves_the_folder_is_refused(self) -> None:
         """With the name in the answer."""
-        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar")
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar", False)
         self.assertFalse(answer.success)
         self.assertIn("'../pillar'", answer.message)
 
@@ -79,7 +79,7 @@ class MapServices(unittest.TestCase):
         """Runs on the same map as the others and puts it back."""
         inbox = Inbox("/MLSM/Markers", MarkerArray)
         shown = inbox.wait_for()
-        self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset", Trigger)().success)
+        self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)().success)
         cleared = inbox.wait_for(lambda array: all(marker.action == Marker.DELETE for marker in array.markers))
         self.assertEqual(len(cleared.markers), len(shown.markers))
         self.setUpClass()

@@ -4,7 +4,7 @@ import threading
 import time as wall
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Callable, Dict, List, Mapping, Optional, Protocol
+from typing import Any, Callable, List, Mapping, Optional, Protocol, Tuple
 
 import numpy as np
 
@@ -60,8 +60,14 @@ class ScanMapper(Protocol):
         """The map in which a lost vehicle is searched."""
 
     @property
-    def layers(self) -> Dict[Layer, Blocks]:
-        """A copy of all maps, to be stored."""
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of all maps, to be stored, each made when it is asked for."""
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
 
     def restore(self, layers: Mapping[Layer, Blocks]) -> None:
         """Take stored maps in the place of the present ones; raises ValueError for other resolutions."""
@@ -130,6 +136,7 @@ class Localiser:
         self._newest: Optional[Scan] = None
         self._newest_came = 0.0
         self._search = PlaceSearch()
+        self._changes = 0
         self.use(settings)
 
     def use(self, settings: LocaliserSettings) -> None:
@@ -162,6 +169,27 @@ class Localiser:
         """Number of blocks of the map."""
         return self.mapper.block_count
 
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown whose mean lies from `low` to `high`, (2,) or (3,) m."""
+        with self._lock:
+            return self.mapper.region(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        with self._lock:
+            return self.mapper.changed_tiles()
+
+    @property
+    def free(self) -> Blocks:
+        """What is known to be free."""
+        with self._lock:
+            return self.mapper.layers[Layer.FREE]
+
+    @property
+    def changes(self) -> int:
+        """A number that grows whenever the map or the pose in it changes."""
+        return self._changes
+
     @property
     def believed_until(self) -> Optional[float]:
         """Time [s] of the newest belief; None before the first scan."""
@@ -172,6 +200,7 @@ class Localiser:
         """Match a scan and put it, and the clouds that waited for it, into the map."""
         with self._lock:
             self.notice_time(scan.reference_time)
+            self._changes += 1
             scan = without_doubtful_points(scan, self._settings.edge_half_width)
             self._newest, self._newest_came = scan, self._clock()
             update = self._found(scan) if self.is_lost else self.mapper.take_echoes(scan)
@@ -188,11 +217,13 @@ class Localiser:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)
+            self._changes += 1
             return self.mapper.take_cloud(cloud)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
         with self._lock:
+            self._changes += 1
             return self.mapper.take_placed(points)
 
     def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
@@ -261,7 +292,7 @@ class Localiser:
     def stored(self, frame: str, calibration: Mapping[str, Any], made: float, run: str) -> StoredMap:
         """Return a copy of the map and of the place in it, to be written; see StoredMap."""
         with self._lock:
-            belief, layers = self.mapper.belief, self.mapper.layers
+            belief, layers = self.mapper.belief, dict(self.mapper.layers)
             correction = self.mapper.correction.copy()
         arrays = {} if belief is None else StoredPlace(correction, belief).arrays()
         return StoredMap(frame, layers, calibration, made, arrays, run)
@@ -275,6 +306,7 @@ class Localiser:
         """
         with self._lock:
             self.mapper.restore(stored.layers)
+            self._changes += 1
             self._live.clear()
             self._newest = None
             self._search.lose()
@@ -288,6 +320,7 @@ class Localiser:
         """Forget map and place; return how many blocks the map had."""
         with self._lock:
             count = self.mapper.block_count
+            self._changes += 1
             self.mapper.clear()
             self._live.clear()
             self._search.forget()

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Dict, Mapping, Optional
+from typing import Deque, Dict, Iterator, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -72,6 +72,22 @@ class CloudUpdate:
     carved: Optional[CarveReport] = None
 
 
+class _Copies(Mapping[Layer, Blocks]):
+    """The blocks of maps, copied when they are asked for."""
+
+    def __init__(self, maps: Dict[Layer, MultiLevelSurfaceMap]) -> None:
+        self._maps = maps
+
+    def __getitem__(self, layer: Layer) -> Blocks:
+        return self._maps[layer].blocks
+
+    def __iter__(self) -> Iterator[Layer]:
+        return iter(self._maps)
+
+    def __len__(self) -> int:
+        return len(self._maps)
+
+
 class Mapper:
     """Keeps the map, what is known of the pose, and the errors of the odometry.
 
@@ -98,9 +114,18 @@ class Mapper:
         self.forget_place()
 
     @property
-    def layers(self) -> Dict[Layer, Blocks]:
-        """A copy of all maps, to be stored."""
-        return {Layer.SHOWN: self.shown.blocks, Layer.MATCHED: self.matched.blocks, Layer.FREE: self.free.blocks}
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of all maps, to be stored, each made when it is asked for."""
+        return _Copies({Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free})
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+        return self.shown.in_box(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        tiles = self.shown.take_changed_tiles()
+        return tiles, self.shown.in_tiles(tiles)
 
     def restore(self, layers: Mapping[Layer, Blocks]) -> None:
         """Take stored maps in the place of the present ones, and forget the place.

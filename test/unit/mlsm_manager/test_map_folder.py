@@ -7,9 +7,9 @@ import pytest
 from made_maps import content, stored_map
 
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.files.errors import MapFileError
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes
-from mlsm_manager.surface_map.files.map_folder import MapFolder
 
 
 @pytest.fixture
