@@ -182,7 +182,7 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(
                 "MLSM/Markers",
                 "visualization_msgs/MarkerArray",
-                "every block at its true size: all to who comes, then what changed",
+                "every block at its true size; all at first, then what changed",
             ),
             _publishes(
                 "MLSM/cloud",

@@ -73,7 +73,10 @@ class BlockMarkers:
 
     def again(self, blocks: Blocks, header: Header) -> PackedMarkerArray:
         """Return the markers of all blocks of the map, for one who knows nothing yet."""
-        return _array(self._packed(blocks, header)[0])
+        packed, now = self._packed(blocks, header)
+        for tile, powers in now.items():
+            self._shown[tile] = self._shown.get(tile, set()) | powers
+        return _array(packed)
 
     def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, Set[int]]]:
         """Return the serialised markers of blocks, and which powers there are in each tile."""
