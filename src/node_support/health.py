@@ -1,4 +1,4 @@
-"""Counters, rates and problems of one stage, as /diagnostics shows them. Free of ROS, safe to use from any thread."""
+"""Counters, rates and problems of one stage for /diagnostics. Free of ROS and thread-safe."""
 
 import threading
 import time
@@ -68,7 +68,7 @@ class Health:
             self._values[what] = value
 
     def problem(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count `number` problems of a kind and warn with the newest detail, unless that was said lately."""
+        """Count `number` problems of a kind and warn with the newest detail, at most once per `WARNING_PERIOD`."""
         with self._lock:
             problem = self._problems.setdefault(kind, _Problem())
             problem.total += number

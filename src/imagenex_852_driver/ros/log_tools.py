@@ -1,5 +1,6 @@
 """The ROS side of .852 logs: plays them, records them, and converts them to bags."""
 
+import math
 import os
 import time
 from argparse import Namespace
@@ -17,6 +18,8 @@ from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
 from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.headers import check_stamp
 from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
@@ -109,6 +112,10 @@ class LogRecorder:
         self._inverted = bool(values.get("inverted", False))
 
     def _record(self, message: SonarScanLine) -> None:
+        check_stamp(message.header.stamp.to_nsec())
+        if not (math.isfinite(message.angle) and math.isfinite(message.maxrange_meters)):
+            detail = f"angle {message.angle} rad, maxrange_meters {message.maxrange_meters}, must be finite"
+            raise RefusedInput("beams refused", detail)
         position = head_position(message.angle, self._inverted)
         if self._last_position not in (None, position):
             # The head may have passed straight astern, where positions wrap around.

@@ -26,7 +26,7 @@ class EchoExtractor:
         and no echo lies on them. Raises RefusedInput for a cloud that is not organised or of too few beams.
         """
         if not cloud.is_organized:
-            raise RefusedInput("clouds refused", "not organised; the echo extractor takes sonar/scan/polar")
+            raise RefusedInput("clouds refused", "not organised; subscribe the echo extractor to sonar/scan/polar")
         rows = cloud.points.reshape(cloud.height, -1, 4)
         strengths = np.nan_to_num(rows[..., 3], nan=0.0, posinf=0.0, neginf=0.0)
         echoes = extract_echoes(strengths, bin_length(rows), self.parameters)

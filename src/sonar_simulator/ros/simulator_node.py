@@ -118,6 +118,6 @@ def _robot() -> RobotDescription:
     try:
         return RobotDescription(rospy.get_param("robot_description"))
     except KeyError as error:
-        raise ParameterError("robot_description is not set: it says where the sonar is mounted") from error
+        raise ParameterError("robot_description is not set; the simulator reads the sonar's mount from it") from error
     except DescriptionError as error:
         raise ParameterError(str(error)) from error
