@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from importlib.util import find_spec
 from typing import Any, Dict, Optional
 
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
@@ -161,12 +162,14 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     """All of mlsm_core's parameters, in one namespace."""
 
     def check(self) -> None:
-        """Refuse an extent that cannot be reserved, and a map that would correct itself."""
+        """Refuse an extent that cannot be reserved, what is not installed, and a map that would correct itself."""
         if self.expected_blocks > MAX_PREALLOCATED_CELLS:
             raise ParameterError(
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
                 f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
             )
+        if self.insertion is InsertionKernel.NUMBA and find_spec("numba") is None:
+            raise ParameterError("insertion = NUMBA: needs numba; install it with: apt install python3-numba")
         if self.map_frame == self.odom_frame:
             raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
 
