@@ -177,12 +177,18 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(topics.ECHOES, "StampedIntensityCloud", "points to match, unless `match_input` is CLEANED"),
             _subscribes(topics.START_MATCHING, "std_msgs/Bool", "switches matching on or off"),
             _subscribes("tf", "", "`odom -> base_link`: dead reckoning"),
-            _publishes(topics.MAP_MARKERS, "visualization_msgs/MarkerArray", "every block at its true size; latched"),
+            _publishes(
+                topics.MAP_MARKERS,
+                "visualization_msgs/MarkerArray",
+                "every block at its true size; all at first, then what changed",
+            ),
             _publishes(
                 topics.MAP_CLOUD,
                 "sensor_msgs/PointCloud2",
-                "mean, height, depth and number of points of every block; latched",
+                "mean, height, depth and number of points of every block",
             ),
+            _publishes(topics.MAP_GRID, "nav_msgs/OccupancyGrid", "free, unknown and occupied from above"),
+            _publishes(topics.MAP_OCTOMAP, "octomap_msgs/Octomap", "voxels; where these messages are installed"),
             _publishes(
                 topics.MATCHED_POSE,
                 "geometry_msgs/PoseWithCovarianceStamped",
@@ -196,8 +202,10 @@ NODES: Dict[str, NodeDescription] = {
                 "tf", "", "`map -> odom` at `transform_rate`; it changes smoothly to a new fix within `blend_time`"
             ),
             _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scan"),
-            _serves("~save_map", "SaveMap", "writes `<save_folder>/<name>.ply`"),
-            _serves("~reset", "std_srvs/Trigger", "discards the map, the position in it and the path"),
+            _serves("~save_map", "SaveMap", "writes the map into `map_directory`"),
+            _serves("~load_map", "LoadMap", "takes a map of `map_directory` in the place of the present one"),
+            _serves("~reset_map", "std_srvs/Trigger", "discards the map, the position in it and the path"),
+            _serves("~get_region", "GetRegion", "returns the blocks in a box"),
         ),
     ),
     "sonar_simulator": NodeDescription(

@@ -3,6 +3,8 @@
 import sys
 import time
 from argparse import Namespace
+from dataclasses import replace
+from functools import partial
 from typing import Any, Dict, List, Optional
 
 import numpy as np
@@ -18,10 +20,24 @@ from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, REFINED, Run, errors_of, write_run, write_summary
+from mlsm_manager.offline.run_files import (
+    CORRECTED,
+    ODOMETRY,
+    REFINED,
+    Run,
+    errors_of,
+    write_run,
+    write_summary,
+    write_trajectory,
+)
+from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.ros.bag_recording import BagNames, read_recording
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
 from sonar_processing.beams.beam_correction import BeamCorrection
+
+# The frame that live.yaml's nodes call their map by default.
+_MAP_FRAME = "map"
 
 
 def run_map_bag() -> None:
@@ -42,7 +58,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     """Map the bag and write the files; return what summary.json holds. Raises RecordingError and OSError."""
     start = time.monotonic()
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth, options.ned)
-    recording = read_recording(options.bag, names)
+    recording = read_recording(options.bags[0], names)
     options.out.mkdir(parents=True, exist_ok=True)
     parameters = _fitted_to_echoes(recording, options)
     scans = _scans(recording, parameters, options)
@@ -50,9 +66,13 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     parameters = _calibrated(scans, parameters, options)
     recording = recording.corrected(parameters.part(BeamCorrection))
     replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
-    run = _run(replayed, _refined(recording, replayed, parameters) if options.refine else None)
+    refined = _refined(recording, replayed, parameters) if options.refine else None
+    sessions = _further_sessions(replayed, parameters, names, options)
+    run = _run(replayed, refined, sessions, parameters)
     errors = errors_of(run, recording)
-    write_run(options.out, options.bag.name, run, recording)
+    write_run(options.out, " ".join(bag.name for bag in options.bags), run, recording)
+    for number, session in enumerate(sessions, start=2):
+        write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, _poses(session.replayed))
     write_live(options.out / "live.yaml", parameters, names.odom_frame, names.base_frame)
     seconds = time.monotonic() - start
     summary = {
@@ -61,6 +81,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
         "calibration": _calibration(parameters),
+        **({"sessions": [session.to_mapping() for session in sessions]} if sessions else {}),
         **errors,
     }
     write_summary(options.out, summary)
@@ -88,7 +109,7 @@ def _scans(recording: Recording, parameters: ReplayParameters, options: Namespac
             scans.append(scan)
             bar.update(beams)
     if not scans:
-        raise RecordingError(f"{options.bag}: {len(recording.beams)} beams make no whole turn of the head")
+        raise RecordingError(f"{options.bags[0]}: {len(recording.beams)} beams make no whole turn of the head")
     return scans
 
 
@@ -119,14 +140,41 @@ def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParamet
         return refine(recording, replayed, parameters.for_few_scans().build_matcher(), bar.update)
 
 
-def _run(replayed: Replayed, refined: Optional[Refined]) -> Run:
-    poses = {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
-    blocks = replayed.mapper.shown.blocks
+def _further_sessions(
+    first: Replayed, parameters: ReplayParameters, names: BagNames, options: Namespace
+) -> List[Session]:
+    """Replay all bags but the first, each in the map of those before, with the first one's calibration."""
+    bags, sessions = options.bags[1:], []
+    if not bags:
+        return []
+    known = _stored(first, parameters)
+    with executor_for(len(bags), options.scheduler) as executor:
+        read = partial(read_recording, names=replace(names, truth=None))
+        for bag, ready in zip(bags, prepared_in_parallel(bags, read, parameters, executor)):
+            with _bar(len(ready[1]), "scan", bag.name[:9]) as bar:
+                sessions.append(add_session(bag, ready, parameters, known, bar.update))
+            known = _stored(sessions[-1].replayed, parameters)
+    return sessions
+
+
+def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
+    """Return the map as made when the recording ended: equal runs write equal files."""
+    return StoredMap(_MAP_FRAME, dict(replayed.mapper.layers), _calibration(parameters), replayed.times[-1])
+
+
+def _poses(replayed: Replayed) -> Dict[str, np.ndarray]:
+    return {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
+
+
+def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
+    poses = _poses(replayed)
+    stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
     counts = {"scans": len(replayed.updates), "matched": replayed.matched, "rejected": replayed.rejected}
     if refined is not None:
-        poses[REFINED], blocks = refined.poses, refined.blocks
+        poses[REFINED] = refined.poses
+        stored = replace(stored, layers={Layer.SHOWN: refined.blocks})
         counts["edges"] = refined.edges
-    return Run(replayed.times, poses, blocks, {**counts, "blocks": len(blocks)})
+    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored)
 
 
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
@@ -138,4 +186,8 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         if name in summary:
             error = summary[name]
             lines.append(f"{name}: mean {error['mean']} m, sd {error['sd']} m, max {error['max']} m")
-    return [*lines, f"in {options.out}: map.ply map.png trajectory.csv live.yaml summary.json"]
+    for session in summary.get("sessions", []):
+        found = session["found_after_scans"]
+        place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
+        lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
+    return [*lines, f"in {options.out}: map.mlsm map.ply map.png trajectory.csv live.yaml summary.json"]
