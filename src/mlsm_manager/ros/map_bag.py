@@ -92,7 +92,7 @@ def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace)
     heights = np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])
     advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
     for sign in suspicions(heights, scans):
-        print(f"map_bag: {options.bag}: {sign}; {advice}", file=sys.stderr)
+        print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
 
 
 def _fitted_to_echoes(recording: Recording, options: Namespace) -> ReplayParameters:
