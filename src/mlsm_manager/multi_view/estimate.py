@@ -1,0 +1,59 @@
+"""What the live solver knows when a scan has ended."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mlsm_manager.matching.planar import composed, inverse
+from mlsm_manager.multi_view.state import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
+
+
+@dataclass(frozen=True)
+class LiveEstimate:
+    """Known from the scan that ended at `time` [s] and those before it.
+
+    odometry_pose: T_odom_base (3,) then. node: (width,) the newest node's unknowns. run: (2,) the run's unknowns.
+    covariance: (width + 2, width + 2) of both. comparisons: number of points compared with surfaces.
+    """
+
+    time: float
+    odometry_pose: np.ndarray
+    node: np.ndarray
+    run: np.ndarray
+    covariance: np.ndarray
+    comparisons: int
+
+    @property
+    def T_map_base(self) -> np.ndarray:
+        """(3,) x y [m], yaw [rad]."""
+        return self.odometry_pose + self.node[POSE]
+
+    @property
+    def T_map_odom(self) -> np.ndarray:
+        """(3,) the correction of the odometry."""
+        return composed(self.T_map_base, inverse(self.odometry_pose))
+
+    @property
+    def pose_covariance(self) -> np.ndarray:
+        """(3, 3) of T_map_base: m^2, m rad, rad^2."""
+        return self.covariance[POSE, POSE]
+
+    @property
+    def node_deviations(self) -> np.ndarray:
+        """(width,) standard deviations of `node`."""
+        return np.sqrt(np.diag(self.covariance)[:-RUN_COLUMNS])
+
+    @property
+    def run_deviations(self) -> np.ndarray:
+        """(2,) standard deviations of `run`."""
+        return np.sqrt(np.diag(self.covariance)[-RUN_COLUMNS:])
+
+    @property
+    def range_scale(self) -> float:
+        """True range over reported range, minus 1."""
+        return float(self.run[RANGE_SCALE])
+
+    @property
+    def sonar_delay(self) -> float:
+        """Seconds by which beams are later than their stamps."""
+        return float(self.run[DELAY])

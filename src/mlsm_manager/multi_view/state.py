@@ -1,0 +1,51 @@
+"""Names of the unknowns and where they stand in a vector.
+
+A node is a moment between two scans. Its first three columns correct the odometry there: T_map_base is the odometry's
+pose plus x, y and yaw. An odometry model may add columns of its own. The run's unknowns come after all nodes.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+X, Y, YAW = range(3)
+POSE = slice(0, 3)
+POSE_COLUMNS = 3
+DIRECTION, SCALE = 3, 4
+RANGE_SCALE, DELAY = range(2)
+RUN_COLUMNS = 2
+
+
+@dataclass
+class State:
+    """nodes: (n, width) corrections of the odometry at the nodes. run: (2,) range scale and sonar delay [s]."""
+
+    nodes: np.ndarray
+    run: np.ndarray
+
+    def copy(self) -> "State":
+        """Return a copy that can be changed alone."""
+        return State(self.nodes.copy(), self.run.copy())
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Where the free unknowns stand: those of nodes `first` to `last` (both included), then those of the run."""
+
+    first: int
+    last: int
+    width: int
+
+    @property
+    def size(self) -> int:
+        """Number of free unknowns."""
+        return self.run_start + RUN_COLUMNS
+
+    @property
+    def run_start(self) -> int:
+        """Place of the run's first unknown."""
+        return self.width * (self.last - self.first + 1)
+
+    def node_start(self, node: np.ndarray) -> np.ndarray:
+        """Return the place of the first column of each node."""
+        return self.width * (np.asarray(node) - self.first)
