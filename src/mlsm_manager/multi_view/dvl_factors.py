@@ -69,6 +69,10 @@ class DvlFactors:
         durations: np.ndarray,
         steps: np.ndarray,
     ) -> None:
+        """Add the steps. Noise is one of the reported velocities, so the residuals are those per unit of scale.
+
+        The derivative by the scale contains that; else the fit would shrink the world to make them smaller.
+        """
         step = steps[:, 0] + 1j * steps[:, 1]
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         turned = _turned(step, nodes[:-1, DIRECTION] + yaw, 0.0)
@@ -79,7 +83,7 @@ class DvlFactors:
         for axis, part in ((0, np.real), (1, np.imag)):
             places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW)
             by_angle = -part(1j * scaled)
-            slopes = (one, -one, by_angle, -part(turned), by_angle / 2.0, by_angle / 2.0)
+            slopes = (one, -one, by_angle, -part(turned) - part(residual), by_angle / 2.0, by_angle / 2.0)
             columns = starts[:, np.newaxis] + np.array(places)
             equations.add(columns, np.column_stack(slopes), part(residual), weight)
 
