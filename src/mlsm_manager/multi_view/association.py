@@ -40,7 +40,7 @@ class BlockIndex:
 
 def blocks_of(points: PlacedPoints, block_scans: int) -> List[BlockIndex]:
     """Return an index for every block of `block_scans` scans that has enough points."""
-    blocks, starts = np.unique(points.scans // block_scans, return_index=True)
+    _, starts = np.unique(points.scans // block_scans, return_index=True)
     ends = np.append(starts[1:], len(points))
     rows = [np.arange(start, end) for start, end in zip(starts, ends) if end - start >= _FEWEST]
     return [BlockIndex(points.places[group], group) for group in rows]

@@ -49,7 +49,7 @@ class _Batch:
     def __init__(self, log: RunLog, odometry: DvlFactors, parameters: MultiViewParameters, state: State) -> None:
         self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
         self._layout = Layout(0, log.scan_count, odometry.width)
-        self._poses = log.node_poses(0, log.scan_count)
+        self._poses = log.node_poses(np.arange(log.scan_count + 1))
         self._solution = None
 
     def step(self) -> float:
@@ -59,7 +59,7 @@ class _Batch:
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
         odometry.add_steps(equations, self._layout, self.state.nodes, self._log.node_times, self._poses)
-        points = place(self._log, self.state, 0, self._layout.last)
+        points = place(self._log, self.state, self._log.rows(0, self._layout.last))
         pairs = pairs_between(points, points, blocks_of(points, matching.block_scans), matching.cut, matching)
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
         self._solution = SparseSolution(equations)

@@ -22,12 +22,17 @@ def add_comparisons(
     targets: PlacedPoints,
     matching: SurfaceMatching,
     cut: float,
+    importance: float = 1.0,
 ) -> int:
-    """Add the distances of `sources` from their neighbours' surfaces; return how many there are."""
+    """Add the distances of `sources` from their neighbours' surfaces; return how many there are.
+
+    importance: factor of the weights, one or one per target.
+    """
     if not len(pairs.rows):
         return 0
     residual, jacobian = linearised(pairs, sources, targets)
     weight = weights(residual, sources.slants[pairs.rows], targets.slants[pairs.neighbours], matching, cut)
+    weight = weight * np.broadcast_to(importance, len(targets))[pairs.neighbours]
     columns, information, gradient = _summed(
         sources.scans[pairs.rows], targets.scans[pairs.neighbours], residual, jacobian, weight, layout
     )
@@ -95,7 +100,6 @@ def _summed(
 
 def _columns(scans: np.ndarray, other_scans: np.ndarray, layout: Layout) -> np.ndarray:
     nodes = np.column_stack([scans, scans + 1, other_scans, other_scans + 1])
-    poses = layout.node_start(nodes)[:, :, np.newaxis] + np.arange(POSE_COLUMNS)
-    poses = np.where((nodes >= layout.first)[:, :, np.newaxis], poses, -1)
+    poses = layout.pose_columns(nodes)
     run = np.broadcast_to(layout.run_start + np.arange(RUN_COLUMNS), (len(scans), RUN_COLUMNS))
     return np.concatenate([poses.reshape(len(scans), -1), run], axis=1)

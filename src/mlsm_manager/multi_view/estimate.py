@@ -13,7 +13,8 @@ class LiveEstimate:
     """Known from the scan that ended at `time` [s] and those before it.
 
     odometry_pose: T_odom_base (3,) then. node: (width,) the newest node's unknowns. run: (2,) the run's unknowns.
-    covariance: (width + 2, width + 2) of both. comparisons: number of points compared with surfaces.
+    covariance: (width + 2, width + 2) of both. own_covariance: the same if the frozen map had no error.
+    comparisons: number of points compared with surfaces.
     """
 
     time: float
@@ -21,6 +22,7 @@ class LiveEstimate:
     node: np.ndarray
     run: np.ndarray
     covariance: np.ndarray
+    own_covariance: np.ndarray
     comparisons: int
 
     @property
@@ -40,13 +42,13 @@ class LiveEstimate:
 
     @property
     def node_deviations(self) -> np.ndarray:
-        """(width,) standard deviations of `node`."""
-        return np.sqrt(np.diag(self.covariance)[:-RUN_COLUMNS])
+        """(width,) standard deviations of `node` if the frozen map had no error."""
+        return np.sqrt(np.diag(self.own_covariance)[:-RUN_COLUMNS])
 
     @property
     def run_deviations(self) -> np.ndarray:
-        """(2,) standard deviations of `run`."""
-        return np.sqrt(np.diag(self.covariance)[-RUN_COLUMNS:])
+        """(2,) standard deviations of `run` if the frozen map had no error."""
+        return np.sqrt(np.diag(self.own_covariance)[-RUN_COLUMNS:])
 
     @property
     def range_scale(self) -> float:

@@ -41,9 +41,9 @@ class PlacedPoints:
         return PlacedPoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
-def place(log: RunLog, state: State, first: int, last: int) -> PlacedPoints:
-    """Return the points of scans `first` to `last` - 1; between two nodes the correction is interpolated linearly."""
-    points, scans = log.points_of(first, last), log.scans_of(first, last)
+def place(log: RunLog, state: State, rows: np.ndarray) -> PlacedPoints:
+    """Return the points in `rows` of the log; between two nodes the correction is interpolated linearly."""
+    points, scans = log.points(rows), log.scans(rows)
     times = points.times + state.run[DELAY]
     node_times = log.node_times
     begin, length = node_times[scans], node_times[scans + 1] - node_times[scans]

@@ -6,11 +6,11 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.matching.scan import Scan
+from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.surface_points import SurfacePoints
 from node_support.refused_input import RefusedInput
 
-_FIRST_CAPACITY = 4096
 _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
 
 
@@ -23,11 +23,11 @@ class RunLog:
     def __init__(self, sonar_in_base: np.ndarray) -> None:
         self.sonar_in_base = np.asarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryTimeline()
-        self._node_times: List[float] = []
+        self._node_times = GrowingArray()
         self._starts: List[int] = [0]
-        empty = np.empty(0)
-        self._points = SurfacePoints(empty, empty, empty, np.empty((0, 2)), empty)
-        self._scans = np.empty(0, dtype=np.int64)
+        self._scans = GrowingArray()
+        self._points = {field.name: GrowingArray() for field in fields(SurfacePoints)}
+        self._points["normals"] = GrowingArray(2)
 
     @property
     def scan_count(self) -> int:
@@ -36,53 +36,40 @@ class RunLog:
 
     @property
     def node_times(self) -> np.ndarray:
-        """(scan_count + 1,) s."""
-        return np.array(self._node_times)
+        """(scan_count + 1,) s; a view that the next scan makes invalid."""
+        return self._node_times.values
 
     def append(self, scan: Scan, lookahead: float) -> None:
         """Append a scan and the odometry of its track up to `lookahead` seconds after its end.
 
         Raises RefusedInput for a scan that does not end later than the one before.
         """
-        if self._node_times and scan.reference_time <= self._node_times[-1]:
-            raise RefusedInput(
-                "scans out of order",
-                f"ends at {scan.reference_time:.3f} s, the one before {self._node_times[-1]:.3f} s",
-            )
-        if not self._node_times:
-            self._node_times.append(min(scan.start, scan.reference_time - _SHORTEST_SCAN))
-        self._node_times.append(scan.reference_time)
+        if not len(self._node_times):
+            self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
+        newest = self.node_times[-1]
+        if scan.reference_time <= newest:
+            text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
+            raise RefusedInput("scans out of order", text)
+        self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
-        self._append_points(SurfacePoints.of(scan, self.sonar_in_base))
+        points = SurfacePoints.of(scan, self.sonar_in_base)
+        for name, array in self._points.items():
+            array.extend(getattr(points, name))
+        self._scans.extend(np.full(len(points), self.scan_count))
+        self._starts.append(self._starts[-1] + len(points))
 
-    def _append_points(self, points: SurfacePoints) -> None:
-        start, scan = self._starts[-1], self.scan_count
-        end = start + len(points)
-        if end > len(self._scans):
-            capacity = max(_FIRST_CAPACITY, end, 2 * len(self._scans))
-            self._points = _enlarged(self._points, start, capacity)
-            self._scans = np.concatenate([self._scans[:start], np.empty(capacity - start, dtype=np.int64)])
-        for field in fields(points):
-            getattr(self._points, field.name)[start:end] = getattr(points, field.name)
-        self._scans[start:end] = scan
-        self._starts.append(end)
+    def rows(self, first: int, last: int) -> np.ndarray:
+        """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
+        return np.arange(self._starts[first], self._starts[last])
 
-    def points_of(self, first: int, last: int) -> SurfacePoints:
-        """Return the points of scans `first` to `last` - 1, oldest scan first."""
-        rows = slice(self._starts[first], self._starts[last])
-        return SurfacePoints(*(getattr(self._points, field.name)[rows] for field in fields(SurfacePoints)))
+    def points(self, rows: np.ndarray) -> SurfacePoints:
+        """Return the points in `rows`."""
+        return SurfacePoints(**{name: array.values[rows] for name, array in self._points.items()})
 
-    def scans_of(self, first: int, last: int) -> np.ndarray:
-        """Return the scan of each point that `points_of` returns."""
-        return self._scans[self._starts[first] : self._starts[last]]
+    def scans(self, rows: np.ndarray) -> np.ndarray:
+        """Return the scan (n,) int of each point in `rows`."""
+        return self._scans.values[rows].astype(np.int64)
 
-    def node_poses(self, first: int, last: int) -> np.ndarray:
-        """Return T_odom_base (n, 3) at nodes `first` to `last` (both included)."""
-        return self.odometry.at(np.array(self._node_times[first : last + 1]))
-
-
-def _enlarged(points: SurfacePoints, count: int, capacity: int) -> SurfacePoints:
-    arrays = [getattr(points, field.name) for field in fields(SurfacePoints)]
-    return SurfacePoints(
-        *(np.concatenate([array[:count], np.empty((capacity - count, *array.shape[1:]))]) for array in arrays)
-    )
+    def node_poses(self, nodes: np.ndarray) -> np.ndarray:
+        """Return T_odom_base (n, 3) at `nodes` (n,)."""
+        return self.odometry.at(self.node_times[nodes])

@@ -4,7 +4,7 @@ A node is a moment between two scans. Its first three columns correct the odomet
 pose plus x, y and yaw. An odometry model may add columns of its own. The run's unknowns come after all nodes.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,11 +30,16 @@ class State:
 
 @dataclass(frozen=True)
 class Layout:
-    """Where the free unknowns stand: those of nodes `first` to `last` (both included), then those of the run."""
+    """Where the free unknowns stand: those of nodes `first` to `last` (both included), then those of the run.
+
+    Nodes before `first` are frozen. Several of them share one group, whose pose stands after the free unknowns.
+    group_of_node: (first,) which one; -1 for a node that nothing depends on.
+    """
 
     first: int
     last: int
     width: int
+    group_of_node: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     @property
     def size(self) -> int:
@@ -49,3 +54,12 @@ class Layout:
     def node_start(self, node: np.ndarray) -> np.ndarray:
         """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
+
+    def pose_columns(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the places (..., 3) of the poses of nodes (...); -1 for a frozen node without a group."""
+        starts = self.node_start(nodes)
+        if self.first:
+            groups = self.group_of_node[np.minimum(nodes, self.first - 1)]
+            frozen = np.where(groups >= 0, self.size + POSE_COLUMNS * groups, -POSE_COLUMNS)
+            starts = np.where(nodes >= self.first, starts, frozen)
+        return np.maximum(starts[..., np.newaxis] + np.arange(POSE_COLUMNS), -1)
