@@ -32,7 +32,7 @@ def add_comparisons(
         return 0
     residual, jacobian = linearised(pairs, sources, targets)
     weight = weights(residual, sources.slants[pairs.rows], targets.slants[pairs.neighbours], matching, cut)
-    weight = weight * np.broadcast_to(importance, len(targets))[pairs.neighbours]
+    weight = weight * pairs.importance * np.broadcast_to(importance, len(targets))[pairs.neighbours]
     columns, information, gradient = _summed(
         sources.scans[pairs.rows], targets.scans[pairs.neighbours], residual, jacobian, weight, layout
     )

@@ -66,13 +66,13 @@ class SurfaceMatching(ParameterSet):
         0.06, "angle within which a beam may have heard a point: twice the half-power half width of common heads",
         unit="rad", low=0.0, high=0.5,
     )  # fmt: skip
-    cut: float = parameter(2.0, "points farther apart are not compared", unit="m", low=0.1, high=50.0)
+    cut: float = parameter(2.2, "points farther apart are not compared", unit="m", low=0.1, high=50.0)
     wide_cut: float = parameter(4.0, "the cut that a new scan starts with", unit="m", low=0.1, high=50.0)
     weight: float = parameter(
         0.03, "weight of one comparison: neighbours share errors, and a point meets many scans", low=1e-4, high=1.0
     )
     min_cosine: float = parameter(
-        0.8, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99
+        0.75, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99
     )
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50

@@ -1,6 +1,6 @@
 """Where the points of scans lie in the map, given the unknowns, and how these move them."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
@@ -16,7 +16,7 @@ class PlacedPoints:
     """n points in the map.
 
     scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, from base_link to them. normals: (n, 2).
-    slants: (n,) m. shares: (n,) how far from the scan's first node (0) to its second (1) they were heard.
+    slants: (n,) m. qualities: (n,). shares: (n,) how far from the scan's first node (0) to its second (1) they were heard.
     by_run: (n, 2, 2) derivatives of the places by range scale and delay, last axis the unknown.
     """
 
@@ -25,6 +25,7 @@ class PlacedPoints:
     arms: np.ndarray
     normals: np.ndarray
     slants: np.ndarray
+    qualities: np.ndarray
     shares: np.ndarray
     by_run: np.ndarray
 
@@ -34,7 +35,7 @@ class PlacedPoints:
     def moved_by_run(self, change: np.ndarray) -> "PlacedPoints":
         """Return the points after the run's unknowns changed a little, by `change` (2,), to first order."""
         places = self.places + self.by_run @ change
-        return PlacedPoints(self.scans, places, self.arms, self.normals, self.slants, self.shares, self.by_run)
+        return replace(self, places=places)
 
     def selected(self, rows: np.ndarray) -> "PlacedPoints":
         """Return the points in `rows`: indices, or (n,) bool."""
@@ -58,7 +59,7 @@ def place(log: RunLog, state: State, rows: np.ndarray) -> PlacedPoints:
     by_delay = velocity[:, :2] + velocity[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
     return PlacedPoints(
         scans=scans, places=poses[:, :2] + arms, arms=arms, normals=rotated(points.normals, poses[:, YAW]),
-        slants=points.slants, shares=shares, by_run=np.stack([sight, by_delay], axis=2),
+        slants=points.slants, qualities=points.qualities, shares=shares, by_run=np.stack([sight, by_delay], axis=2),
     )  # fmt: skip
 
 

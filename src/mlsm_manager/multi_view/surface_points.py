@@ -9,11 +9,14 @@ from scipy.spatial import cKDTree
 from mlsm_manager.matching.planar import inverse, rotated, transformed
 from mlsm_manager.matching.scan import Scan
 
-_NEIGHBOURS = 10  # enough for a line with the noise of dense echoes, few enough to stay on one wall
-_FEWEST = 5  # a line through fewer points says little about its direction
-_FLATNESS = 0.3  # variance across over variance along: above it the points are a heap and no line
-_REACH = 2.0  # m: neighbours at short range
-_REACH_PER_RANGE = 0.12  # rad: beams fan out; about four steps of a head with 1.8 deg
+_NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
+_REACH = 2.3  # m: neighbours at short range
+_REACH_PER_RANGE = 0.14  # rad: beams fan out; about four steps of a head with 1.8 deg
+_NEAR = 0.75  # share of the reach within which a neighbour counts fully; from there to the reach it fades out
+_FEWEST = (4.0, 5.0)  # neighbours, the point included: from no line at all to a line
+_FLATNESS = (0.35, 0.25)  # variance across over variance along: from a heap to a line
+_NOTHING = 1e-9  # m: keeps points on top of each other, or of the sonar, from dividing by zero
+_GRAZING = (0.02, 0.1)  # cosine of incidence: from no telling which side of a surface was heard to certainty
 
 
 @dataclass(frozen=True)
@@ -22,7 +25,9 @@ class SurfacePoints:
 
     times: (n,) s, stamps of their beams. ranges: (n,) m from the sonar as reported. bearings: (n,) rad from the sonar,
     in base_link. normals: (n, 2) of the surface in base_link at the point's own time, pointing away from the sonar.
-    slants: (n,) m, range times the sine of the angle of incidence.
+    slants: (n,) m, range times the sine of the angle of incidence. qualities: (n,) from above 0 to 1, how certainly the
+    point lies on a surface; what makes a point drop out takes its quality to 0 first, so that nothing hangs on a
+    rounding error.
     """
 
     times: np.ndarray
@@ -30,6 +35,7 @@ class SurfacePoints:
     bearings: np.ndarray
     normals: np.ndarray
     slants: np.ndarray
+    qualities: np.ndarray
 
     def __len__(self) -> int:
         return len(self.times)
@@ -43,32 +49,41 @@ class SurfacePoints:
     def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "SurfacePoints":
         """Return the points of a scan that lie on surfaces; sonar_in_base: (2,) m, where the sonar is in base_link."""
         poses = scan.track.at(scan.times)
-        normals, known = surface_normals(scan.points[:, :2], poses, sonar_in_base)
-        poses, seen = poses[known], scan.points[known][:, :2]
-        sight = transformed(inverse(poses), seen)[:, :2] - sonar_in_base
-        normals = rotated(normals[known], -poses[:, 2])
-        normals = normals * np.where(np.einsum("na,na->n", normals, sight) < 0.0, -1.0, 1.0)[:, np.newaxis]
+        sight = transformed(inverse(poses), scan.points[:, :2]) - sonar_in_base
+        ranges = np.hypot(sight[:, 0], sight[:, 1])
+        normals, qualities = surface_normals(scan.points[:, :2], ranges)
+        normals = rotated(normals, -poses[:, 2])
+        outward = np.einsum("na,na->n", normals, sight)
+        normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
         slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
-        return cls(
-            scan.times[known], np.hypot(sight[:, 0], sight[:, 1]), np.arctan2(sight[:, 1], sight[:, 0]), normals, slants
-        )
+        qualities = qualities * ramp(np.abs(outward) / np.maximum(ranges, _NOTHING), *_GRAZING)
+        known = qualities > 0.0
+        bearings = np.arctan2(sight[:, 1], sight[:, 0])
+        return cls(*(array[known] for array in (scan.times, ranges, bearings, normals, slants, qualities)))
 
 
-def surface_normals(points: np.ndarray, poses: np.ndarray, sonar_in_base: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and (n,) where they do lie on one.
+def surface_normals(points: np.ndarray, ranges: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and how certain these are (n,), 0 to 1.
 
-    poses: (n, 3) T_odom_base when each point was heard.
+    ranges: (n,) m from the sonar.
     """
-    if len(points) < _FEWEST:
-        return np.zeros((len(points), 2)), np.zeros(len(points), dtype=bool)
-    sonar = poses[:, :2] + rotated(np.broadcast_to(sonar_in_base, (len(points), 2)), poses[:, 2])
-    reach = np.maximum(_REACH, _REACH_PER_RANGE * np.hypot(*(points - sonar).T))
-    distance, index = cKDTree(points).query(points, k=min(_NEIGHBOURS, len(points)))
-    near = distance <= reach[:, np.newaxis]
-    count = near.sum(axis=1)
-    group = points[np.where(near, index, 0)]
-    mean = (group * near[..., np.newaxis]).sum(axis=1) / count[:, np.newaxis]
-    offset = (group - mean[:, np.newaxis]) * near[..., np.newaxis]
-    covariance = np.einsum("nka,nkb->nab", offset, offset) / count[:, np.newaxis, np.newaxis]
+    count = min(_NEIGHBOURS + 1, len(points))
+    if count < _FEWEST[0]:
+        return np.zeros((len(points), 2)), np.zeros(len(points))
+    distance, index = cKDTree(points).query(points, k=count)
+    reach = np.minimum(np.maximum(_REACH, _REACH_PER_RANGE * ranges), distance[:, -1])
+    reach = np.maximum(reach, _NOTHING)[:, np.newaxis]
+    weight = ramp(distance, reach, _NEAR * reach)
+    total = weight.sum(axis=1)
+    group = points[index]
+    mean = (group * weight[..., np.newaxis]).sum(axis=1) / total[:, np.newaxis]
+    offset = group - mean[:, np.newaxis]
+    covariance = np.einsum("nk,nka,nkb->nab", weight, offset, offset) / total[:, np.newaxis, np.newaxis]
     values, vectors = np.linalg.eigh(covariance)
-    return vectors[:, :, 0], (count >= _FEWEST) & (values[:, 0] < _FLATNESS * values[:, 1])
+    flatness = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
+    return vectors[:, :, 0], ramp(total, *_FEWEST) * ramp(flatness, *_FLATNESS)
+
+
+def ramp(values: np.ndarray, zero: np.ndarray, one: np.ndarray) -> np.ndarray:
+    """Return 0 for values at `zero` and beyond, 1 at `one` and beyond, and linearly between."""
+    return np.clip((values - zero) / (one - zero), 0.0, 1.0)
