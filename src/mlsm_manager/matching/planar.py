@@ -10,6 +10,8 @@ def wrapped(angle: np.ndarray) -> np.ndarray:
 
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
+    # Of a view with gaps, numpy's cos depends in its last bit on where the view lies in memory (numpy 1.24, AVX-512).
+    yaw = np.array(yaw, order="C")
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = vectors[..., 0], vectors[..., 1]
     first = cos * x - sin * y
