@@ -66,9 +66,14 @@ def weights(
     A beam that meets a surface aslant may have heard it anywhere in its width: such a point is less certain. The
     kernel is Geman and McClure's (1985), wider while the cut is.
     """
-    variance = matching.range_deviation**2 + matching.beam_half_width**2 * (slant**2 + other_slant**2)
+    variance = variances(slant, other_slant, matching)
     widening = max(1.0, cut / matching.cut)
     return matching.weight / variance / (1.0 + residual**2 / variance / widening**2) ** 2
+
+
+def variances(slant: np.ndarray, other_slant: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
+    """Return the variances (m,) [m^2] of residuals whose points have slants (m,) [m]."""
+    return matching.range_deviation**2 + matching.beam_half_width**2 * (slant**2 + other_slant**2)
 
 
 def _by_pose(arms: np.ndarray, normals: np.ndarray) -> np.ndarray:

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlsm_manager.matching.planar import composed, inverse
 from mlsm_manager.multi_view.state import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
 
 
@@ -12,28 +11,22 @@ from mlsm_manager.multi_view.state import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
 class LiveEstimate:
     """Known from the scan that ended at `time` [s] and those before it.
 
-    odometry_pose: T_odom_base (3,) then. node: (width,) the newest node's unknowns. run: (2,) the run's unknowns.
-    covariance: (width + 2, width + 2) of both. own_covariance: the same if the frozen map had no error.
-    comparisons: number of points compared with surfaces.
+    T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. T_map_odom: (3,) the correction. node: (width,)
+    the newest node's unknowns. run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
+    own_covariance: the same if the frozen map had no error. comparisons: number of points compared with surfaces.
+    agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these.
     """
 
     time: float
-    odometry_pose: np.ndarray
+    T_odom_base: np.ndarray
+    T_map_base: np.ndarray
+    T_map_odom: np.ndarray
     node: np.ndarray
     run: np.ndarray
     covariance: np.ndarray
     own_covariance: np.ndarray
     comparisons: int
-
-    @property
-    def T_map_base(self) -> np.ndarray:
-        """(3,) x y [m], yaw [rad]."""
-        return self.odometry_pose + self.node[POSE]
-
-    @property
-    def T_map_odom(self) -> np.ndarray:
-        """(3,) the correction of the odometry."""
-        return composed(self.T_map_base, inverse(self.odometry_pose))
+    agreement: float
 
     @property
     def pose_covariance(self) -> np.ndarray:

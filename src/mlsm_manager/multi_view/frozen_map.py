@@ -11,7 +11,9 @@ from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import POSE_COLUMNS, State
 
+_AGE_DISTANCE = 5.0  # m by which the newest block counts as farther than the oldest: the oldest drifted least
 _FADING = 0.1  # share of the reach within which a block fades out, so that no block appears at once
+_NO_DISTANCE = 1e-9  # m: keeps blocks at one place from dividing by zero
 
 
 @dataclass(frozen=True)
@@ -40,7 +42,8 @@ def nearest_blocks(
     scans = parameters.matching.block_scans
     middles = np.arange(count) * scans + scans // 2
     places = log.node_poses(middles)[:, :2] + state.nodes[middles, :2]
-    importance = fading(np.hypot(*(places - place_now).T), parameters.window.max_frozen_blocks)
+    distances = np.hypot(*(places - place_now).T) + _AGE_DISTANCE * np.arange(count) / max(count, 1)
+    importance = fading(distances, parameters.window.max_frozen_blocks)
     numbers = np.flatnonzero(importance > 0.0)
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
@@ -51,14 +54,14 @@ def nearest_blocks(
 
 
 def fading(distances: np.ndarray, most: int) -> np.ndarray:
-    """Return factors (b,) of blocks at `distances` (b,) [m]: 1 for near ones, falling to 0 so that at most `most` count.
+    """Return factors (b,) of blocks at `distances` (b,) [m]: 1 for near ones, falling to 0; at most `most` are above 0.
 
-    They depend on the distances continuously.
+    They depend on the distances continuously. Blocks at one distance fade together.
     """
     if len(distances) <= most:
         return np.ones(len(distances))
     border = np.partition(distances, most)[most]
-    return np.clip((border - distances) / (_FADING * border), 0.0, 1.0)
+    return np.clip((border - distances) / max(_FADING * border, _NO_DISTANCE), 0.0, 1.0)
 
 
 def joint_covariance(covariances: np.ndarray) -> np.ndarray:

@@ -4,11 +4,13 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.matching.planar import composed, inverse
+from mlsm_manager.multi_view.agreement import agreement
 from mlsm_manager.multi_view.association import blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
-from mlsm_manager.multi_view.frozen_map import FrozenMap, joint_covariance, nearest_blocks
+from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import place
@@ -43,6 +45,7 @@ class LiveWindow:
         self._poses = log.node_poses(np.arange(first, last + 1))
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
+        self._met = ()
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
@@ -99,11 +102,12 @@ class LiveWindow:
         recent = place(self._log, self._state, self._log.rows(self._recent, self._layout.last))
         sources = recent.selected(recent.scans >= self._layout.first)
         frozen = self._frozen.moved_by_run(self._state.run)
-        pairs = pairs_between(sources, frozen, self._frozen.indices, cut, matching)
+        to_frozen = pairs_between(sources, frozen, self._frozen.indices, cut, matching)
         importance = self._frozen.importance
-        count = add_comparisons(equations, self._layout, pairs, sources, frozen, matching, cut, importance)
-        pairs = pairs_between(sources, recent, blocks_of(recent, matching.block_scans), cut, matching)
-        return count + add_comparisons(equations, self._layout, pairs, sources, recent, matching, cut)
+        count = add_comparisons(equations, self._layout, to_frozen, sources, frozen, matching, cut, importance)
+        to_recent = pairs_between(sources, recent, blocks_of(recent, matching.block_scans), cut, matching)
+        self._met = ((to_frozen, sources, frozen), (to_recent, sources, recent))
+        return count + add_comparisons(equations, self._layout, to_recent, sources, recent, matching, cut)
 
     def _move(self, step: np.ndarray) -> None:
         nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)
@@ -124,9 +128,13 @@ class LiveWindow:
     def estimate(self) -> LiveEstimate:
         """Return what is known of the newest node."""
         newest = np.arange(self._layout.size - self._layout.width - RUN_COLUMNS, self._layout.size)
+        T_odom_base, node = self._poses[-1], self._state.nodes[-1].copy()
+        T_map_base = T_odom_base + node[POSE]
         return LiveEstimate(
-            time=float(self._log.node_times[-1]), odometry_pose=self._poses[-1], node=self._state.nodes[-1].copy(),
-            run=self._state.run.copy(), covariance=self._solution.covariance(newest, self._held_covariance),
+            time=float(self._log.node_times[-1]), T_odom_base=T_odom_base, T_map_base=T_map_base,
+            T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
+            covariance=self._solution.covariance(newest, self._held_covariance),
             own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
             comparisons=self._comparisons,
+            agreement=agreement(self._met, self._layout.last - 1, self._parameters.matching),
         )  # fmt: skip

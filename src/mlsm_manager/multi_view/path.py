@@ -22,7 +22,7 @@ def live_path(
     known_from = np.array([estimate.time for estimate in estimates]) + latency
     newest = np.searchsorted(known_from, times, side="right") - 1
     nodes = np.array([estimate.node for estimate in estimates])[newest]
-    before = np.array([estimate.odometry_pose for estimate in estimates])[newest]
+    before = np.array([estimate.T_odom_base for estimate in estimates])[newest]
     return np.where((newest >= 0)[:, np.newaxis], odometry.continued(nodes, before, poses), poses)
 
 
