@@ -20,14 +20,9 @@ def unwrapped(angle: float, near: float) -> float:
 
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
-<<<<<<< HEAD:src/node_support/geometry/planar.py
     # On a column of a table numpy picks between two sines by where in memory the result lies; they differ in the last
     # bit, so that equal runs would end differently. Contiguous values always take the same one.
     yaw = np.asarray(yaw, order="C")
-=======
-    # Of a view with gaps, numpy's cos depends in its last bit on where the view lies in memory (numpy 1.24, AVX-512).
-    yaw = np.array(yaw, order="C")
->>>>>>> solver/position:src/mlsm_manager/matching/planar.py
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = vectors[..., 0], vectors[..., 1]
     first = cos * x - sin * y
