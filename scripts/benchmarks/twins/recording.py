@@ -9,9 +9,9 @@ from benchmarks.twins.parameters import TwinParameters
 from benchmarks.twins.paths import true_path
 from benchmarks.twins.sonar import heard
 from benchmarks.twins.water import made_water
-from mlsm_manager.mapping.recording import Recording, Truth
-from mlsm_manager.matching.planar import matrices
-from sonar_processing.placed_beam import PlacedBeam
+from mlsm_manager.offline.recording import Recording, Truth
+from node_support.geometry.planar import matrices
+from sonar_processing.beams.placed_beam import PlacedBeam
 
 _AT_ENDS = 2.0  # s at both ends of the recording without beams, so that odometry covers delayed beams
 

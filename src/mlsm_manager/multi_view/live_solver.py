@@ -4,7 +4,7 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.matching.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.growing import GrowingArray

@@ -4,7 +4,6 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.planar import composed, inverse
 from mlsm_manager.multi_view.agreement import agreement
 from mlsm_manager.multi_view.association import blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import add_comparisons
@@ -17,6 +16,7 @@ from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
+from node_support.geometry.planar import composed, inverse
 
 _MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
 

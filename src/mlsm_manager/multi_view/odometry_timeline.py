@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.matching.scan import Track
+from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.growing import GrowingArray
 
 

@@ -4,7 +4,7 @@ from typing import Sequence
 
 import numpy as np
 
-from mlsm_manager.matching.scan import Track
+from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
 

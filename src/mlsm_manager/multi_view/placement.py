@@ -4,9 +4,9 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from mlsm_manager.matching.planar import rotated
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE, YAW, State
+from node_support.geometry.planar import rotated
 
 _HALF_SECOND = 0.5  # s: the velocity of a point is averaged over one second, longer than the odometry's period
 

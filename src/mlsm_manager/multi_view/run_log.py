@@ -5,11 +5,11 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.matching.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.surface_points import SurfacePoints
-from node_support.refused_input import RefusedInput
+from node_support.errors import RefusedInput
 
 _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
 

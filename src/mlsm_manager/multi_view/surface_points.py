@@ -6,8 +6,8 @@ from typing import Sequence, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.matching.planar import inverse, rotated, transformed
-from mlsm_manager.matching.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan
+from node_support.geometry.planar import inverse, rotated, transformed
 
 _NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
 _REACH = 2.3  # m: neighbours at short range

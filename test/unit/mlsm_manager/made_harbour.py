@@ -5,8 +5,8 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.matching.planar import inverse, rotated, transformed
-from mlsm_manager.matching.scan import Scan, Track
+from mlsm_manager.matching.problem.scan import Scan, Track
+from node_support.geometry.planar import inverse, rotated, transformed
 
 TURN = 14.0  # s per turn of the head
 BEAMS = 120

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.matching.scan import Track
+from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.association import Pairs
 from mlsm_manager.multi_view.comparisons import linearised, weights
 from mlsm_manager.multi_view.dvl_factors import DvlFactors

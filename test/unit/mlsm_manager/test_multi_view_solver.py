@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.matching.planar import composed
-from mlsm_manager.matching.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import DvlOdometry, MultiViewParameters, SolverWindow
 from mlsm_manager.multi_view.path import live_path, solved_path
 from mlsm_manager.multi_view.state import DELAY, DIRECTION
-from node_support.refused_input import RefusedInput
+from node_support.errors import RefusedInput
+from node_support.geometry.planar import composed
 
 DIRECTION_ERROR, LATE = 0.12, 0.6
 DEFAULTS = MultiViewParameters()
