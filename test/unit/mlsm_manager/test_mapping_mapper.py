@@ -6,8 +6,8 @@ from made_scans import at_velocity, harbour, scan_of, still, wall
 from mlsm_manager.localisation.mapper import Mapper, MapSettings
 from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.matchers.matcher_table.matcher_table import MATCHERS, MatcherName
-from mlsm_manager.matching.matchers.matcher_table.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchStatus
 from mlsm_manager.matching.problem.scan import Scan

@@ -6,8 +6,8 @@ from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, sti
 from scipy.stats import chi2
 
 from mlsm_manager.matching.fit.residual_covariance import PointEvidence, residual_covariance
-from mlsm_manager.matching.matchers.matcher_table.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.matcher_table.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 
 SCANS = 40
 DEVIATIONS = np.array([0.5, 0.5, 0.05, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])

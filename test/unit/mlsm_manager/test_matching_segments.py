@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
-from mlsm_manager.matching.matchers.matcher_table.closest_blocks import ClosestBlocks
-from mlsm_manager.matching.matchers.matcher_table.parameters import SegmentsMatcherParameters
-from mlsm_manager.matching.matchers.matcher_table.segments import translate_segments
-from mlsm_manager.matching.matchers.matcher_table.segments_matcher import SegmentsMatcher
+from mlsm_manager.matching.matchers.closest_blocks import ClosestBlocks
+from mlsm_manager.matching.matchers.parameters import SegmentsMatcherParameters
+from mlsm_manager.matching.matchers.segments import translate_segments
+from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
 from mlsm_manager.matching.problem.result import MatchStatus
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
