@@ -46,6 +46,10 @@ class ScanMapper(Protocol):
     correction: np.ndarray
 
     @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after the end of a scan that its track should hold."""
+
+    @property
     def blocks(self) -> Blocks:
         """The map that is shown and saved."""
 
@@ -148,6 +152,11 @@ class Localiser:
     def block_count(self) -> int:
         """Number of blocks of the map."""
         return self.mapper.block_count
+
+    @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after the end of a scan that are waited for before the scan is taken."""
+        return self.mapper.lookahead
 
     @property
     def believed_until(self) -> Optional[float]:

@@ -18,8 +18,8 @@ from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
 # Clouds: with one per scan, more than a matcher is ever behind.
-_MOST_WAITING = 8
-_NOTHING = InsertReport(0, 0, 0)
+MOST_WAITING = 8
+NOTHING_INSERTED = InsertReport(0, 0, 0)
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,12 @@ class Mapper:
         self.belief: Optional[Belief] = None
         self.correction = np.zeros(3)
         self._history = CorrectionHistory()
-        self._waiting: Deque[TimedPoints] = deque(maxlen=_MOST_WAITING)
+        self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
+
+    @property
+    def lookahead(self) -> float:
+        """A scan is matched as soon as it has ended."""
+        return 0.0
 
     @property
     def blocks(self) -> Blocks:
@@ -130,7 +135,7 @@ class Mapper:
             return self.take_placed(transformed(self.correction, cloud.points))
         if cloud.end > self._history.end:
             self._waiting.append(cloud)
-            return CloudUpdate(_NOTHING, True, 0)
+            return CloudUpdate(NOTHING_INSERTED, True, 0)
         points, unplaced = self._history.placed(cloud)
         return CloudUpdate(self.shown.insert(points), False, unplaced)
 

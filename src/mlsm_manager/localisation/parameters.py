@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 from enum import Enum
 
-from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
+from mlsm_manager.localisation.joint_mapper import JointMapper
+from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
+from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput, ScanMapper
 from mlsm_manager.localisation.mapper import Mapper, MapSettings
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from node_support.headers import StampParameters
@@ -42,15 +45,22 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class LocaliserParameters(MatcherChoice, OdometryErrors, MapParameters):
+class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, MapParameters):
     """All that a localiser is made from."""
 
     def build_localiser(self) -> Localiser:
         """Return a localiser with an empty map."""
         settings = self.localiser_settings()
-        mapper = Mapper(self.map_settings(), self.part(OdometryErrors), settings.matcher)
+        mapper = self._build_mapper(settings.matcher)
         mapper.matching = self.matches_from_start
         return Localiser(mapper, settings)
+
+    def _build_mapper(self, matcher: Matcher) -> ScanMapper:
+        errors = self.part(OdometryErrors)
+        if self.estimator is Estimator.SCAN_BY_SCAN:
+            return Mapper(self.map_settings(), errors, matcher)
+        solver = self.solver_parameters(errors, self.range_scale_deviation)
+        return JointMapper(self.map_settings(), errors, solver, matcher)
 
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""

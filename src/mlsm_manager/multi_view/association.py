@@ -64,8 +64,12 @@ def pairs_between(
         return Pairs(np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64), np.empty(0))
     rows, neighbours, distance = (np.concatenate(parts) for parts in zip(*found))
     cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals[neighbours])
-    importance = ramp(distance, cut, _FADING * cut)
-    importance = importance * ramp(cosine, matching.min_cosine, matching.min_cosine + _COSINE_FADING)
+    importance = faded(distance, cosine, cut, matching)
     importance = importance * sources.qualities[rows] * targets.qualities[neighbours]
     kept = (sources.scans[rows] != targets.scans[neighbours]) & (importance > 0.0)
     return Pairs(rows[kept], neighbours[kept], importance[kept])
+
+
+def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, matching: SurfaceMatching) -> np.ndarray:
+    """Return factors (m,) of pairs at `distance` (m,) [m] with `cosine` (m,) between normals: 0 where they drop out."""
+    return ramp(distance, cut, _FADING * cut) * ramp(cosine, matching.min_cosine, matching.min_cosine + _COSINE_FADING)

@@ -8,7 +8,7 @@ from mlsm_manager.multi_view.association import Pairs
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
-from mlsm_manager.multi_view.state import POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout
+from mlsm_manager.multi_view.state import BEFORE_THE_RUN, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout
 
 _PAIR_COLUMNS = 4 * POSE_COLUMNS + RUN_COLUMNS
 _MOST_SCANS = 10**8  # two scan numbers fit into one integer key
@@ -90,7 +90,7 @@ def _summed(
     layout: Layout,
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return columns, information and gradient of each pair of scans."""
-    keys = scans * _MOST_SCANS + other_scans
+    keys = scans * _MOST_SCANS + other_scans - BEFORE_THE_RUN
     order = np.argsort(keys, kind="stable")
     keys, jacobian = keys[order], jacobian[order]
     weighted = jacobian * weight[order, np.newaxis]
@@ -100,7 +100,7 @@ def _summed(
     for group, (start, end) in enumerate(zip(bounds[:-1], bounds[1:])):
         np.dot(weighted[start:end].T, jacobian[start:end], out=information[group])
     first = keys[bounds[:-1]]
-    return _columns(first // _MOST_SCANS, first % _MOST_SCANS, layout), information, gradient
+    return _columns(first // _MOST_SCANS, first % _MOST_SCANS + BEFORE_THE_RUN, layout), information, gradient
 
 
 def _columns(scans: np.ndarray, other_scans: np.ndarray, layout: Layout) -> np.ndarray:

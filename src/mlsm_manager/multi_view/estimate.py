@@ -14,7 +14,8 @@ class LiveEstimate:
     T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. T_map_odom: (3,) the correction. node: (width,)
     the newest node's unknowns. run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
     own_covariance: the same if the frozen map had no error. comparisons: number of points compared with surfaces.
-    agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these.
+    agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
+    mean distance of the scan's points from these surfaces.
     """
 
     time: float
@@ -27,6 +28,7 @@ class LiveEstimate:
     own_covariance: np.ndarray
     comparisons: int
     agreement: float
+    distance: float
 
     @property
     def pose_covariance(self) -> np.ndarray:

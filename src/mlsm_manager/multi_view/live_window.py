@@ -10,6 +10,7 @@ from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import place
@@ -24,12 +25,14 @@ _MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cann
 class LiveWindow:
     """Moves the free nodes of `state` and its run's unknowns in place.
 
-    estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`.
+    estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
+    standard deviations of the first node's pose, None where it defines the map. known: what was in the map before.
     """
 
     def __init__(
         self, log: RunLog, odometry: DvlFactors, parameters: MultiViewParameters, state: State,
-        estimates: Sequence[LiveEstimate], covariances: np.ndarray,
+        estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
+        known: Optional[KnownSurfaces],
     ) -> None:  # fmt: skip
         self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
         last = log.scan_count
@@ -43,6 +46,7 @@ class LiveWindow:
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._anchor = estimates[first - 1] if first else None
         self._poses = log.node_poses(np.arange(first, last + 1))
+        self._start, self._known = start, known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
         self._met = ()
@@ -90,8 +94,10 @@ class LiveWindow:
         """
         sonar = self._parameters.sonar
         if self._anchor is None:
-            own = self._odometry.first_node(), self._odometry.first_deviations()
-            return (*own, run_mean(sonar), run_deviations(sonar))
+            deviations = self._odometry.first_deviations()
+            if self._start is not None:
+                deviations[POSE] = self._start
+            return self._odometry.first_node(), deviations, run_mean(sonar), run_deviations(sonar)
         pose = self._state.nodes[self._layout.first, POSE]
         mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
         deviations = self._odometry.frozen_deviations(self._anchor.node_deviations)
@@ -104,9 +110,14 @@ class LiveWindow:
         frozen = self._frozen.moved_by_run(self._state.run)
         to_frozen = pairs_between(sources, frozen, self._frozen.indices, cut, matching)
         importance = self._frozen.importance
+        self._met = ()
         count = add_comparisons(equations, self._layout, to_frozen, sources, frozen, matching, cut, importance)
+        if self._known is not None:
+            to_known, known = self._known.compared(sources, cut, matching)
+            count += add_comparisons(equations, self._layout, to_known, sources, known, matching, cut)
+            self._met += ((to_known, sources, known),)
         to_recent = pairs_between(sources, recent, blocks_of(recent, matching.block_scans), cut, matching)
-        self._met = ((to_frozen, sources, frozen), (to_recent, sources, recent))
+        self._met += ((to_frozen, sources, frozen), (to_recent, sources, recent))
         return count + add_comparisons(equations, self._layout, to_recent, sources, recent, matching, cut)
 
     def _move(self, step: np.ndarray) -> None:
@@ -130,11 +141,12 @@ class LiveWindow:
         newest = np.arange(self._layout.size - self._layout.width - RUN_COLUMNS, self._layout.size)
         T_odom_base, node = self._poses[-1], self._state.nodes[-1].copy()
         T_map_base = T_odom_base + node[POSE]
+        share, distance = agreement(self._met, self._layout.last - 1, self._parameters.matching)
         return LiveEstimate(
             time=float(self._log.node_times[-1]), T_odom_base=T_odom_base, T_map_base=T_map_base,
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
             covariance=self._solution.covariance(newest, self._held_covariance),
             own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
             comparisons=self._comparisons,
-            agreement=agreement(self._met, self._layout.last - 1, self._parameters.matching),
+            agreement=share, distance=distance,
         )  # fmt: skip

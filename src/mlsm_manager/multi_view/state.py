@@ -14,6 +14,8 @@ POSE_COLUMNS = 3
 DIRECTION, SCALE = 3, 4
 RANGE_SCALE, DELAY = range(2)
 RUN_COLUMNS = 2
+BEFORE_THE_RUN = -2
+"""Stands for the scan of points that were in the map before the run; its nodes, -2 and -1, do not exist."""
 
 
 @dataclass
@@ -56,10 +58,11 @@ class Layout:
         return self.width * (np.asarray(node) - self.first)
 
     def pose_columns(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the places (..., 3) of the poses of nodes (...); -1 for a frozen node without a group."""
+        """Return the places (..., 3) of the poses of nodes (...); -1 for frozen ones without a group and before the run."""
         starts = self.node_start(nodes)
         if self.first:
             groups = self.group_of_node[np.minimum(nodes, self.first - 1)]
             frozen = np.where(groups >= 0, self.size + POSE_COLUMNS * groups, -POSE_COLUMNS)
             starts = np.where(nodes >= self.first, starts, frozen)
+        starts = np.where(np.asarray(nodes) >= 0, starts, -POSE_COLUMNS)
         return np.maximum(starts[..., np.newaxis] + np.arange(POSE_COLUMNS), -1)

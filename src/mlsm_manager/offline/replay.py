@@ -43,13 +43,13 @@ def replay(
 ) -> Replayed:
     """Match the `scans` of corrected beams one after the other; `on_scans` is called with 1 after each of them.
 
-    A scan is used from the moment on at which its last beam and the odometry of that time were known.
+    A scan is used from the moment on at which its last beam and the odometry that the localiser waits for were known.
     """
     localiser, track = parameters.build_localiser(), recording.track
     corrections, updates = np.empty((len(track.times), 3)), []
     done = 0
     for scan in scans:
-        known = max(done, int(np.searchsorted(track.times, scan.reference_time, side="left")))
+        known = max(done, int(np.searchsorted(track.times, scan.reference_time + localiser.lookahead, side="left")))
         corrections[done:known] = _corrections(localiser, track, done, known)
         done = known
         updates.append(localiser.take_scan(scan).scan)
