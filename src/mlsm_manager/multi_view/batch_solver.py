@@ -9,12 +9,14 @@ from mlsm_manager.multi_view.association import blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.normal_equations import NormalEquations, SparseSolution
+from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS, Layout, State
+
+_CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,8 @@ def solved(live: LiveSolver) -> BatchResult:
     while steps < window.batch_iterations and not converged:
         converged = problem.step() < window.tolerance
         steps += 1
-    problem.step()
     poses, run = problem.covariances()
-    return BatchResult(problem.state, live.log.node_times, poses, run, steps + 1, converged)
+    return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
 
 
 class _Batch:
@@ -62,7 +63,7 @@ class _Batch:
         points = place(self._log, self.state, self._log.rows(0, self._layout.last))
         pairs = pairs_between(points, points, blocks_of(points, matching.block_scans), matching.cut, matching)
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
-        self._solution = SparseSolution(equations)
+        self._solution = solution_of(equations)
         nodes = self._solution.step[: self._layout.run_start].reshape(-1, self._layout.width)
         self.state.nodes += nodes
         self.state.run += self._solution.step[self._layout.run_start :]
@@ -70,8 +71,17 @@ class _Batch:
 
     def covariances(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""
-        whole = self._solution.solve(np.eye(self._layout.size))
-        starts = self._layout.node_start(np.arange(self._layout.last + 1))
-        rows = starts[:, np.newaxis] + np.arange(POSE_COLUMNS)
         run = self._layout.run_start + np.arange(RUN_COLUMNS)
-        return whole[rows[:, :, np.newaxis], rows[:, np.newaxis]], whole[np.ix_(run, run)]
+        nodes = np.arange(self._layout.last + 1)
+        poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
+        return np.concatenate(poses), self._columns_of_inverse(run)[run]
+
+    def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
+        columns = self._layout.pose_columns(nodes)
+        inverse = self._columns_of_inverse(columns.ravel()).reshape(self._layout.size, len(nodes), POSE_COLUMNS)
+        return np.stack([inverse[own, number] for number, own in enumerate(columns)])
+
+    def _columns_of_inverse(self, columns: np.ndarray) -> np.ndarray:
+        unit = np.zeros((self._layout.size, len(columns)))
+        unit[columns, np.arange(len(columns))] = 1.0
+        return self._solution.solve(unit)

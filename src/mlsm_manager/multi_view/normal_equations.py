@@ -1,6 +1,6 @@
 """Sums of weighted residuals as normal equations, gathered in small blocks of columns."""
 
-from typing import Tuple
+from typing import Tuple, Union
 
 import numpy as np
 import scipy.linalg
@@ -8,6 +8,7 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 _REGULARISATION = 1e-9  # of a column that no residual touches: it stays where it is
+_MOST_DENSE = 2500  # unknowns, about 500 scans: up to there 50 MB and faster than a sparse solution
 
 
 class NormalEquations:
@@ -65,6 +66,11 @@ class NormalEquations:
         return (whole[: self.size, : self.size] + _REGULARISATION * scipy.sparse.eye(self.size)).tocsc()
 
 
+def solution_of(equations: NormalEquations) -> "Union[DenseSolution, SparseSolution]":
+    """Return the solution, found in the way that is faster for its size."""
+    return DenseSolution(equations) if equations.size <= _MOST_DENSE else SparseSolution(equations)
+
+
 class DenseSolution:
     """Solves normal equations of bounded size, and tells covariances."""
 
@@ -73,6 +79,10 @@ class DenseSolution:
         self._factor = scipy.linalg.cho_factor(information)
         self.step = -scipy.linalg.cho_solve(self._factor, equations.gradient)
 
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Return the inverse of the information times `right` (size, k)."""
+        return scipy.linalg.cho_solve(self._factor, right)
+
     def covariance(self, columns: np.ndarray, held_covariance: np.ndarray) -> np.ndarray:
         """Return the covariance (k, k) of unknowns `columns` (k,), where held ones err by `held_covariance`.
 
@@ -80,7 +90,7 @@ class DenseSolution:
         """
         unit = np.zeros((len(self.step), len(columns)))
         unit[columns, np.arange(len(columns))] = 1.0
-        gain = scipy.linalg.cho_solve(self._factor, unit)
+        gain = self.solve(unit)
         by_held = gain.T @ self._to_held
         return gain[columns] + by_held @ held_covariance @ by_held.T
 

@@ -83,7 +83,10 @@ class SurfaceMatching(ParameterSet):
 class SolverWindow(ParameterSet):
     """What the live solver keeps free and how far it looks."""
 
-    free_nodes: int = parameter(20, "newest nodes that may still move: about five minutes", low=2, high=200)
+    free_nodes: int = parameter(
+        40, "newest nodes that may still move: about ten minutes, in which most places are seen from all sides",
+        low=2, high=200,
+    )  # fmt: skip
     max_frozen_blocks: int = parameter(
         40, "older blocks that a scan is compared with, the nearest ones", low=1, high=500
     )
