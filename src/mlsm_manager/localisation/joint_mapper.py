@@ -69,14 +69,16 @@ class JointMapper:
     """
 
     def __init__(
-        self, settings: MapSettings, errors: OdometryErrors, parameters: MultiViewParameters, matcher: Matcher
-    ) -> None:
+        self, settings: MapSettings, errors: OdometryErrors, parameters: MultiViewParameters, matcher: Matcher,
+        sonar_in_base: np.ndarray,
+    ) -> None:  # fmt: skip
+        """`sonar_in_base`: (2,) m; a change of it counts from the next run on."""
         self.settings = settings
         self.errors = errors
         self.parameters = parameters
         self.matcher = matcher
         self.matching = False
-        self.sonar_in_base = np.zeros(2)
+        self.sonar_in_base = sonar_in_base
         self._shown = self._matched = self._new_map(1.0, 0)
         self.clear()
 

@@ -11,7 +11,6 @@ import numpy as np
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
-from mlsm_manager.localisation.sensor_model import without_doubtful_points
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
@@ -90,12 +89,11 @@ class ScanMapper(Protocol):
 class LocaliserSettings:
     """matcher: for scans near their expected place. anywhere: for a vehicle that is lost.
 
-    edge_half_width: rad, see BeamEdge. blend_time: s, within which the correction goes over to a new one.
+    blend_time: s, within which the correction goes over to a new one.
     """
 
     matcher: Matcher
     anywhere: Matcher
-    edge_half_width: float
     blend_time: float
     map_input: MapInput
 
@@ -168,7 +166,6 @@ class Localiser:
         """Match a scan and put it, and the clouds that waited for it, into the map."""
         with self._lock:
             self.notice_time(scan.reference_time)
-            scan = without_doubtful_points(scan, self._settings.edge_half_width)
             self._newest, self._newest_came = scan, self._clock()
             update = self.mapper.take_echoes(scan)
             self._live.believe(update.belief)

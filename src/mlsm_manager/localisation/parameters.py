@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Sequence
+
+import numpy as np
 
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
@@ -48,26 +51,24 @@ class MapParameters(ParameterSet):
 class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, MapParameters):
     """All that a localiser is made from."""
 
-    def build_localiser(self) -> Localiser:
-        """Return a localiser with an empty map."""
+    def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
+        """Return a localiser with an empty map; sonar_in_base: m, x y of the sonar in base_link."""
         settings = self.localiser_settings()
-        mapper = self._build_mapper(settings.matcher)
+        mapper = self._build_mapper(settings.matcher, np.array(sonar_in_base, dtype=np.float64))
         mapper.matching = self.matches_from_start
         return Localiser(mapper, settings)
 
-    def _build_mapper(self, matcher: Matcher) -> ScanMapper:
+    def _build_mapper(self, matcher: Matcher, sonar_in_base: np.ndarray) -> ScanMapper:
         errors = self.part(OdometryErrors)
         if self.estimator is Estimator.SCAN_BY_SCAN:
             return Mapper(self.map_settings(), errors, matcher)
         solver = self.solver_parameters(errors, self.range_scale_deviation)
-        return JointMapper(self.map_settings(), errors, solver, matcher)
+        return JointMapper(self.map_settings(), errors, solver, matcher, sonar_in_base)
 
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""
-        anywhere = relocaliser(self.with_effective_beam_width().part(DistributionMatcherParameters))
-        return LocaliserSettings(
-            self.build_matcher(), anywhere, self.edge_half_width, self.blend_time, self.chosen_map_input
-        )
+        anywhere = relocaliser(self.part(DistributionMatcherParameters))
+        return LocaliserSettings(self.build_matcher(), anywhere, self.blend_time, self.chosen_map_input)
 
     def map_settings(self) -> MapSettings:
         """Return what the grids are made from."""

@@ -16,8 +16,8 @@ class PlacedPoints:
     """n points in the map.
 
     scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, from base_link to them. normals: (n, 2).
-        slants: (n,) m. qualities: (n,). shares: (n,) when they were heard, 0 at the scan's first node, 1 at its second.
-        by_run: (n, 2, 2) derivatives of the places by range scale and delay, last axis the unknown.
+    slants: (n,) m. qualities: (n,). shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second.
+    by_run: (n, 2, 2) derivatives of the places by range scale and delay, last axis the unknown.
     """
 
     scans: np.ndarray

@@ -58,7 +58,7 @@ class Layout:
         return self.width * (np.asarray(node) - self.first)
 
     def pose_columns(self, nodes: np.ndarray) -> np.ndarray:
-        """Return the places (..., 3) of the poses of nodes (...); -1 for frozen ones without a group and before the run."""
+        """Return the columns (..., 3) of poses of nodes (...); -1 for a frozen one without group or before the run."""
         starts = self.node_start(nodes)
         if self.first:
             groups = self.group_of_node[np.minimum(nodes, self.first - 1)]

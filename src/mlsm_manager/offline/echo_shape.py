@@ -26,7 +26,7 @@ class EchoShape(Enum):
 
 _SUITED = {
     EchoShape.PEAK: {"mode": ExtractionMode.MATCHED_FILTER, "match_resolution": 0.5},
-    EchoShape.PLATEAU: {"mode": ExtractionMode.LEADING_EDGE, "match_resolution": 1.0},
+    EchoShape.PLATEAU: {"mode": ExtractionMode.DENSE, "spacing": 1.0, "match_resolution": 1.0},
 }
 
 

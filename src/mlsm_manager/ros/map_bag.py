@@ -8,8 +8,8 @@ from typing import Any, Dict, List, Optional
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.offline.calibration import calibrated
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
+from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
@@ -42,32 +42,28 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
     recording = read_recording(options.bag, names)
     options.out.mkdir(parents=True, exist_ok=True)
-    parameters = _fitted_to_echoes(recording, options)
-    parameters = _calibrated(_scans(recording, parameters, options), parameters, options)
+    shape = echo_shape_of([placed.beam for placed in recording.beams])
+    parameters = suited(options.parameters, shape, options.fixed)
     recording = recording.corrected(parameters.part(BeamCorrection))
     replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
-    run = _run(replayed, _refined(recording, replayed, parameters) if options.refine else None)
-    errors = errors_of(run, recording)
+    refined = _refined(recording, replayed, parameters) if options.refine else None
+    found = None if replayed.solver is None else Found.of(replayed, refined)
+    run = _run(replayed, refined, found)
     write_run(options.out, options.bag.name, run, recording)
-    write_live(options.out / "live.yaml", parameters, names.odom_frame, names.base_frame)
+    known = parameters if found is None else found.calibration.applied(parameters)
+    write_live(options.out / "live.yaml", known, names.odom_frame, names.base_frame)
     seconds = time.monotonic() - start
     summary = {
         **run.counts,
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
-        "calibration": _calibration(parameters),
-        **errors,
+        "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
+        **({} if found is None else found.to_mapping()),
+        **errors_of(run, recording),
     }
     write_summary(options.out, summary)
     return summary
-
-
-def _fitted_to_echoes(recording: Recording, options: Namespace) -> ReplayParameters:
-    if not options.calibrate:
-        return options.parameters
-    form = echo_shape_of([placed.beam for placed in recording.beams])
-    return suited(options.parameters, form, options.fixed)
 
 
 def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
@@ -81,19 +77,6 @@ def _scans(recording: Recording, parameters: ReplayParameters, options: Namespac
     return scans
 
 
-def _calibrated(scans: List[Scan], parameters: ReplayParameters, options: Namespace) -> ReplayParameters:
-    if not options.calibrate:
-        return parameters
-    with _bar(None, "", "calibrate"):
-        return calibrated(scans, parameters, options.fixed)
-
-
-def _calibration(parameters: ReplayParameters) -> Dict[str, Any]:
-    model = {name: round(value, 4) for name, value in parameters.sensor_model().to_mapping().items()}
-    chosen = parameters.to_mapping()
-    return {**{name: chosen[name] for name in ("mode", "match_resolution", "scale_deviation")}, **model}
-
-
 def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParameters) -> Replayed:
     with _bar(len(scans), "scan", "match") as bar:
         return replay(recording, scans, parameters, bar.update)
@@ -104,18 +87,17 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
 
 
 def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
-    with _bar(len(replayed.updates), "scan", "refine") as bar:
-        return refine(recording, replayed, parameters.for_few_scans().build_matcher(), bar.update)
+    with _bar(None, "", "refine"):
+        return refine(recording.track, replayed.scans, replayed.solver, parameters.resolution)
 
 
-def _run(replayed: Replayed, refined: Optional[Refined]) -> Run:
-    poses = {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
-    blocks = replayed.mapper.shown.blocks
-    counts = {"scans": len(replayed.updates), "matched": replayed.matched, "rejected": replayed.rejected}
+def _run(replayed: Replayed, refined: Optional[Refined], found: Optional[Found]) -> Run:
+    poses, blocks = {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}, replayed.mapper.blocks
     if refined is not None:
         poses[REFINED], blocks = refined.poses, refined.blocks
-        counts["edges"] = refined.edges
-    return Run(replayed.times, poses, blocks, {**counts, "blocks": len(blocks)})
+    counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
+    checked = None if found is None else found.trust
+    return Run(replayed.times, poses, blocks, {**counts, "blocks": len(blocks)}, checked)
 
 
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
@@ -127,4 +109,6 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         if name in summary:
             error = summary[name]
             lines.append(f"{name}: mean {error['mean']} m, sd {error['sd']} m, max {error['max']} m")
+    if "trust" in summary:
+        lines.append(summary["trust"])
     return [*lines, f"in {options.out}: map.ply map.png trajectory.csv live.yaml summary.json"]
