@@ -30,10 +30,8 @@ def main() -> None:
     arguments = parser.parse_args()
     source = read_recording(arguments.bag, BagNames("/sonar/raw", "odom", "base_link", None))
     for name in arguments.twins:
-        live, batch = errors(twin_of(source, TWINS[name]), TWINS[name])
-        print(
-            f"{name}: live {live.mean:.2f} m in the mean, {live.max:.2f} at most; batch {batch.mean:.2f}, {batch.max:.2f}"
-        )
+        for path, error in zip(("live", "batch"), errors(twin_of(source, TWINS[name]), TWINS[name])):
+            print(f"{name}, {path}: {error.mean:.2f} m in the mean, {error.max:.2f} m at most")
 
 
 def errors(twin: Recording, conditions: TwinParameters) -> Tuple:
