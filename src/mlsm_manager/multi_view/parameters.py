@@ -88,7 +88,10 @@ class SolverWindow(ParameterSet):
         low=2, high=200,
     )  # fmt: skip
     max_frozen_blocks: int = parameter(
-        40, "older blocks that a scan is compared with, the nearest ones", low=1, high=500
+        16,
+        "older blocks that a scan is compared with, the nearest: 80 scans, more than see one place in a tour",
+        low=1,
+        high=500,
     )
     lookahead: float = parameter(
         1.0, "seconds of odometry after a scan that are waited for, as beams may be later than stamped", unit="s",

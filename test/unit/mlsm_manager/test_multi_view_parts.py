@@ -89,7 +89,7 @@ def test_odometry_that_went_as_expected_pulls_at_nothing():
     np.testing.assert_allclose(equations.gradient, 0.0, atol=1e-9)
 
 
-@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize("column", range(4))
 def test_odometry_residuals_and_derivatives_agree(column):
     factors = DvlFactors(DvlOdometry())
     layout, times = Layout(0, 2, factors.width), np.array([0.0, 14.0, 28.0])
@@ -106,8 +106,7 @@ def test_odometry_residuals_and_derivatives_agree(column):
     moved[1, column] += STEP
     cost = (equations_at(moved).cost - equations_at(nodes).cost) / STEP / 2.0
     expected = equations_at(nodes).gradient[factors.width + column]
-    if column != 4:
-        assert cost == pytest.approx(expected, rel=1e-3, abs=1.0)
+    assert cost == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
 @given(st.lists(st.floats(0.0, 1e3), min_size=1, max_size=60), st.integers(1, 20))
@@ -212,7 +211,3 @@ def test_tracks_that_overlap_make_one_path_without_a_turn_in_its_yaw():
     whole.extend(Track(np.arange(2.0, 8.0), np.column_stack([np.arange(2.0, 8.0), np.zeros(6), np.full(6, -3.1)])), 9.0)
     np.testing.assert_allclose(whole.at(np.array([1.0, 3.5, 6.5]))[:, 0], [1.0, 3.5, 6.5])
     assert np.ptp(whole.at(np.arange(0.0, 7.0, 0.5))[:, 2]) < 0.2
-
-
-def test_every_default_parameter_is_valid():
-    assert MultiViewParameters().window.free_nodes > 1
