@@ -11,15 +11,15 @@ import numpy as np
 
 from benchmarks.twins.parameters import TWINS, TwinParameters
 from benchmarks.twins.recording import twin_of
-from mlsm_manager.bag_recording import BagNames, read_recording
-from mlsm_manager.mapping.evaluation import position_error
-from mlsm_manager.mapping.recording import Recording, scans_of
-from mlsm_manager.matching.planar import inverse, transformed
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.path import live_path, solved_path
-from sonar_processing.echo_extraction import EchoExtractorParameters, ExtractionMode
+from mlsm_manager.offline.evaluation import position_error
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.ros.bag_recording import BagNames, read_recording
+from node_support.geometry.planar import inverse, transformed
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters, ExtractionMode
 
 
 def main() -> None:

@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Deque, Optional
+from typing import Deque, List, Optional
 
 import numpy as np
 
@@ -21,12 +21,17 @@ from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import DIRECTION, POSE_COLUMNS, SCALE
+from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.path_spread import told_deviation
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 # Points of the path within a scan: about one per second of a slow head's revolution.
 _PATH_POINTS = 17
 _ORIGIN = np.zeros(3)
+# Scans that are checked for their agreement with the map: about the window of the solver.
+_CHECKED_SCANS = 20
 
 
 @dataclass
@@ -72,13 +77,13 @@ class JointMapper:
         self, settings: MapSettings, errors: OdometryErrors, parameters: MultiViewParameters, matcher: Matcher,
         sonar_in_base: np.ndarray,
     ) -> None:  # fmt: skip
-        """`sonar_in_base`: (2,) m; a change of it counts from the next run on."""
+        """`sonar_in_base`: (2,) m; `mount` changes it."""
         self.settings = settings
         self.errors = errors
         self.parameters = parameters
         self.matcher = matcher
         self.matching = False
-        self.sonar_in_base = sonar_in_base
+        self._sonar_in_base = sonar_in_base
         self._shown = self._matched = self._new_map(1.0, 0)
         self.clear()
 
@@ -103,7 +108,21 @@ class JointMapper:
     @property
     def lookahead(self) -> float:
         """Seconds of odometry after a scan's end that it is placed better with, because beams may be late."""
-        return self.parameters.window.lookahead if self.parameters.sonar.sonar_delay_deviation > 0.0 else 0.0
+        return self.parameters.window.lookahead
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m; it counts from the next run on."""
+        self._sonar_in_base = sonar_in_base
+
+    def verdicts(self) -> List[Verdict]:
+        """Return whether the newest scans of the run agree with the map, and how uncertain its path has become."""
+        if self._session is None:
+            return []
+        newest = self._session.solver.estimates[-_CHECKED_SCANS:]
+        times = np.array([estimate.time for estimate in newest])
+        radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
+        agreements = np.array([estimate.agreement for estimate in newest])
+        return [recent_agreement(times, agreements, _CHECKED_SCANS), told_deviation(times, np.array(radii))]
 
     @property
     def solver(self) -> Optional[LiveSolver]:
@@ -195,7 +214,7 @@ class JointMapper:
 
     def _new_session(self) -> _Session:
         known = KnownSurfaces(self._matched.map.blocks.mean[:, :2]) if len(self._matched.map) else None
-        solver = LiveSolver(self.parameters, self.sonar_in_base, self._start, known)
+        solver = LiveSolver(self.parameters, self._sonar_in_base, self._start, known)
         return _Session(solver, self.correction.copy())
 
     def _end_session(self) -> None:

@@ -18,6 +18,9 @@ from node_support.parameters import ParameterSet, parameter
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.
 _FOR_EVER = 1e6
 _NO_COMPASS = 1e-5
+# Deviations by which beams may be later than their stamps, and s of odometry that are worth waiting for.
+_LATE = 3.0
+_LONGEST_LOOKAHEAD = 1.0
 # rad/sqrt(s): the solver needs some freedom of the heading from scan to scan.
 _LEAST_WALK = 1e-6
 
@@ -64,7 +67,9 @@ class JointParameters(ParameterSet):
                 range_scale_deviation=range_scale_deviation, sonar_delay_deviation=self.sonar_delay_deviation
             ),
             matching=SurfaceMatching(range_deviation=self.echo_deviation),
-            window=SolverWindow(free_nodes=self.free_scans),
+            window=SolverWindow(
+                free_nodes=self.free_scans, lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD)
+            ),
         )
 
     def _odometry(self, errors: OdometryErrors) -> DvlOdometry:

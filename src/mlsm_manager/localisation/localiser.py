@@ -16,6 +16,7 @@ from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
@@ -47,6 +48,12 @@ class ScanMapper(Protocol):
     @property
     def lookahead(self) -> float:
         """Seconds of odometry after the end of a scan that its track should hold."""
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m."""
+
+    def verdicts(self) -> List[Verdict]:
+        """What the run says of itself, without any truth."""
 
     @property
     def blocks(self) -> Blocks:
@@ -155,6 +162,16 @@ class Localiser:
     def lookahead(self) -> float:
         """Seconds of odometry after the end of a scan that are waited for before the scan is taken."""
         return self.mapper.lookahead
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m."""
+        with self._lock:
+            self.mapper.mount(sonar_in_base)
+
+    def verdicts(self) -> List[Verdict]:
+        """Return what the run says of itself, without any truth."""
+        with self._lock:
+            return self.mapper.verdicts()
 
     @property
     def believed_until(self) -> Optional[float]:

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Optional
+from typing import Deque, List, Optional
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, pre
 from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import ERRORS
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
@@ -96,6 +97,13 @@ class Mapper:
     def lookahead(self) -> float:
         """A scan is matched as soon as it has ended."""
         return 0.0
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Points are matched wherever the sonar is."""
+
+    def verdicts(self) -> List[Verdict]:
+        """Each match is judged alone: its status says it."""
+        return []
 
     @property
     def blocks(self) -> Blocks:

@@ -118,6 +118,7 @@ class MlsmNodeParameters(ParameterSet):
     map_frame: str = parameter("map", "frame of the map", tunable=False)
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
     base_frame: str = parameter("base_link", "frame of the vehicle, which the dead reckoning places", tunable=False)
+    sonar_frame: str = parameter("sonar", "frame of the sonar, whose place on the vehicle tf knows", tunable=False)
     transform_rate: float = parameter(
         20.0, "how often map -> odom is sent", unit="1/s", low=0.1, high=1000.0, tunable=False
     )

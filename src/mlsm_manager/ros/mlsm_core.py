@@ -10,7 +10,7 @@ from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.localisation.update_report import report_cloud, report_scan
+from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_verdicts
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.ros.fix_publisher import FixPublisher
 from mlsm_manager.ros.map_publisher import MapPublisher
@@ -42,6 +42,7 @@ class MlsmCore:
         self._odometry = OdometryTrack(
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
+        self._mounted = False
         self._map = MapPublisher(parameters.map_frame)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
@@ -116,10 +117,12 @@ class MlsmCore:
         scan = self._scan(cloud)
         if scan is None:
             return
+        self._mount(cloud.stamp_ns)
         taken = self._localiser.take_scan(scan)
         for update in taken.clouds:
             self._report_cloud(update, cloud.stamp_ns)
         report_scan(self.health, taken.scan, self._localiser.matching)
+        report_verdicts(self.health, self._localiser.verdicts())
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
     def _check_header(self, cloud: IntensityCloud) -> None:
@@ -134,7 +137,7 @@ class MlsmCore:
         known = self._localiser.believed_until
         start = min([time, *times[:1], *([] if known is None else [known])])
         try:
-            track = self._odometry.track(start, times, time)
+            track = self._odometry.track(start, times, time, self._localiser.lookahead)
         except RefusedInput:
             self.health.count("scans not used")
             if self._localiser.matching:
