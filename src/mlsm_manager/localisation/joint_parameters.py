@@ -57,7 +57,7 @@ class JointParameters(ParameterSet):
         0.5, "standard deviation of a point square-on to its surface: half an echo's length",
         unit="m", low=0.01, high=10.0, tunable=False,
     )  # fmt: skip
-    free_scans: int = parameter(20, "newest scans whose poses may still change", low=2, high=200, tunable=False)
+    free_scans: int = parameter(40, "newest scans whose poses may still change", low=2, high=200, tunable=False)
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver."""

@@ -41,11 +41,11 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(_pair(text, parser) for text in options.set)
-    options.fixed = frozenset(values)
     if options.matcher:
         values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
+    options.fixed = frozenset(values)
     options.parameters = ReplayParameters.from_mapping(values)
     if options.refine and options.parameters.estimator is not Estimator.JOINT:
         raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
