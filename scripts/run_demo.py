@@ -149,7 +149,7 @@ def summary(watch: Watch, seconds: float) -> Dict[str, Any]:
 
 def leave_results(watch: Watch, seconds: float, output: Path) -> None:
     """Save the map, draw it and write the summary. Raises DemoError."""
-    answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("map")
+    answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("map.ply", True)
     if not answer.success:
         raise DemoError(answer.message)
     blocks = read_ply(output / "map.ply")
@@ -170,7 +170,7 @@ def run(arguments: argparse.Namespace) -> None:
     output = arguments.output.resolve()
     output.mkdir(parents=True, exist_ok=True)
     show = bool(os.environ.get("DISPLAY")) and not arguments.no_rviz
-    settings = {"rviz": str(show).lower(), "save_folder": str(output), "real_time_factor": arguments.factor}
+    settings = {"rviz": str(show).lower(), "map_directory": str(output), "real_time_factor": arguments.factor}
     graph = Graph([f"{key}:={value}" for key, value in settings.items()], output / "roslaunch.log")
     try:
         graph.wait_for_master()

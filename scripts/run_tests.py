@@ -9,11 +9,13 @@ from pathlib import Path
 from typing import Callable, List, Optional
 from xml.etree import ElementTree as ET
 
-from oldest.run import HOW_TO_GET_ONE, find_python38
+from oldest.environment import HOW_TO_GET_ONE, find_python38
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "build/test_results"
 STEP_TIMEOUT = 400.0
+# Downloads 100 MB.
+ENVIRONMENT_TIMEOUT = 1200.0
 
 
 @dataclass(frozen=True)
@@ -32,12 +34,13 @@ class Step:
     name: str
     command: List[str]
     report: Optional[Path] = None
+    timeout: float = STEP_TIMEOUT
 
 
 def steps() -> List[Step]:
     """Return all steps, quick ones first."""
     unit_report, recordings_report = RESULTS / "unit.xml", RESULTS / "recordings.xml"
-    installation_report = RESULTS / "installation.xml"
+    installation_report, stopping_report = RESULTS / "installation.xml", RESULTS / "stopping.xml"
     pytest = ["python3", "-m", "pytest"]
     found = [
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
@@ -47,6 +50,7 @@ def steps() -> List[Step]:
         Step("recordings", [*pytest, "test/recordings", f"--junitxml={recordings_report}"], recordings_report),
         *oldest_versions(),
         Step("installation", [*pytest, "test/installation", f"--junitxml={installation_report}"], installation_report),
+        Step("stopping", [*pytest, "test/stopping", f"--junitxml={stopping_report}"], stopping_report),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):
         folder = RESULTS / test.stem
@@ -56,13 +60,17 @@ def steps() -> List[Step]:
 
 
 def oldest_versions() -> List[Step]:
-    """Return the step of the unit tests with the oldest versions, none where no Python 3.8 is found."""
+    """Return the steps of the unit tests with the oldest versions, none where no Python 3.8 is found."""
     if find_python38() is None:
         print(f"       left out: oldest versions: {HOW_TO_GET_ONE}", flush=True)
         return []
     report = RESULTS / "oldest.xml"
     command = ["python3", "scripts/oldest/run.py", "-n", "auto", "--dist", "loadfile", f"--junitxml={report}"]
-    return [Step("oldest versions", command, report)]
+    environment = ["python3", "scripts/oldest/environment.py"]
+    return [
+        Step("oldest versions: environment", environment, timeout=ENVIRONMENT_TIMEOUT),
+        Step("oldest versions: unit tests", command, report),
+    ]
 
 
 def run_step(step: Step) -> Outcome:
@@ -72,11 +80,11 @@ def run_step(step: Step) -> Outcome:
     try:
         done = subprocess.run(
             step.command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
-            stdin=subprocess.DEVNULL, timeout=STEP_TIMEOUT, check=False,
+            stdin=subprocess.DEVNULL, timeout=step.timeout, check=False,
         )  # fmt: skip
         status, output = done.returncode, done.stdout.decode(errors="replace")
     except subprocess.TimeoutExpired as expired:
-        status, output = 1, f"{(expired.stdout or b'').decode(errors='replace')}\nno end after {STEP_TIMEOUT:.0f} s"
+        status, output = 1, f"{(expired.stdout or b'').decode(errors='replace')}\nno end after {step.timeout:.0f} s"
     outcome = _counted(step, status)
     if outcome.failed:
         print("\n".join([output.rstrip(), *_failure_texts(step)]))

@@ -12,12 +12,15 @@ from std_msgs.msg import Header
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map, write_map
+from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5
 MILLION = 1_000_000
 _POINTS_PER_BLOCK = 4
 _ECHOES = 400
+_BEAM_WIDTH = 0.0436
 _RADIUS = 50.0
 _REACH = 70.0
 _SCANS = 20
@@ -75,15 +78,20 @@ def size_rows() -> List[Row]:
 def _scan_rows(surface_map: MultiLevelSurfaceMap, rng: np.random.Generator) -> List[Row]:
     markers, header, sizes = BlockMarkers(), Header(frame_id="map"), []
     surface_map.take_changed_tiles()
-    inserted, published, fetched = [], [], []
+    inserted, carved, published, fetched = [], [], [], []
+    free, carver = MultiLevelSurfaceMap(RESOLUTION), Carver(CarvingParameters(), _BEAM_WIDTH)
     for _ in range(_SCANS):
         points = echoes(rng)
         inserted.append(_seconds(lambda points=points: surface_map.insert(points))[1])
+        origins = np.column_stack([np.zeros((_ECHOES, 2)), points[:, 2]])
+        beams = FirstEchoes.of_points(points, np.arange(_ECHOES), origins)
+        carved.append(_seconds(lambda beams=beams, points=points: carver.carve(surface_map, free, beams, points))[1])
         published.append(_seconds(lambda: sizes.append(_published(surface_map, markers, header)))[1])
         box = np.full(2, _REACH)
         fetched.append(median_seconds(lambda box=box: surface_map.in_box(-box, box), 1, time.process_time))
     return [
         (f"insert {_ECHOES} echoes", f"{1e3 * np.median(inserted):.1f} ms", "no slower"),
+        (f"carve {_ECHOES} beams", f"{1e3 * np.median(carved):.1f} ms", "no slower"),
         ("markers of a scan's change", f"{1e3 * np.median(published):.1f} ms", "< 20 ms"),
         ("their size", f"{max(sizes) / 1e6:.2f} MB", "< 1 MB"),
         (

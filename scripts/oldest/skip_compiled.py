@@ -1,6 +1,8 @@
-"""A pytest plugin that skips the test files that import a compiled module of ROS, directly or through others."""
+"""A pytest plugin that skips what needs a compiled module of ROS: test files that import one, directly or through
+others, and tests whose child process ends because it imports one."""
 
-from typing import Generator
+import subprocess
+from typing import Generator, Optional
 
 import pytest
 from ros_modules import CompiledModuleError
@@ -10,14 +12,29 @@ from ros_modules import CompiledModuleError
 def pytest_make_collect_report(collector: pytest.Collector) -> Generator:
     """Make a skipped file of one that cannot be collected because of a CompiledModuleError."""
     outcome = yield
-    report = outcome.get_result()
-    missing = _missing(report)
+    _skip(outcome.get_result(), collector.path, outcome.get_result().call)
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_runtest_makereport(item: pytest.Item, call: pytest.CallInfo) -> Generator:
+    """Make a skipped test of one that fails because of a CompiledModuleError, here or in a child process."""
+    outcome = yield
+    _skip(outcome.get_result(), item.path, call)
+
+
+def _skip(report: object, path: object, call: Optional[pytest.CallInfo]) -> None:
+    error = call.excinfo.value if report.failed and call and call.excinfo else None
+    missing = _missing(error)
     if missing is not None:
-        report.outcome, report.longrepr = "skipped", (str(collector.path), 0, f"Skipped: {missing}")
+        report.outcome, report.longrepr = "skipped", (str(path), 0, f"Skipped: {missing}")
 
 
-def _missing(report: pytest.CollectReport) -> object:
-    error = report.call.excinfo.value if report.failed and report.call.excinfo else None
-    while error is not None and not isinstance(error, CompiledModuleError):
+def _missing(error: Optional[BaseException]) -> Optional[str]:
+    while error is not None:
+        if isinstance(error, CompiledModuleError):
+            return str(error)
+        if isinstance(error, subprocess.CalledProcessError) and isinstance(error.stderr, str):
+            last = (error.stderr.strip().splitlines() or [""])[-1]
+            return last.partition(": ")[2] if last.startswith("ros_modules.CompiledModuleError: ") else None
         error = error.__cause__ or error.__context__
-    return error
+    return None

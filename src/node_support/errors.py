@@ -2,7 +2,7 @@
 
 
 class RefusedInput(ValueError):  # noqa: N818 - named for what it says, it is not an error of the program
-    """Input that cannot be used. `kind` names the counter in /diagnostics, the text holds the offending value."""
+    """Input that cannot be used. `kind` names the counter in /diagnostics; the text holds the offending value."""
 
     def __init__(self, kind: str, detail: str) -> None:
         super().__init__(detail)

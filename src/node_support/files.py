@@ -1,10 +1,13 @@
 """Files that are written whole or not at all."""
 
+import fcntl
 import os
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Iterator
+from typing import Iterator, Tuple
+
+_PART = ".umc_part"
 
 
 def write_whole(path: Path, data: bytes) -> None:
@@ -17,20 +20,56 @@ def write_whole(path: Path, data: bytes) -> None:
 def whole_file(path: Path) -> Iterator[Path]:
     """Give the path of a temporary file, made beside `path`, that takes its place when the block ends well.
 
-    The folder is made where it is missing; on any failure an older file stays as it was. Raises OSError.
+    The folder is made where it is missing; on any failure an older file stays as it was. What killed processes left
+    behind in that folder is removed first. Raises OSError.
     """
     path.parent.mkdir(parents=True, exist_ok=True)
-    handle, name = tempfile.mkstemp(dir=str(path.parent), prefix=f".{path.name}.")
-    os.close(handle)
-    temporary = Path(name)
+    remove_abandoned_parts(path.parent)
+    handle, temporary = _locked_part(path)
     try:
         yield temporary
         _flush(temporary)
-        os.chmod(name, 0o644)
-        os.replace(name, str(path))
+        os.chmod(str(temporary), 0o644)
+        os.replace(str(temporary), str(path))
     except BaseException:
         temporary.unlink()
         raise
+    finally:
+        os.close(handle)
+
+
+def remove_abandoned_parts(folder: Path) -> None:
+    """Remove the temporary files of `whole_file` whose writers were killed. What cannot be removed stays."""
+    for part in folder.glob(f".*{_PART}"):
+        try:
+            handle = os.open(str(part), os.O_RDWR | os.O_NOFOLLOW)
+        except OSError:
+            continue
+        try:
+            if _took_lock(handle):
+                part.unlink()
+        except OSError:
+            continue
+        finally:
+            os.close(handle)
+
+
+def _locked_part(path: Path) -> Tuple[int, Path]:
+    """Return a new temporary file, open and locked: the system drops the lock however its writer ends."""
+    while True:
+        handle, name = tempfile.mkstemp(dir=str(path.parent), prefix=f".{path.name}.", suffix=_PART)
+        # Between these lines another process may take the file for an abandoned one and remove it.
+        if _took_lock(handle) and os.fstat(handle).st_nlink:
+            return handle, Path(name)
+        os.close(handle)
+
+
+def _took_lock(handle: int) -> bool:
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        return False
+    return True
 
 
 def _flush(path: Path) -> None:

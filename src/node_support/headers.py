@@ -14,8 +14,9 @@ DAY = 86400.0
 """A clock that is wrong by more than a day has never been set."""
 
 _NANOSECONDS = 10**9
-# tf2 and rospy.Time subtract seconds as signed 32 bit numbers, and end the process where these overflow.
-_UNSAFE_SECONDS = 2**31
+# tf2 takes stamps as float64 seconds, which may round up, and subtracts and returns them as signed 32 bit numbers;
+# from 2^31 s on it ends the process.
+_UNSAFE_SECONDS = 2**31 - 1
 
 
 @dataclass(frozen=True)
@@ -29,7 +30,7 @@ class StampParameters(ParameterSet):
 
 
 def check_stamp(stamp_ns: int, references_ns: Iterable[int] = (), tolerance: float = DAY) -> None:
-    """Raise RefusedInput unless a stamp [ns] is positive, below 2^31 s and within `tolerance` [s] of a reference.
+    """Raise RefusedInput unless a stamp [ns] is positive, below 2^31 - 1 s and within `tolerance` [s] of a reference.
 
     references_ns: what the stamp may be near, the newest odometry and the clock; with none, any safe stamp passes.
     """

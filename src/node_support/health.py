@@ -1,4 +1,4 @@
-"""Counters, rates and problems of one stage, as /diagnostics shows them. Free of ROS, safe to use from any thread."""
+"""Counters, rates and problems of one stage for /diagnostics. Free of ROS and thread-safe."""
 
 import threading
 import time
@@ -68,19 +68,31 @@ class Health:
             self._values[what] = value
 
     def problem(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count `number` problems of a kind and warn with the newest detail, unless that was said lately."""
+        """Count `number` problems of a kind and warn with the newest detail, at most once per `WARNING_PERIOD`."""
         with self._lock:
-            problem = self._problems.setdefault(kind, _Problem())
-            problem.total += number
-            problem.unreported += number
-            problem.last_seen = self._clock()
-            problem.detail = detail
+            problem = self._counted(kind, detail, number)
             if problem.last_seen - problem.last_report < WARNING_PERIOD:
                 return
             line = f"{self.name}: {problem.unreported} {kind} ({problem.total} in all): {detail}"
             problem.last_report = problem.last_seen
             problem.unreported = 0
         self._warn(line)
+
+    def answered_problem(self, kind: str, detail: str) -> None:
+        """Count a problem that somebody waits to hear of, and warn each time."""
+        with self._lock:
+            problem = self._counted(kind, detail, 1)
+            problem.last_report = problem.last_seen
+            problem.unreported = 0
+        self._warn(f"{self.name}: {kind}: {detail}")
+
+    def _counted(self, kind: str, detail: str, number: int) -> _Problem:
+        problem = self._problems.setdefault(kind, _Problem())
+        problem.total += number
+        problem.unreported += number
+        problem.last_seen = self._clock()
+        problem.detail = detail
+        return problem
 
     @contextmanager
     def timed(self) -> Iterator[None]:

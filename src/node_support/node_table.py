@@ -4,6 +4,8 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Dict, Tuple
 
+from node_support import topics
+
 
 class Role(Enum):
     """What a node does with a topic, a transform or a service."""
@@ -51,10 +53,10 @@ def _serves(name: str, kind: str, text: str) -> Interface:
     return Interface(Role.SERVICE, name, kind, text)
 
 
-_BEAMS_IN = _subscribes("sonar/raw", "SonarScanLine", "beams")
-_JOINTS_IN = _subscribes("joint_states", "sensor_msgs/JointState", "position of the tilt servo")
+_BEAMS_IN = _subscribes(topics.BEAMS, "SonarScanLine", "beams")
+_JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo")
 _DRIVER_JOINTS_IN = _subscribes(
-    "joint_states", "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
+    topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
 )
 _AS_POINTS = "also as PointCloud2 on `.../cloud`"
 
@@ -67,7 +69,7 @@ NODES: Dict[str, NodeDescription] = {
         "the log tools `play_852`, `record_852` and `convert_852`.",
         (
             _DRIVER_JOINTS_IN,
-            _publishes("sonar/raw", "SonarScanLine", "one beam for every valid reply"),
+            _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"),
         ),
     ),
     "imagenex_852_emulator": NodeDescription(
@@ -81,26 +83,26 @@ NODES: Dict[str, NodeDescription] = {
         (
             _BEAMS_IN,
             _subscribes(
-                "cmd_vel",
+                topics.VELOCITY_COMMANDS,
                 "geometry_msgs/Twist, TwistStamped or nav_msgs/Odometry",
                 "velocity of the vehicle; `velocity_topic` sets the name, `velocity_type` the type",
             ),
-            _publishes("sonar/scan/sonarCloud", "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
-            _publishes("sonar/scan/laserCloud", "sensor_msgs/PointCloud2", "scans of the LASER modes"),
-            _publishes("sonar/scan/laserScan", "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
+            _publishes(topics.SCANS, "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
+            _publishes(topics.LASER_POINTS, "sensor_msgs/PointCloud2", "scans of the LASER modes"),
+            _publishes(topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
             _publishes(
-                "sonar/scan/polar",
+                topics.POLAR_SCANS,
                 "StampedIntensityCloud",
                 f"every revolution with all its bins, organised; {_AS_POINTS}",
             ),
-            _publishes("sonar/beam", "sensor_msgs/PointCloud2", "the newest beam"),
+            _publishes(topics.NEWEST_BEAM, "sensor_msgs/PointCloud2", "the newest beam"),
         ),
     ),
     "thresholder": NodeDescription(
         "Removes weak echoes (thesis 6.5.3). See [sonar_processing](sonar_processing.md#thresholder).",
         (
-            _subscribes("sonar/scan/sonarCloud", "StampedIntensityCloud", "scans"),
-            _publishes("sonar/scan/thresholded", "StampedIntensityCloud", f"strong points; {_AS_POINTS}"),
+            _subscribes(topics.SCANS, "StampedIntensityCloud", "scans"),
+            _publishes(topics.THRESHOLDED, "StampedIntensityCloud", f"strong points; {_AS_POINTS}"),
             _publishes("~threshold", "std_msgs/Float32", "the threshold of each cloud, for plotting"),
         ),
     ),
@@ -108,16 +110,16 @@ NODES: Dict[str, NodeDescription] = {
         "Removes isolated points, exactly as PCL does (thesis 6.5.4). "
         "See [sonar_processing](sonar_processing.md#outlier_remover).",
         (
-            _subscribes("sonar/scan/thresholded", "StampedIntensityCloud", "strong points"),
-            _publishes("sonar/scan/cleaned", "StampedIntensityCloud", f"strong points without outliers; {_AS_POINTS}"),
+            _subscribes(topics.THRESHOLDED, "StampedIntensityCloud", "strong points"),
+            _publishes(topics.CLEANED, "StampedIntensityCloud", f"strong points without outliers; {_AS_POINTS}"),
         ),
     ),
     "echo_extractor": NodeDescription(
         "Finds the echoes of a whole revolution for matching, and removes the ring of floor echoes. "
         "See [sonar_processing](sonar_processing.md#echo_extractor).",
         (
-            _subscribes("sonar/scan/polar", "StampedIntensityCloud", "revolutions with all bins"),
-            _publishes("sonar/scan/echoes", "StampedIntensityCloud", f"echoes; {_AS_POINTS}"),
+            _subscribes(topics.POLAR_SCANS, "StampedIntensityCloud", "revolutions with all bins"),
+            _publishes(topics.ECHOES, "StampedIntensityCloud", f"echoes; {_AS_POINTS}"),
             _publishes("~threshold", "std_msgs/Float32", "the smallest accepted echo height of each revolution"),
         ),
     ),
@@ -126,32 +128,30 @@ NODES: Dict[str, NodeDescription] = {
         "See [sonar_processing](sonar_processing.md#sonar_image).",
         (
             _BEAMS_IN,
-            _publishes("sonar/image", "sensor_msgs/Image", "mono8"),
-            _publishes("sonar/camera_info", "sensor_msgs/CameraInfo", "scale: `K[0]` is in pixels per metre"),
+            _publishes(topics.IMAGE, "sensor_msgs/Image", "mono8"),
+            _publishes(topics.CAMERA_INFO, "sensor_msgs/CameraInfo", "scale: `K[0]` is in pixels per metre"),
         ),
     ),
     "line_detector": NodeDescription(
         "Detects walls by RANSAC (thesis 6.5.5). See [shapes](shapes.md).",
         (
-            _subscribes(
-                "sonar/scan/cleaned", "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"
-            ),
+            _subscribes(topics.CLEANED, "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"),
             _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam"),
-            _publishes("sonar/scan/line/coefficients", "Walls", "all walls of a scan, the most certain first"),
-            _publishes("sonar/scan/line", "sensor_msgs/PointCloud2", "the inliers of all walls"),
-            _publishes("sonar/scan/line/markers", "visualization_msgs/MarkerArray", "the walls for rviz"),
+            _publishes(f"{topics.LINES}/coefficients", "Walls", "all walls of a scan, the most certain first"),
+            _publishes(topics.LINES, "sensor_msgs/PointCloud2", "the inliers of all walls"),
+            _publishes(f"{topics.LINES}/markers", "visualization_msgs/MarkerArray", "the walls for rviz"),
         ),
     ),
     "circle_detector": NodeDescription(
         "Detects buoys and pipes by RANSAC (thesis 6.5.5). See [shapes](shapes.md).",
         (
             _subscribes(
-                "sonar/scan/thresholded", "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"
+                topics.THRESHOLDED, "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"
             ),
             _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam"),
-            _publishes("sonar/scan/circle/coefficients", "Circles", "all circles of a scan, the most certain first"),
-            _publishes("sonar/scan/circle", "sensor_msgs/PointCloud2", "the inliers of all circles"),
-            _publishes("sonar/scan/circle/markers", "visualization_msgs/MarkerArray", "the circles for rviz"),
+            _publishes(f"{topics.CIRCLES}/coefficients", "Circles", "all circles of a scan, the most certain first"),
+            _publishes(topics.CIRCLES, "sensor_msgs/PointCloud2", "the inliers of all circles"),
+            _publishes(f"{topics.CIRCLES}/markers", "visualization_msgs/MarkerArray", "the circles for rviz"),
         ),
     ),
     "sonar_control": NodeDescription(
@@ -160,7 +160,7 @@ NODES: Dict[str, NodeDescription] = {
             _JOINTS_IN,
             _BEAMS_IN,
             _publishes(
-                "sonar_servo/command",
+                topics.SERVO_COMMANDS,
                 "std_msgs/Float64",
                 "goal of the servo, rad; latched; the launch argument `command` sets the topic",
             ),
@@ -173,31 +173,39 @@ NODES: Dict[str, NodeDescription] = {
         "matching is on, an accepted scan is undistorted, inserted into the map, and corrects `map -> odom`; a "
         "rejected scan changes nothing, and `/diagnostics` says why it was rejected. See [matching](matching.md).",
         (
-            _subscribes("sonar/scan/cleaned", "StampedIntensityCloud", "points of the map that is shown"),
-            _subscribes(
-                "sonar/scan/echoes", "StampedIntensityCloud", "points to match, unless `match_input` is CLEANED"
-            ),
-            _subscribes("startMatching", "std_msgs/Bool", "switches matching on or off"),
+            _subscribes(topics.CLEANED, "StampedIntensityCloud", "points of the map that is shown"),
+            _subscribes(topics.ECHOES, "StampedIntensityCloud", "points to match, unless `match_input` is CLEANED"),
+            _subscribes(topics.START_MATCHING, "std_msgs/Bool", "switches matching on or off"),
             _subscribes("tf", "", "`odom -> base_link`: dead reckoning"),
-            _publishes("MLSM/Markers", "visualization_msgs/MarkerArray", "every block at its true size; latched"),
             _publishes(
-                "MLSM/cloud",
-                "sensor_msgs/PointCloud2",
-                "mean, height, depth and number of points of every block; latched",
+                topics.MAP_MARKERS,
+                "visualization_msgs/MarkerArray",
+                "every block at its true size; all at first, then what changed",
             ),
             _publishes(
-                "MLSM/pose",
+                topics.MAP_CLOUD,
+                "sensor_msgs/PointCloud2",
+                "mean, height, depth and number of points of every block",
+            ),
+            _publishes(topics.MAP_GRID, "nav_msgs/OccupancyGrid", "free, unknown and occupied from above"),
+            _publishes(topics.MAP_OCTOMAP, "octomap_msgs/Octomap", "voxels; where these messages are installed"),
+            _publishes(
+                topics.MATCHED_POSE,
                 "geometry_msgs/PoseWithCovarianceStamped",
                 "the fix of each matched scan, at the stamp of its newest beam",
             ),
-            _publishes("MLSM/odometry", "nav_msgs/Odometry", "the fix with the velocity, for robot_localization"),
-            _publishes("MLSM/path", "nav_msgs/Path", "all fixes; latched"),
+            _publishes(
+                topics.MATCHED_ODOMETRY, "nav_msgs/Odometry", "the fix with the velocity, for robot_localization"
+            ),
+            _publishes(topics.MATCHED_PATH, "nav_msgs/Path", "all fixes; latched"),
             _publishes(
                 "tf", "", "`map -> odom` at `transform_rate`; it changes smoothly to a new fix within `blend_time`"
             ),
             _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scan"),
-            _serves("~save_map", "SaveMap", "writes `<save_folder>/<name>.ply`"),
-            _serves("~reset", "std_srvs/Trigger", "discards the map, the position in it and the path"),
+            _serves("~save_map", "SaveMap", "writes the map into `map_directory`"),
+            _serves("~load_map", "LoadMap", "takes a map of `map_directory` in the place of the present one"),
+            _serves("~reset_map", "std_srvs/Trigger", "discards the map, the position in it and the path"),
+            _serves("~get_region", "GetRegion", "returns the blocks in a box"),
         ),
     ),
     "sonar_simulator": NodeDescription(
@@ -206,19 +214,19 @@ NODES: Dict[str, NodeDescription] = {
         "[the simulated vehicle](simulator_vehicle.md), also for `simulate_bag`, "
         "and [the simulated sonar](simulation.md).",
         (
-            _subscribes("cmd_vel", "geometry_msgs/Twist", "commands, if `drive` is CMD_VEL"),
-            _subscribes("sonar_servo/command", "std_msgs/Float64", "goal of the servo, rad, positive down"),
-            _publishes("sonar/raw", "SonarScanLine", "beams"),
-            _publishes("odom", "nav_msgs/Odometry", "dead reckoning with the configured errors; also as tf"),
-            _publishes("ground_truth", "nav_msgs/Odometry", "the true pose and velocity"),
+            _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "commands, if `drive` is CMD_VEL"),
+            _subscribes(topics.SERVO_COMMANDS, "std_msgs/Float64", "goal of the servo, rad, positive down"),
+            _publishes(topics.BEAMS, "SonarScanLine", "beams"),
+            _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "dead reckoning with the configured errors; also as tf"),
+            _publishes(topics.GROUND_TRUTH, "nav_msgs/Odometry", "the true pose and velocity"),
             _publishes(
-                "joint_states",
+                topics.JOINT_STATES,
                 "sensor_msgs/JointState",
                 "position of the servo; robot_state_publisher makes tf `base_link -> sonar` of it",
             ),
-            _publishes("velocity", "geometry_msgs/Twist", "velocity as the odometry measures it"),
-            _publishes("cmd_vel", "geometry_msgs/Twist", "the same, if `drive` is SCRIPT"),
-            _publishes("/clock", "rosgraph_msgs/Clock", "simulated time"),
+            _publishes(topics.VELOCITY, "geometry_msgs/Twist", "velocity as the odometry measures it"),
+            _publishes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "the same, if `drive` is SCRIPT"),
+            _publishes(topics.CLOCK, "rosgraph_msgs/Clock", "simulated time"),
             _publishes("~world", "visualization_msgs/Marker", "triangles of the world; latched"),
             _publishes("~progress", "std_msgs/Float32", "completed share of the script, 0 to 1; latched"),
         ),
@@ -227,9 +235,9 @@ NODES: Dict[str, NodeDescription] = {
         "Makes sonar beams from the output of Gazebo's ray sensor plugins, with the same echo models and parameter "
         "groups as `sonar_simulator`; no plugin has to be built. See [a sonar in Gazebo](gazebo.md).",
         (
-            _subscribes("sonar/rays", "sensor_msgs/LaserScan, PointCloud or PointCloud2", "rays of the sensor plugin"),
+            _subscribes(topics.RAYS, "sensor_msgs/LaserScan, PointCloud or PointCloud2", "rays of the sensor plugin"),
             _DRIVER_JOINTS_IN,
-            _publishes("sonar/raw", "SonarScanLine", "beams"),
+            _publishes(topics.BEAMS, "SonarScanLine", "beams"),
         ),
     ),
 }

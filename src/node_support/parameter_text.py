@@ -1,4 +1,4 @@
-"""Writes what a `ParameterSet` says of itself: the commented default yaml and the table for the documentation."""
+"""Writes the commented default yaml and the documentation's table of a `ParameterSet`."""
 
 import dataclasses
 from enum import Enum

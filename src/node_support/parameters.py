@@ -1,4 +1,4 @@
-"""Parameters as frozen dataclasses that validate themselves, the one place where a value is judged.
+"""Parameters as frozen dataclasses that validate themselves; no value is checked anywhere else.
 
 A stage declares its parameters once::
 
@@ -102,7 +102,7 @@ class ParameterSet:
 
     @classmethod
     def from_group(cls: Type[Self], name: str, values: Any) -> Self:
-        """Build as `from_mapping` does from the keys of one group; what is wrong is told with the group's name."""
+        """Build as `from_mapping` does from the keys of one group; errors name the group."""
         if not isinstance(values, Mapping):
             raise ParameterError(f"{name} = {values!r}: must be keys and values")
         try:

@@ -78,6 +78,12 @@ MAP_MARKERS = "MLSM/Markers"
 MAP_CLOUD = "MLSM/cloud"
 """PointCloud2: the blocks of the map."""
 
+MAP_GRID = "MLSM/grid"
+"""OccupancyGrid: free, unknown and occupied from above."""
+
+MAP_OCTOMAP = "MLSM/octomap"
+"""octomap_msgs/Octomap: the map as voxels, where these messages are installed."""
+
 MATCHED_POSE = "MLSM/pose"
 """PoseWithCovarianceStamped: the vehicle in the map at the newest match."""
 

@@ -53,6 +53,10 @@ class Inbox:
         with self._condition:
             return list(self._messages)
 
+    def close(self) -> None:
+        """Stop listening: rospy connects a process once per topic, so that only then the next Inbox is a newcomer."""
+        self._subscriber.unregister()
+
     def _take(self, message: Any) -> None:
         with self._condition:
             self._messages.append(message)

@@ -100,6 +100,14 @@ class TestLogs(unittest.TestCase):
         assert {(e.topic, e.message._md5sum) for e in entries} == {("/sonar/raw", SonarScanLine._md5sum)}
         assert all(entry.message.header.stamp == entry.timestamp for entry in entries)
 
+    def test_convert_refuses_what_is_no_log(self):
+        stranger, bag = self.folder / "notes.txt", self.folder / "strange.bag"
+        stranger.write_text("852 is a sonar\n" * 100)
+        status, text = output_of(tool("convert_852", stranger, "--out", bag))
+        assert status == 1
+        assert text.strip() == f"convert_852: {stranger}: not a .852 log, no ping in it; nothing was written"
+        assert not bag.exists()
+
     def test_convert_paces_a_log_without_times(self):
         entries = self.convert(self.real_log(), "--rate", 5, "--start", 1000)
         assert len(entries) == 177

@@ -9,7 +9,9 @@ from pathlib import Path
 import numpy as np
 import rospy
 import rostest
+from geometry_msgs.msg import Point
 from graph import Inbox, wait_for_publisher_links
+from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -18,7 +20,7 @@ from mlsm_manager.surface_map.storage import read_ply
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
-from underwater_map_construction.srv import SaveMap
+from underwater_map_construction.srv import GetRegion, LoadMap, SaveMap
 
 
 class MapServices(unittest.TestCase):
@@ -29,11 +31,14 @@ class MapServices(unittest.TestCase):
         """Insert the points and wait until the map shows them."""
         cls.folder = Path(rospy.get_param("~folder"))
         points = np.array([[0.1, 0.1, z, 100] for z in np.arange(0, 3, 0.2)] + [[5.1, 5.1, 0, 90]], np.float32)
-        cloud = IntensityCloud(points, np.full(len(points), -1.0), 10**9, "odom")
+        now = rospy.Time.now()
+        cloud = IntensityCloud(points, np.full(len(points), -now.to_sec()), now.to_nsec(), "odom")
         cls.publisher = rospy.Publisher("/sonar/scan/cleaned", StampedIntensityCloud, queue_size=1)
         wait_for_publisher_links(cls.publisher, 1)
         cls.publisher.publish(cloud_to_message(cloud))
-        Inbox("/MLSM/Markers", MarkerArray).wait_for(lambda array: len(array.markers) > 1)
+        inbox = Inbox("/MLSM/Markers", MarkerArray)
+        inbox.wait_for(lambda array: len(array.markers) > 1)
+        inbox.close()
 
     @classmethod
     def tearDownClass(cls) -> None:
@@ -41,8 +46,10 @@ class MapServices(unittest.TestCase):
         shutil.rmtree(str(cls.folder), ignore_errors=True)
 
     def test_a_late_subscriber_sees_the_whole_map(self) -> None:
-        """The markers are latched, and they show true extents: 2.8 m of pillar."""
-        array = Inbox("/MLSM/Markers", MarkerArray).wait_for()
+        """Though nothing changes any more, and they show true extents: 2.8 m of pillar."""
+        inbox = Inbox("/MLSM/Markers", MarkerArray)
+        array = inbox.wait_for()
+        inbox.close()
         vertical = [marker for marker in array.markers if marker.ns == "vertical"]
         horizontal = [marker for marker in array.markers if marker.ns == "horizontal"]
         self.assertEqual({marker.type for marker in array.markers}, {Marker.CUBE_LIST})
@@ -65,13 +72,52 @@ class MapServices(unittest.TestCase):
 
     def test_a_map_is_saved_in_the_folder_that_was_named(self) -> None:
         """The file holds the blocks."""
-        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar")
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar.ply", False)
         self.assertTrue(answer.success, answer.message)
         self.assertEqual(sorted(read_ply(self.folder / "pillar.ply").count), [1, 15])
 
+    def test_a_saved_map_can_be_loaded_and_a_damaged_one_changes_nothing(self) -> None:
+        """Load what was saved into an empty map."""
+        load = rospy.ServiceProxy("/mlsm_core/load_map", LoadMap)
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("kept", False)
+        self.assertTrue(answer.success, answer.message)
+        (self.folder / "damaged.mlsm").write_bytes((self.folder / "kept.mlsm").read_bytes()[:-40])
+        answer = load("damaged")
+        self.assertFalse(answer.success)
+        self.assertRegex(answer.message, r"damaged\.mlsm: damaged or cut short.*; the present map stays")
+        self.assertEqual(self._blocks_around(0.0), 1)
+        self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)().success)
+        self.assertEqual(self._blocks_around(0.0), 0)
+        answer = load("kept")
+        self.assertTrue(answer.success, answer.message)
+        self.assertEqual([self._blocks_around(place) for place in (0.0, 5.0, 9.0)], [1, 1, 0])
+
+    def _blocks_around(self, place: float) -> int:
+        """Return how many blocks get_region finds within a metre of a place on the diagonal."""
+        region = rospy.ServiceProxy("/mlsm_core/get_region", GetRegion)
+        return region(Point(place - 1, place - 1, -5), Point(place + 1, place + 1, 5)).cloud.width
+
+    def test_a_saved_map_is_kept_when_another_takes_its_name(self) -> None:
+        """And an empty one takes nobody's."""
+        save = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)
+        for _ in range(2):
+            self.assertTrue(save("twice", False).success)
+        self.assertTrue((self.folder / "twice.1.mlsm").exists())
+        rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)()
+        answer = save("twice", True)
+        self.assertFalse(answer.success)
+        self.assertIn("not replaced, the map has no blocks", answer.message)
+        self.setUpClass()
+
+    def test_a_grid_is_sent_to_who_asks_for_it(self) -> None:
+        """Two cells are occupied, nothing else is known."""
+        grid = Inbox("/MLSM/grid", OccupancyGrid).wait_for()
+        self.assertEqual((grid.info.width, grid.info.height, grid.info.resolution), (11, 11, 0.5))
+        self.assertEqual([value for value in grid.data if value != -1], [100, 100])
+
     def test_a_name_that_leaves_the_folder_is_refused(self) -> None:
         """With the name in the answer."""
-        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar")
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar", False)
         self.assertFalse(answer.success)
         self.assertIn("'../pillar'", answer.message)
 
@@ -79,8 +125,9 @@ class MapServices(unittest.TestCase):
         """Runs on the same map as the others and puts it back."""
         inbox = Inbox("/MLSM/Markers", MarkerArray)
         shown = inbox.wait_for()
-        self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset", Trigger)().success)
+        self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)().success)
         cleared = inbox.wait_for(lambda array: all(marker.action == Marker.DELETE for marker in array.markers))
+        inbox.close()
         self.assertEqual(len(cleared.markers), len(shown.markers))
         self.setUpClass()
 

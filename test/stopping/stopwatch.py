@@ -12,17 +12,30 @@ from typing import List, Set
 PACKAGE = "underwater_map_construction"
 START_TIMEOUT = 60.0
 STOP_TIMEOUT = 30.0
+ROOT = Path(__file__).resolve().parents[2]
+# Every node has these before it begins to do anything.
+_FIRST = ("/rosout", "/clock", "/get_loggers", "/set_logger_level")
 
 
 def seconds_to_stop(launch_file: str, arguments: List[str], log: Path) -> float:
-    """Return the seconds from SIGINT until roslaunch and all its nodes have ended. Raises AssertionError."""
+    """Return the seconds from SIGINT until a launch file and all its nodes have ended. Raises AssertionError."""
+    return _seconds_to_stop(["roslaunch", PACKAGE, launch_file, *arguments], _nodes(launch_file, arguments), log)
+
+
+def seconds_to_stop_without_nodes(log: Path) -> float:
+    """Return the seconds from SIGINT until a bare master has ended. Raises AssertionError."""
+    return _seconds_to_stop(["roscore"], {"/rosout"}, log)
+
+
+def _seconds_to_stop(command: List[str], nodes: Set[str], log: Path) -> float:
     port = _free_port()
-    command = ["roslaunch", "-p", str(port), PACKAGE, launch_file, *arguments]
     environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(log.parent)}
     with log.open("wb") as output:
-        launch = subprocess.Popen(command, env=environment, stdout=output, stderr=output, start_new_session=True)
+        launch = subprocess.Popen(
+            [*command, "-p", str(port)], env=environment, stdout=output, stderr=output, start_new_session=True
+        )
     try:
-        _wait_for(_nodes(launch_file, arguments), port, launch, log)
+        _wait_for(nodes, port, launch, log)
         start = time.monotonic()
         launch.send_signal(signal.SIGINT)
         launch.wait(STOP_TIMEOUT)
@@ -61,6 +74,4 @@ def _registered(master: xmlrpc.client.ServerProxy) -> Set[str]:
     except OSError:
         return set()
     states = [*publishers, *subscribers, *services]
-    return {
-        node for name, nodes in states for node in nodes if not name.endswith(("rosout", "_loggers", "logger_level"))
-    }
+    return {node for name, nodes in states for node in nodes if node == "/rosout" or not name.endswith(_FIRST)}

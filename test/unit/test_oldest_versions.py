@@ -1,8 +1,8 @@
 """The run with the oldest versions: which Python it takes, and which modules of ROS are lent to that one."""
 
 import pytest
+from oldest.environment import find_python38
 from oldest.ros_modules import CompiledModuleError, RosModules
-from oldest.run import find_python38
 
 
 def _program(path, text):

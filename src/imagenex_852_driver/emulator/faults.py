@@ -35,7 +35,7 @@ class FaultRates(ParameterSet):
     doubled: float = parameter(0.0, "share of replies sent twice", low=0.0, high=1.0)
     overrun: float = parameter(0.0, "share of replies that report a character overrun", low=0.0, high=1.0)
     silence: float = parameter(0.0, "share of commands after which the head falls silent", low=0.0, high=1.0)
-    disappearance: float = parameter(0.0, "share of commands after which the port goes away", low=0.0, high=1.0)
+    disappearance: float = parameter(0.0, "share of commands after which the port disappears", low=0.0, high=1.0)
     lateness: float = parameter(0.4, "delay of a late reply", unit="s", low=0.0, high=60.0)
     silence_duration: float = parameter(2.0, "length of a silence", unit="s", low=0.0, high=600.0)
     absence_duration: float = parameter(2.0, "time until the port is back", unit="s", low=0.0, high=600.0)

@@ -17,7 +17,7 @@ class ConnectionParameters(ParameterSet):
     )
     reply_margin: float = parameter(
         0.25,
-        "time to wait for a reply, in addition to the travel time of sound and the switch delay",
+        "how long to wait for a reply beyond the sound's travel time and the switch delay",
         unit="s",
         low=0.01,
         high=1.0,
@@ -25,19 +25,14 @@ class ConnectionParameters(ParameterSet):
     )
     late_window: float = parameter(
         0.25,
-        "time to wait after a timeout for a late reply, so that it is not taken for the reply to the next ping",
+        "how long to wait after a timeout for a late reply, so that the next ping does not get it",
         unit="s",
         low=0.0,
         high=1.0,
         tunable=False,
     )
     byte_gap: float = parameter(
-        0.1,
-        "pause within a reply after which the rest is no longer expected",
-        unit="s",
-        low=0.01,
-        high=1.0,
-        tunable=False,
+        0.1, "silence that ends an incomplete reply", unit="s", low=0.01, high=1.0, tunable=False
     )
     back_off_first: float = parameter(
         0.1, "wait before the first attempt to reopen the port", unit="s", low=0.01, high=1.0, tunable=False

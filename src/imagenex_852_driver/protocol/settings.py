@@ -26,7 +26,7 @@ class HeadSettings(ParameterSet):
     """
 
     max_range: int = parameter(
-        20, "reach of a beam: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range"
+        20, "range of a beam: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range"
     )
     direction: Direction = parameter(
         Direction.CLOCKWISE, "direction the head turns, seen from above", thesis_name="Direction"

@@ -1,8 +1,10 @@
 """The ROS side of .852 logs: plays them, records them, and converts them to bags."""
 
+import math
 import os
 import time
 from argparse import Namespace
+from pathlib import Path
 from typing import Optional
 
 import rosbag
@@ -17,6 +19,9 @@ from imagenex_852_driver.protocol.angles import head_position
 from imagenex_852_driver.protocol.settings import HeadSettings
 from imagenex_852_driver.ros.messages import logged_ping, scan_line
 from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.files import whole_file
+from node_support.headers import check_stamp
 from node_support.parameters import ParameterError
 from node_support.ros.node import StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
@@ -60,11 +65,14 @@ class LogPlayer:
 
 
 def convert(options: Namespace) -> str:
-    """Write the bag of a log; return in words what was written. Raises StartError if it cannot be written."""
+    """Write the bag of a log, whole or not at all; return in words what was written.
+
+    Raises StartError when that cannot be done, and when the file holds no ping.
+    """
     reader = opened(options.file)
     count, start = 0, options.start
     try:
-        with rosbag.Bag(options.out, "w") as bag:
+        with whole_file(Path(options.out)) as temporary, rosbag.Bag(str(temporary), "w") as bag:
             for moment, ping in timed(reader, options.rate):
                 if start is None:
                     start = ping.stamp or os.path.getmtime(options.file)
@@ -72,6 +80,8 @@ def convert(options: Namespace) -> str:
                 if message is not None:
                     bag.write(options.topic, message, message.header.stamp)
                     count += 1
+            if not reader.ping_count:
+                raise StartError(f"{options.file}: not a .852 log, no ping in it; nothing was written")
     except OSError as error:
         raise StartError(f"{options.out}: {error.strerror}") from error
     return f"{options.out}: {count} beams; {summary(reader)}"
@@ -109,6 +119,10 @@ class LogRecorder:
         self._inverted = bool(values.get("inverted", False))
 
     def _record(self, message: SonarScanLine) -> None:
+        check_stamp(message.header.stamp.to_nsec())
+        if not (math.isfinite(message.angle) and math.isfinite(message.maxrange_meters)):
+            detail = f"angle {message.angle} rad, maxrange_meters {message.maxrange_meters}, must be finite"
+            raise RefusedInput("beams refused", detail)
         position = head_position(message.angle, self._inverted)
         if self._last_position not in (None, position):
             # The head may have passed straight astern, where positions wrap around.

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Tuple
+from typing import Deque, Optional
 
 import numpy as np
 
@@ -13,14 +13,30 @@ from node_support.geometry.planar import composed, inverse, transformed
 # A cloud comes within a scan or two of its own; eight turns of a head are two minutes.
 _MOST_STRETCHES = 8
 
+# s by which a cloud may reach beyond the scans that are known: a few beams, in which a vehicle moves decimetres.
+_SLACK = 0.5
+
 
 @dataclass(frozen=True)
 class _Stretch:
-    """times: (b,) s. corrections: (b, 3) T_map_odom. holds: whether the scan of this time was placed in the map."""
+    """times: (b,) s. corrections: (b, 3) T_map_odom. positions: (b, 2) m, of base_link in map.
+
+    holds: whether the scan of this time was placed in the map.
+    """
 
     times: np.ndarray
     corrections: np.ndarray
+    positions: np.ndarray
     holds: bool
+
+
+@dataclass(frozen=True)
+class PlacedPoints:
+    """points: (k, 4) in map. times: (k,) s. unplaced: how many were left out because their time has no place."""
+
+    points: np.ndarray
+    times: np.ndarray
+    unplaced: int
 
 
 class CorrectionHistory:
@@ -37,15 +53,15 @@ class CorrectionHistory:
     def add(self, times: np.ndarray, poses: np.ndarray, track: Track, holds: bool) -> None:
         """Add the path T_map_base `poses` (b, 3) at increasing `times` (b,)."""
         corrections = composed(poses, inverse(track.at(times)))
-        self._stretches.append(_Stretch(times, corrections, holds))
+        self._stretches.append(_Stretch(times, corrections, poses[:, :2], holds))
 
-    def placed(self, cloud: TimedPoints) -> Tuple[np.ndarray, int]:
-        """Return the points (k, 4) of `cloud` in map, and how many were left out because their time has no place.
+    def placed(self, cloud: TimedPoints) -> PlacedPoints:
+        """Return the points of `cloud` in map, without those whose time has no place.
 
         Between two stretches the nearer one's end counts.
         """
         if not self._stretches:
-            return np.empty((0, 4)), len(cloud)
+            return PlacedPoints(np.empty((0, 4)), np.empty(0), len(cloud))
         times = np.concatenate([stretch.times for stretch in self._stretches])
         corrections = np.concatenate([stretch.corrections for stretch in self._stretches])
         holds = np.concatenate([np.full(len(stretch.times), stretch.holds) for stretch in self._stretches])
@@ -53,4 +69,14 @@ class CorrectionHistory:
         keep = holds[nearest]
         chosen = cloud.times[keep]
         path = np.column_stack([np.interp(chosen, times, corrections[:, axis]) for axis in range(3)])
-        return transformed(path, cloud.points[keep]), int(np.count_nonzero(~keep))
+        return PlacedPoints(transformed(path, cloud.points[keep]), chosen, int(np.count_nonzero(~keep)))
+
+    def positions(self, times: np.ndarray) -> Optional[np.ndarray]:
+        """Return where the vehicle was in map at `times` (n,), (n, 2) m; None where not all of them are known."""
+        if not self._stretches or not len(times):
+            return None
+        known = np.concatenate([stretch.times for stretch in self._stretches])
+        if times.min() < known[0] - _SLACK or times.max() > known[-1] + _SLACK:
+            return None
+        positions = np.concatenate([stretch.positions for stretch in self._stretches])
+        return np.column_stack([np.interp(times, known, positions[:, axis]) for axis in range(2)])

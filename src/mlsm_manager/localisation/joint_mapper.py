@@ -3,12 +3,19 @@
 from collections import deque
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Deque, List, Optional
+from typing import Deque, List, Mapping, Optional, Tuple
 
 import numpy as np
 
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.mapper import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, MapSettings, ScanUpdate
+from mlsm_manager.localisation.mapper import (
+    MOST_WAITING,
+    NOTHING_INSERTED,
+    CloudUpdate,
+    LayerCopies,
+    MapSettings,
+    ScanUpdate,
+)
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
@@ -24,7 +31,9 @@ from mlsm_manager.multi_view.state import DIRECTION, POSE_COLUMNS, SCALE
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 # Points of the path within a scan: about one per second of a slow head's revolution.
@@ -88,13 +97,14 @@ class JointMapper:
         self.clear()
 
     def _new_map(self, resolution: float, expected_blocks: int) -> KeyframeMap:
-        return KeyframeMap(resolution, self.settings.limit, expected_blocks)
+        return KeyframeMap(resolution, self.settings.limit, expected_blocks, self.settings.kernel)
 
     def clear(self) -> None:
         """Forget the map and the place in it."""
         self._session: Optional[_Session] = None
         self._shown = self._new_map(self.settings.resolution, self.settings.expected_blocks)
         self._matched = self._new_map(self.settings.match_resolution, 0)
+        self._free = MultiLevelSurfaceMap(self.settings.resolution, self.settings.limit)
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -140,9 +150,43 @@ class JointMapper:
         return len(self._shown.map)
 
     @property
-    def target(self) -> Blocks:
+    def target(self) -> BlockSource:
         """The map in which a lost vehicle is searched."""
-        return self._matched.map.blocks
+        return self._matched.map
+
+    @property
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of both maps, to be stored, each made when it is asked for; no free space is known."""
+        return LayerCopies({Layer.SHOWN: self._shown.map, Layer.MATCHED: self._matched.map, Layer.FREE: self._free})
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+        return self._shown.map.in_box(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        tiles = self._shown.map.take_changed_tiles()
+        return tiles, self._shown.map.in_tiles(tiles)
+
+    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+        """Take stored maps in the place of the present ones, and forget the place.
+
+        A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
+        other resolutions than those of the settings.
+        """
+        settings = self.settings
+        shown = self._new_map(settings.resolution, settings.expected_blocks)
+        matched = self._new_map(settings.match_resolution, 0)
+        blocks = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        shown.map.insert_blocks(blocks)
+        matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
+        self.forget_place()
+        self._shown, self._matched = shown, matched
+
+    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
+        self.correction = np.array(correction, dtype=np.float64)
+        self._start = np.sqrt(np.diag(belief.covariance)[POSE])
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan together with those of the scans before it, and draw the map anew."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 
 Place = Callable[[TimedPoints], np.ndarray]
@@ -19,9 +20,15 @@ class KeyframeMap:
     The cost of drawing depends on the keyframes that are not settled, not on the map.
     """
 
-    def __init__(self, resolution: float, limit: float, expected_blocks: int = 0) -> None:
+    def __init__(
+        self,
+        resolution: float,
+        limit: float,
+        expected_blocks: int = 0,
+        kernel: InsertionKernel = InsertionKernel.NUMPY,
+    ) -> None:
         """As MultiLevelSurfaceMap."""
-        self.map = MultiLevelSurfaceMap(resolution, limit, expected_blocks)
+        self.map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
         self._moving: Deque[TimedPoints] = deque()
         self._above = self._covered = self._new().blocks
 

@@ -4,20 +4,22 @@ import threading
 import time as wall
 from dataclasses import dataclass
 from enum import Enum
-from typing import Callable, List, Optional, Protocol
+from typing import Any, Callable, List, Mapping, Optional, Protocol, Tuple
 
 import numpy as np
 
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
+from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
@@ -64,8 +66,24 @@ class ScanMapper(Protocol):
         """Number of those blocks, without a copy of them."""
 
     @property
-    def target(self) -> Blocks:
+    def target(self) -> BlockSource:
         """The map in which a lost vehicle is searched."""
+
+    @property
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of all maps, to be stored, each made when it is asked for."""
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+
+    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+        """Take stored maps in the place of the present ones; raises ValueError for other resolutions."""
+
+    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan, and keep the scan where that holds."""
@@ -126,6 +144,8 @@ class Localiser:
         self._live = LiveCorrection(settings.blend_time)
         self._newest: Optional[Scan] = None
         self._newest_came = 0.0
+        self._search = PlaceSearch()
+        self._changes = 0
         self.use(settings)
 
     def use(self, settings: LocaliserSettings) -> None:
@@ -158,6 +178,27 @@ class Localiser:
         """Number of blocks of the map."""
         return self.mapper.block_count
 
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown whose mean lies from `low` to `high`, (2,) or (3,) m."""
+        with self._lock:
+            return self.mapper.region(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        with self._lock:
+            return self.mapper.changed_tiles()
+
+    @property
+    def free(self) -> Blocks:
+        """What is known to be free."""
+        with self._lock:
+            return self.mapper.layers[Layer.FREE]
+
+    @property
+    def changes(self) -> int:
+        """A number that grows whenever the map or the pose in it changes."""
+        return self._changes
+
     @property
     def lookahead(self) -> float:
         """Seconds of odometry after the end of a scan that are waited for before the scan is taken."""
@@ -183,9 +224,12 @@ class Localiser:
         """Match a scan and put it, and the clouds that waited for it, into the map."""
         with self._lock:
             self.notice_time(scan.reference_time)
+            self._changes += 1
             self._newest, self._newest_came = scan, self._clock()
-            update = self.mapper.take_echoes(scan)
-            self._live.believe(update.belief)
+            update = self._found(scan) if self.is_lost else self.mapper.take_echoes(scan)
+            self._search.learn(update.accepted)
+            if update.belief is not None:
+                self._live.believe(update.belief)
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
                 clouds.append(self.mapper.take_cloud(TimedPoints.of_scan(scan)))
@@ -196,11 +240,13 @@ class Localiser:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)
+            self._changes += 1
             return self.mapper.take_cloud(cloud)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
         with self._lock:
+            self._changes += 1
             return self.mapper.take_placed(points)
 
     def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
@@ -248,18 +294,58 @@ class Localiser:
             scan = self._newest
             if scan is None:
                 return None
-            result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
-            if not result.accepted:
-                return ScanUpdate(scan, result, False, self.mapper.belief)
-            update = self.mapper.adopt(scan, result)
-            self._live.believe(update.belief)
+            update = self._found(scan)
+            if update.accepted:
+                self._search.forget()
+                self._live.believe(update.belief)
         return update
+
+    def _found(self, scan: Scan) -> ScanUpdate:
+        """Search the whole map for a scan; where it is found it goes into the map."""
+        result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
+        return (
+            self.mapper.adopt(scan, result) if result.accepted else ScanUpdate(scan, result, False, self.mapper.belief)
+        )
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether a map was loaded, scans are matched, and the vehicle is not found in the map yet."""
+        return self._search.is_lost and self.mapper.matching
+
+    def stored(self, frame: str, calibration: Mapping[str, Any], made: float, run: str) -> StoredMap:
+        """Return a copy of the map and of the place in it, to be written; see StoredMap."""
+        with self._lock:
+            belief, layers = self.mapper.belief, dict(self.mapper.layers)
+            correction = self.mapper.correction.copy()
+        arrays = {} if belief is None else StoredPlace(correction, belief).arrays()
+        return StoredMap(frame, layers, calibration, made, arrays, run)
+
+    def restore(self, stored: StoredMap, same_odometry: bool) -> None:
+        """Take a stored map in the place of the present one.
+
+        With the odometry under which it was stored the vehicle is expected where the stored correction puts it, and is
+        searched everywhere when three scans do not match there; otherwise it is searched everywhere from the start.
+        Raises ValueError, and keeps the present map, for other resolutions than those of the parameters.
+        """
+        with self._lock:
+            self.mapper.restore(stored.layers)
+            self._changes += 1
+            self._live.clear()
+            self._newest = None
+            self._search.lose()
+            place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
+            if place is not None:
+                self.mapper.start_from(place.widened, place.correction)
+                self._live.start_from(place.correction)
+                self._search.expect()
 
     def clear(self) -> int:
         """Forget map and place; return how many blocks the map had."""
         with self._lock:
             count = self.mapper.block_count
+            self._changes += 1
             self.mapper.clear()
             self._live.clear()
+            self._search.forget()
             self._newest = None
         return count

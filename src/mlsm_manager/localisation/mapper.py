@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, List, Optional
+from typing import Deque, Dict, Iterator, List, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -14,7 +14,11 @@ from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import ERRORS
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
+from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
@@ -29,6 +33,7 @@ class MapSettings:
 
     resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
     of blocks to reserve memory for. fewest_blocks: of a map that can be matched with.
+    carver: what marks free space in the map that is shown; None where that is not wanted.
     """
 
     resolution: float
@@ -36,6 +41,8 @@ class MapSettings:
     limit: float
     expected_blocks: int
     fewest_blocks: int
+    carver: Optional[Carver] = None
+    kernel: InsertionKernel = InsertionKernel.NUMPY
 
 
 @dataclass(frozen=True)
@@ -57,11 +64,29 @@ class CloudUpdate:
 
     report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
     not inserted because the scan of their time was rejected.
+    carved: what its beams said about free space, None where nobody asked or the vehicle's position is not known.
     """
 
     report: InsertReport
     waiting: bool
     unplaced: int
+    carved: Optional[CarveReport] = None
+
+
+class LayerCopies(Mapping[Layer, Blocks]):
+    """The blocks of maps, copied when they are asked for."""
+
+    def __init__(self, maps: Dict[Layer, MultiLevelSurfaceMap]) -> None:
+        self._maps = maps
+
+    def __getitem__(self, layer: Layer) -> Blocks:
+        return self._maps[layer].blocks
+
+    def __iter__(self) -> Iterator[Layer]:
+        return iter(self._maps)
+
+    def __len__(self) -> int:
+        return len(self._maps)
 
 
 class Mapper:
@@ -82,13 +107,51 @@ class Mapper:
     def clear(self) -> None:
         """Delete the map, and forget the pose in it."""
         settings = self.settings
-        self.shown = MultiLevelSurfaceMap(settings.resolution, settings.limit, settings.expected_blocks)
+        self.shown = MultiLevelSurfaceMap(
+            settings.resolution, settings.limit, settings.expected_blocks, settings.kernel
+        )
+        self.free = MultiLevelSurfaceMap(settings.resolution, settings.limit)
         self.matched = MultiLevelSurfaceMap(settings.match_resolution, settings.limit)
         self.forget_place()
+
+    @property
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of all maps, to be stored, each made when it is asked for."""
+        return LayerCopies({Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free})
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+        return self.shown.in_box(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        tiles = self.shown.take_changed_tiles()
+        return tiles, self.shown.in_tiles(tiles)
+
+    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+        """Take stored maps in the place of the present ones, and forget the place.
+
+        A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
+        other resolutions than those of the settings.
+        """
+        shown = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        restored = Mapper(self.settings, self.errors, self.matcher)
+        restored.shown.insert_blocks(shown)
+        restored.matched.insert_blocks(layers.get(Layer.MATCHED, shown))
+        if Layer.FREE in layers:
+            restored.free.insert_blocks(layers[Layer.FREE])
+        self.shown, self.matched, self.free = restored.shown, restored.matched, restored.free
+        self.forget_place()
+
+    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
+        self._start = belief
+        self.correction = np.array(correction, dtype=np.float64)
 
     def forget_place(self) -> None:
         """Keep the map but forget the pose, because time jumped."""
         self.belief: Optional[Belief] = None
+        self._start: Optional[Belief] = None
         self.correction = np.zeros(3)
         self._history = CorrectionHistory()
         self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
@@ -116,16 +179,16 @@ class Mapper:
         return len(self.shown)
 
     @property
-    def target(self) -> Blocks:
+    def target(self) -> BlockSource:
         """The map that is matched with."""
-        return self.matched.blocks
+        return self.matched
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
         belief = self._belief_at(scan)
         if not self.matching or len(self.matched) < self.settings.fewest_blocks:
             return self._place(scan, belief)
-        result = self.matcher.match(scan, self.matched.blocks, prior_of(belief, scan.reference_pose))
+        result = self.matcher.match(scan, self.matched, prior_of(belief, scan.reference_pose))
         return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
@@ -140,12 +203,12 @@ class Mapper:
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
         """Insert a cloud into the map that is shown, or let it wait for the match of its time."""
         if not self.matching:
-            return self.take_placed(transformed(self.correction, cloud.points))
+            return self._show(transformed(self.correction, cloud.points), cloud.times, 0)
         if cloud.end > self._history.end:
             self._waiting.append(cloud)
             return CloudUpdate(NOTHING_INSERTED, True, 0)
-        points, unplaced = self._history.placed(cloud)
-        return CloudUpdate(self.shown.insert(points), False, unplaced)
+        placed = self._history.placed(cloud)
+        return self._show(placed.points, placed.times, placed.unplaced)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""
@@ -162,10 +225,21 @@ class Mapper:
         if self.belief is not None and time > self.belief.time:
             self.belief = predicted(self.belief, track, time, self.errors)
 
+    def _show(self, points: np.ndarray, times: np.ndarray, unplaced: int) -> CloudUpdate:
+        """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is shown, and carve them."""
+        report, carver = self.shown.insert(points), self.settings.carver
+        positions = None if carver is None else self._history.positions(times)
+        if positions is None:
+            return CloudUpdate(report, False, unplaced)
+        # A level beam: the sonar is as deep as what it hears.
+        origins = np.column_stack([positions, points[:, 2]])
+        carved = carver.carve(self.shown, self.free, FirstEchoes.of_points(points, times, origins), points)
+        return CloudUpdate(report, False, unplaced, carved)
+
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)
         self._history.add(times, poses, scan.track, holds=True)
-        self.matched.insert(self._history.placed(TimedPoints.of_scan(scan))[0])
+        self.matched.insert(self._history.placed(TimedPoints.of_scan(scan)).points)
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
         # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
         if belief.theta[ERRORS].any():
@@ -180,12 +254,18 @@ class Mapper:
     def _belief_at(self, scan: Scan) -> Belief:
         """Return what is known at the scan's reference time before it is matched."""
         if self.belief is None:
-            theta = np.concatenate([scan.reference_pose, np.zeros(5)])
-            self.belief = Belief(scan.reference_time, theta, self.errors.covariance())
+            self.belief = self._first_belief(scan)
         if scan.reference_time <= self.belief.time:
             return self.belief
         belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
         return updated_by_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
+
+    def _first_belief(self, scan: Scan) -> Belief:
+        if self._start is None:
+            theta = np.concatenate([scan.reference_pose, np.zeros(5)])
+            return Belief(scan.reference_time, theta, self.errors.covariance())
+        theta = np.concatenate([composed(self.correction, scan.reference_pose), self._start.theta[3:]])
+        return Belief(scan.reference_time, theta, self._start.covariance)
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""

@@ -2,7 +2,8 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Sequence
+from importlib.util import find_spec
+from typing import Any, Dict, Optional, Sequence
 
 import numpy as np
 
@@ -15,6 +16,9 @@ from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.surface_map.export.colors import ColorBy
+from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.surface_map.insertion import InsertionKernel
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
@@ -48,7 +52,7 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, MapParameters):
+class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, CarvingParameters, MapParameters):
     """All that a localiser is made from."""
 
     def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
@@ -73,8 +77,19 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, MapPar
     def map_settings(self) -> MapSettings:
         """Return what the grids are made from."""
         return MapSettings(
-            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points
-        )
+            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points, self.carver,
+            self.chosen_kernel,
+        )  # fmt: skip
+
+    @property
+    def carver(self) -> Optional[Carver]:
+        """What marks free space in the map that is shown; None where that is not wanted."""
+        return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
+
+    @property
+    def chosen_kernel(self) -> InsertionKernel:
+        """What inserts points into the map that is shown."""
+        return InsertionKernel.NUMPY
 
     @property
     def matches_from_start(self) -> bool:
@@ -129,7 +144,28 @@ class MlsmNodeParameters(ParameterSet):
         1.0, "shortest time between two messages of the map, in wall time", unit="s", low=0.05, high=3600.0,
         tunable=False,
     )  # fmt: skip
-    save_folder: str = parameter("~/.ros/maps", "the only folder that save_map writes to", tunable=False)
+    insertion: InsertionKernel = parameter(
+        InsertionKernel.NUMPY, "what inserts points: NUMBA is two to four times faster and needs python3-numba",
+        tunable=False,
+    )  # fmt: skip
+    color_by: ColorBy = parameter(ColorBy.TYPE, "what the colour of a block's marker tells", tunable=False)
+    grid_low: float = parameter(
+        -1000.0, "lowest height that MLSM/grid shows", unit="m", low=-20000.0, high=20000.0, tunable=False
+    )
+    grid_high: float = parameter(
+        1000.0, "greatest height that MLSM/grid shows", unit="m", low=-20000.0, high=20000.0, tunable=False
+    )
+    map_directory: str = parameter(
+        "~/.ros/maps", "the only folder that maps are written to and loaded from", tunable=False
+    )
+    map: str = parameter(
+        "", "name of a map in map_directory to start with; the vehicle is searched in it", tunable=False,
+        may_be_empty=True,
+    )  # fmt: skip
+    autosave_period: float = parameter(
+        10.0, "a changed map is saved this often, so that a node that is killed goes on in it; 0: never", unit="s",
+        low=0.0, high=86400.0, tunable=False,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -137,12 +173,14 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     """All of mlsm_core's parameters, in one namespace."""
 
     def check(self) -> None:
-        """Refuse an extent that cannot be reserved, and a map that would correct itself."""
+        """Refuse an extent that cannot be reserved, what is not installed, and a map that would correct itself."""
         if self.expected_blocks > MAX_PREALLOCATED_CELLS:
             raise ParameterError(
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
                 f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
             )
+        if self.insertion is InsertionKernel.NUMBA and find_spec("numba") is None:
+            raise ParameterError("insertion = NUMBA: needs numba; install it with: apt install python3-numba")
         if self.map_frame == self.odom_frame:
             raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
 
@@ -150,6 +188,18 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     def matches_from_start(self) -> bool:
         """Whether scans are matched from the start."""
         return self.start_matching
+
+    @property
+    def chosen_kernel(self) -> InsertionKernel:
+        """What inserts points into the map that is shown."""
+        return self.insertion
+
+    @property
+    def calibration(self) -> Dict[str, Any]:
+        """The parameters that a map's blocks depend on, by name, to be stored with it."""
+        names = ("map_input", "match_input", "beam_width", "range_scale_deviation")
+        values = self.to_mapping()
+        return {name: values[name] for name in names}
 
     @property
     def chosen_map_input(self) -> MapInput:

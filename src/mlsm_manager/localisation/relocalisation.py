@@ -9,7 +9,7 @@ from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.matching.problem.state import YAW, X, Y
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import BlockSource, all_of
 from node_support.geometry.planar import composed, inverse
 
 # Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
@@ -24,8 +24,9 @@ def relocaliser(parameters: DistributionMatcherParameters) -> Matcher:
     return DistributionMatcher(parameters.changed(_EVERYWHERE))
 
 
-def relocalised(scan: Scan, target: Blocks, matcher: Matcher, errors: OdometryErrors) -> MatchResult:
+def relocalised(scan: Scan, target: BlockSource, matcher: Matcher, errors: OdometryErrors) -> MatchResult:
     """Return where in the whole map `scan` was taken, whatever was believed before."""
+    target = all_of(target)
     centers = target.mean[:, :2] if len(target) else np.zeros((1, 2))
     low, high = centers.min(axis=0), centers.max(axis=0)
     middle = np.append((low + high) / 2.0, scan.reference_pose[2])

@@ -42,6 +42,8 @@ def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float)
         return
     health.count("points inserted", update.report.inserted)
     health.show("blocks", str(blocks))
+    if update.carved is not None:
+        health.count("blocks removed because beams went through them", update.carved.removed)
     if update.unplaced:
         health.count("points not inserted because their scan was not matched", update.unplaced)
     if update.report.outside:

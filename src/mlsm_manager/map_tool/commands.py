@@ -82,6 +82,8 @@ def _crop(options: Namespace) -> List[str]:
     if not (len(options.low) == len(options.high) in (2, 3)):
         raise ValueError(f"--low {options.low} --high {options.high}: must both be X Y or both X Y Z")
     stored = cropped(read_any(options.map), np.array(options.low), np.array(options.high))
+    if not len(stored):
+        raise ValueError(f"{options.map}: the map has no blocks between {options.low} and {options.high}")
     export(stored, options.out, ExportOptions())
     return [f"{options.out}: {len(stored)} blocks"]
 

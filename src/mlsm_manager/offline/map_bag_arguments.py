@@ -15,12 +15,18 @@ from node_support.parameters import ParameterError
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
-    """Return bag, out, truth, refine, beams, odom_frame, base_frame and parameters; exits on a bad command line.
+    """Return bags, out, scheduler, truth, refine, beams, frames and parameters; exits on a bad command line.
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
     parser = argparse.ArgumentParser("map_bag", description="Map a recording without a ROS master.")
-    parser.add_argument("bag", type=Path, help="recording with beams and tf (odom, base_link, sonar)")
+    parser.add_argument(
+        "bags", type=Path, nargs="+", metavar="bag",
+        help="recording with beams and tf (odom, base_link, sonar); each further one starts in the map of those before",
+    )  # fmt: skip
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
+    )
     parser.add_argument("--out", type=Path, required=True, help="folder to write to; created if missing")
     parser.add_argument(
         "--matcher", choices=[name.value for name in MatcherName], help="match scan by scan, with this matcher"
@@ -38,7 +44,10 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     parser.add_argument("--beams", default=f"/{topics.BEAMS}", help="topic of the beams (default: %(default)s)")
     parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
     parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: %(default)s)")
+    parser.add_argument("--ned", action="store_true", help="the odometry counts x north, y east, z down")
     options = parser.parse_args(arguments)
+    if options.refine and len(options.bags) > 1:
+        parser.error("--refine smooths one recording, not several")
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(_pair(text, parser) for text in options.set)
     if options.matcher:

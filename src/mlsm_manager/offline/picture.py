@@ -6,12 +6,11 @@ from itertools import cycle
 from pathlib import Path
 from typing import List, Optional, Sequence
 
-import matplotlib as mpl
-
-mpl.use("Agg")
-import matplotlib.pyplot as plt
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PatchCollection
+from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
@@ -52,7 +51,9 @@ def draw_map(
     doubts: Optional[Doubts] = None,
 ) -> None:
     """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m], paths, and how certain the last one is."""
-    figure, axes = plt.subplots(figsize=(14, 8), dpi=110)
+    figure = Figure(figsize=(14, 8), dpi=110)
+    FigureCanvasAgg(figure)
+    axes = figure.add_subplot(1, 1, 1)
     for index, outline in enumerate(outlines):
         label = "walls as they are" if index == 0 else None
         axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
@@ -69,11 +70,10 @@ def draw_map(
     figure.tight_layout()
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
-    plt.close(figure)
     write_whole(file, picture.getvalue())
 
 
-def _draw_doubts(axes: plt.Axes, doubts: Doubts) -> None:
+def _draw_doubts(axes: Axes, doubts: Doubts) -> None:
     ellipses = []
     for center, covariance in zip(doubts.centers, doubts.covariances):
         values, vectors = np.linalg.eigh(covariance)
@@ -87,7 +87,7 @@ def _draw_doubts(axes: plt.Axes, doubts: Doubts) -> None:
         axes.plot(*stretch.T, color=_DOUBT_COLOR, linewidth=6.0, alpha=0.35, label=label, zorder=4)
 
 
-def _draw_blocks(axes: plt.Axes, blocks: Blocks) -> None:
+def _draw_blocks(axes: Axes, blocks: Blocks) -> None:
     for kind, color in _COLORS.items():
         if not np.any(blocks.type == kind):
             continue

@@ -12,6 +12,7 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.geometry.planar import composed
 
 
@@ -51,13 +52,21 @@ class Replayed:
 
 
 def replay(
-    recording: Recording, scans: Sequence[Scan], parameters: ReplayParameters, on_scans: Callable[[int], None]
+    recording: Recording,
+    scans: Sequence[Scan],
+    parameters: ReplayParameters,
+    on_scans: Callable[[int], None],
+    known: Optional[StoredMap] = None,
 ) -> Replayed:
     """Match the `scans` of corrected beams one after the other; `on_scans` is called with 1 after each of them.
+
+    `known` is a map to start in, at a place in it that has to be found.
 
     A scan is used from the moment on at which its last beam and the odometry that the localiser waits for were known.
     """
     localiser, track = parameters.build_localiser(recording.sonar_in_base), recording.track
+    if known is not None:
+        localiser.restore(known, same_odometry=False)
     corrections, updates = np.empty((len(track.times), 3)), []
     done = 0
     for scan in scans:

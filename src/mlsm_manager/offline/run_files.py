@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from mlsm_manager.offline.picture import Doubts, Path2d, draw_map
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.trust import Trust
 from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
 from mlsm_manager.surface_map.storage import write_ply
 from node_support.files import write_whole
 from node_support.geometry.planar import wrapped
@@ -29,21 +30,27 @@ _MOST_ELLIPSES = 40
 
 @dataclass(frozen=True)
 class Run:
-    """times: (m,) s. poses: name -> (m, 3) x y yaw, the last one is the best. blocks: of the final map. counts: what
-    goes into the summary. trust: what the checks say; None where there are none.
+    """times: (m,) s. poses: name -> (m, 3) x y yaw, the last one is the best. counts: what goes into the summary.
+    stored: the final map. trust: what the checks say; None where there are none.
     """
 
     times: np.ndarray
     poses: Dict[str, np.ndarray]
-    blocks: Blocks
     counts: Dict[str, Any]
+    stored: StoredMap
     trust: Optional[Trust] = None
+
+    @property
+    def blocks(self) -> Blocks:
+        """The blocks of the final map."""
+        return self.stored.shown
 
 
 def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
-    """Write map.ply, map.png and trajectory.csv, each whole or not at all; raises OSError."""
+    """Write map.mlsm, map.ply, map.png and trajectory.csv, each whole or not at all; raises OSError."""
+    write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
-    write_whole(folder / "trajectory.csv", trajectory_csv(run).encode("ascii"))
+    write_trajectory(folder / "trajectory.csv", run.times, run.poses)
     draw_map(folder / "map.png", name, run.blocks, [], _paths(run, recording), _doubts(run))
 
 
@@ -59,12 +66,17 @@ def errors_of(run: Run, recording: Recording) -> Dict[str, Dict[str, float]]:
     return {name: position_error(run.times, poses, recording.truth).to_mapping() for name, poses in run.poses.items()}
 
 
-def trajectory_csv(run: Run) -> str:
+def write_trajectory(path: Path, times: np.ndarray, poses: Mapping[str, np.ndarray]) -> None:
+    """Write trajectories (m, 3) at `times` (m,) s whole or not at all; raises OSError."""
+    write_whole(path, trajectory_csv(times, poses).encode("ascii"))
+
+
+def trajectory_csv(times: np.ndarray, poses: Mapping[str, np.ndarray]) -> str:
     """Return the table of all trajectories: time [s], then x y [m] and yaw [rad] of each."""
-    header = ["time"] + [f"{_COLUMNS[name]}_{axis}" for name in run.poses for axis in ("x", "y", "yaw")]
-    columns: List[np.ndarray] = [run.times[:, np.newaxis]]
-    for poses in run.poses.values():
-        columns += [poses[:, :2], wrapped(poses[:, 2:])]
+    header = ["time"] + [f"{_COLUMNS[name]}_{axis}" for name in poses for axis in ("x", "y", "yaw")]
+    columns: List[np.ndarray] = [times[:, np.newaxis]]
+    for path in poses.values():
+        columns += [path[:, :2], wrapped(path[:, 2:])]
     rows = np.concatenate(columns, axis=1)
     lines = [",".join([f"{row[0]:.6f}", *(f"{value:.4f}" for value in row[1:])]) for row in rows]
     return "\n".join([",".join(header), *lines]) + "\n"

@@ -9,7 +9,7 @@ import numpy as np
 import rosbag
 import rospy
 import tf2_py
-from geometry_msgs.msg import Twist
+from geometry_msgs.msg import Transform, Twist
 from tf2_msgs.msg import TFMessage
 
 from mlsm_manager.matching.problem.scan import Track
@@ -30,12 +30,17 @@ _VELOCITY_TOPIC = "/cmd_vel"
 
 @dataclass(frozen=True)
 class BagNames:
-    """What is called how in a bag. truth: topic of the true pose (Odometry or PoseStamped), or None."""
+    """What is called how in a bag.
+
+    truth: topic of the true pose (Odometry or PoseStamped), or None. z_is_down: odometry and truth count x north, y
+    east, z down; they are turned into x, y left, z up (REP-103).
+    """
 
     beams: str
     odom_frame: str
     base_frame: str
     truth: Optional[str]
+    z_is_down: bool = False
 
 
 def read_recording(path: Path, names: BagNames) -> Recording:
@@ -62,12 +67,12 @@ def _read(bag: rosbag.Bag, path: Path, names: BagNames) -> Recording:
         raise RecordingError(
             f"{path}: no /tf, so nothing tells where the beams were taken; there are {', '.join(topics)}"
         )
-    buffer, stamps = _transforms(bag)
+    buffer, stamps = _transforms(bag, names)
     if not stamps.size:
         stamps = _beam_stamps(bag, names.beams)
     track = _track(buffer, stamps, path, names)
     beams, unplaced = _beams(bag, buffer, path, names)
-    return Recording(beams, unplaced, track, _truth(bag, names.truth, path) if names.truth else None)
+    return Recording(beams, unplaced, track, _truth(bag, names, path) if names.truth else None)
 
 
 def _messages(bag: rosbag.Bag, topic: str) -> List[Tuple[float, Any]]:
@@ -75,17 +80,26 @@ def _messages(bag: rosbag.Bag, topic: str) -> List[Tuple[float, Any]]:
     return [(time.to_sec(), message) for _, message, time in bag.read_messages(topics=[topic])]
 
 
-def _transforms(bag: rosbag.Bag) -> Tuple[tf2_py.BufferCore, np.ndarray]:
+def _transforms(bag: rosbag.Bag, names: BagNames) -> Tuple[tf2_py.BufferCore, np.ndarray]:
     buffer, stamps = tf2_py.BufferCore(rospy.Duration(_FOR_EVER)), set()
     for topic in _TF_TOPICS:
         for _, raw, _ in bag.read_messages(topics=[topic], raw=True):
             for transform in TFMessage().deserialize(raw[1]).transforms:
+                frames = transform.header.frame_id.lstrip("/"), transform.child_frame_id.lstrip("/")
+                if names.z_is_down and frames == (names.odom_frame, names.base_frame):
+                    _turn_up(transform.transform)
                 if topic == "/tf_static":
                     buffer.set_transform_static(transform, "map_bag")
                 else:
                     buffer.set_transform(transform, "map_bag")
                     stamps.add(transform.header.stamp.to_nsec())
     return buffer, np.array(sorted(stamps), dtype=np.int64)
+
+
+def _turn_up(transform: Transform) -> None:
+    """Turn north-east-down into x, y left, z up: both frames by half a turn about x."""
+    transform.translation.y, transform.translation.z = -transform.translation.y, -transform.translation.z
+    transform.rotation.y, transform.rotation.z = -transform.rotation.y, -transform.rotation.z
 
 
 def _beam_stamps(bag: rosbag.Bag, topic: str) -> np.ndarray:
@@ -150,14 +164,15 @@ def _matrix(buffer: tf2_py.BufferCore, target: str, source: str, stamp_ns: int) 
         return None, str(error)
 
 
-def _truth(bag: rosbag.Bag, topic: str, path: Path) -> Truth:
+def _truth(bag: rosbag.Bag, names: BagNames, path: Path) -> Truth:
+    left = -1.0 if names.z_is_down else 1.0
     times, positions = [], []
-    for _, message in _messages(bag, topic):
+    for _, message in _messages(bag, names.truth):
         pose = getattr(message, "pose", None)
         pose = getattr(pose, "pose", pose)
         if pose is None or not hasattr(pose, "position"):
-            raise RecordingError(f"{path}: {topic} holds {message._type}, must be Odometry or PoseStamped")
+            raise RecordingError(f"{path}: {names.truth} holds {message._type}, must be Odometry or PoseStamped")
         times.append(message.header.stamp.to_sec())
-        positions.append([pose.position.x, pose.position.y])
+        positions.append([pose.position.x, left * pose.position.y])
     kept = np.concatenate([[True], np.diff(times) > 0.0])
     return Truth(np.array(times)[kept], np.array(positions)[kept])

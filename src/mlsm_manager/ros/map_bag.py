@@ -3,8 +3,11 @@
 import sys
 import time
 from argparse import Namespace
+from dataclasses import replace
+from functools import partial
 from typing import Any, Dict, List, Optional
 
+import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
@@ -12,14 +15,29 @@ from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
+from mlsm_manager.offline.north_east_down import suspicions
 from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, REFINED, Run, errors_of, write_run, write_summary
+from mlsm_manager.offline.run_files import (
+    CORRECTED,
+    ODOMETRY,
+    REFINED,
+    Run,
+    errors_of,
+    write_run,
+    write_summary,
+    write_trajectory,
+)
+from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.ros.bag_recording import BagNames, read_recording
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
 from sonar_processing.beams.beam_correction import BeamCorrection
+
+# The frame that live.yaml's nodes call their map by default.
+_MAP_FRAME = "map"
 
 
 def run_map_bag() -> None:
@@ -39,18 +57,24 @@ def run_map_bag() -> None:
 def map_bag(options: Namespace) -> Dict[str, Any]:
     """Map the bag and write the files; return what summary.json holds. Raises RecordingError and OSError."""
     start = time.monotonic()
-    names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth)
-    recording = read_recording(options.bag, names)
+    names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth, options.ned)
+    recording = read_recording(options.bags[0], names)
     options.out.mkdir(parents=True, exist_ok=True)
     shape = echo_shape_of([placed.beam for placed in recording.beams])
     parameters = suited(options.parameters, shape, options.fixed)
     recording = recording.corrected(parameters.part(BeamCorrection))
-    replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
+    scans = _scans(recording, parameters, options)
+    _warn_of_z_down(recording, scans, options)
+    replayed = _replayed(recording, scans, parameters)
     refined = _refined(recording, replayed, parameters) if options.refine else None
     found = None if replayed.solver is None else Found.of(replayed, refined)
-    run = _run(replayed, refined, found)
-    write_run(options.out, options.bag.name, run, recording)
     known = parameters if found is None else found.calibration.applied(parameters)
+    sessions = _further_sessions(replayed, known, names, options)
+    run = _run(replayed, refined, sessions, known)
+    run = run if found is None else replace(run, trust=found.trust)
+    write_run(options.out, " ".join(bag.name for bag in options.bags), run, recording)
+    for number, session in enumerate(sessions, start=2):
+        write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, _poses(session.replayed))
     write_live(options.out / "live.yaml", known, names.odom_frame, names.base_frame)
     seconds = time.monotonic() - start
     summary = {
@@ -60,10 +84,18 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         "times_real_time": round(recording.seconds / seconds, 1),
         "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
         **({} if found is None else found.to_mapping()),
+        **({"sessions": [session.to_mapping() for session in sessions]} if sessions else {}),
         **errors_of(run, recording),
     }
     write_summary(options.out, summary)
     return summary
+
+
+def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
+    heights = np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])
+    advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
+    for sign in suspicions(heights, scans):
+        print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
 
 
 def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
@@ -73,7 +105,7 @@ def _scans(recording: Recording, parameters: ReplayParameters, options: Namespac
             scans.append(scan)
             bar.update(beams)
     if not scans:
-        raise RecordingError(f"{options.bag}: {len(recording.beams)} beams make no whole turn of the head")
+        raise RecordingError(f"{options.bags[0]}: {len(recording.beams)} beams make no whole turn of the head")
     return scans
 
 
@@ -91,13 +123,41 @@ def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParamet
         return refine(recording.track, replayed.scans, replayed.solver, parameters.resolution)
 
 
-def _run(replayed: Replayed, refined: Optional[Refined], found: Optional[Found]) -> Run:
-    poses, blocks = {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}, replayed.mapper.blocks
-    if refined is not None:
-        poses[REFINED], blocks = refined.poses, refined.blocks
+def _further_sessions(
+    first: Replayed, parameters: ReplayParameters, names: BagNames, options: Namespace
+) -> List[Session]:
+    """Replay all bags but the first, each in the map of those before, with the first one's calibration."""
+    bags, sessions = options.bags[1:], []
+    if not bags:
+        return []
+    known = _stored(first, parameters)
+    with executor_for(len(bags), options.scheduler) as executor:
+        read = partial(read_recording, names=replace(names, truth=None))
+        for bag, ready in zip(bags, prepared_in_parallel(bags, read, parameters, executor)):
+            with _bar(len(ready[1]), "scan", bag.name[:9]) as bar:
+                sessions.append(add_session(bag, ready, parameters, known, bar.update))
+            known = _stored(sessions[-1].replayed, parameters)
+    return sessions
+
+
+def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
+    """Return the map as made when the recording ended: equal runs write equal files."""
+    calibration = parameters.part(BeamCorrection).to_mapping()
+    return StoredMap(_MAP_FRAME, dict(replayed.mapper.layers), calibration, replayed.times[-1])
+
+
+def _poses(replayed: Replayed) -> Dict[str, np.ndarray]:
+    return {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
+
+
+def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
+    poses = _poses(replayed)
+    stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
     counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
-    checked = None if found is None else found.trust
-    return Run(replayed.times, poses, blocks, {**counts, "blocks": len(blocks)}, checked)
+    if refined is not None:
+        poses[REFINED] = refined.poses
+        stored = replace(stored, layers={Layer.SHOWN: refined.blocks})
+    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored)
 
 
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
@@ -109,6 +169,10 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         if name in summary:
             error = summary[name]
             lines.append(f"{name}: mean {error['mean']} m, sd {error['sd']} m, max {error['max']} m")
+    for session in summary.get("sessions", []):
+        found = session["found_after_scans"]
+        place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
+        lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
     if "trust" in summary:
         lines.append(summary["trust"])
-    return [*lines, f"in {options.out}: map.ply map.png trajectory.csv live.yaml summary.json"]
+    return [*lines, f"in {options.out}: map.mlsm map.ply map.png trajectory.csv live.yaml summary.json"]

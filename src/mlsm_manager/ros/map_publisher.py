@@ -1,46 +1,146 @@
-"""Shows the map: block markers and block means, latched, so that a late subscriber sees all of it."""
+"""Shows the map: what changed to those who listen, all of it once to those who come, nothing while nobody does."""
 
 import threading
-from typing import Callable, Optional
+import time
+from typing import Any, Callable, Optional
 
-import numpy as np
 import rospy
+from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
+from mlsm_manager.localisation.localiser import Localiser
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.ros.map_messages import has_octomap_messages, map_cloud, occupancy_grid, octomap_message, octomap_type
 from mlsm_manager.ros.markers import BlockMarkers
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.errors import ExportError
+from mlsm_manager.surface_map.export.octomap import octree
+from mlsm_manager.surface_map.export.rasters import occupancy
 from node_support import topics
-from sonar_processing.ros.conversions import header, point_cloud
+from node_support.errors import RefusedInput
+from node_support.health import Health
+from node_support.ros.node import guarded
+from sonar_processing.ros.conversions import header
 
-CLOUD_FIELDS = ("x", "y", "z", "intensity", "height", "depth", "count")
+# Share of the time that may go into sending the whole map on one topic again and again.
+_MOST_TIME = 0.1
+
+
+class _WholeMap(rospy.SubscribeListener):
+    """A topic that carries the whole map in each message: built only for those who listen, and not all the time."""
+
+    def __init__(self, topic: str, kind: Any, build: Callable[[], Any], health: Health) -> None:
+        self._build = build
+        self._next = 0.0
+        self._is_due = False
+        self._guarded = guarded(health, self._send)
+        self._publisher = rospy.Publisher(topic, kind, subscriber_listener=self, queue_size=2)
+
+    def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], peer_publish: Callable[[Any], None]) -> None:
+        """Send all to who comes."""
+        self._guarded(peer_publish)
+
+    def change(self) -> None:
+        """Remember that the map changed."""
+        self._is_due = True
+
+    def publish_if_due(self) -> None:
+        """Send the map if it changed, somebody listens, and the last time is long enough ago."""
+        start = time.monotonic()
+        if not self._is_due or start < self._next or not self._publisher.get_num_connections():
+            return
+        self._is_due = False
+        self._guarded(self._publisher.publish)
+        self._next = time.monotonic() + (time.monotonic() - start) / _MOST_TIME
+
+    def _send(self, send: Callable[[Any], None]) -> None:
+        try:
+            message = self._build()
+        except ExportError as error:
+            raise RefusedInput("maps not sent", f"{self._publisher.name}: {error}") from None
+        send(message)
+
+
+class _Tiles(rospy.SubscribeListener):
+    """MLSM/Markers: the tiles that changed, and the whole map to who comes."""
+
+    def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
+        self._localiser = localiser
+        self._frame = parameters.map_frame
+        self._markers = BlockMarkers(parameters.color_by)
+        self._lock = threading.Lock()
+        self._is_replaced = True
+        self._send_all = guarded(health, self._again)
+        self._publisher = rospy.Publisher(topics.MAP_MARKERS, MarkerArray, subscriber_listener=self, queue_size=10)
+
+    def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], peer_publish: Callable[[Any], None]) -> None:
+        """Send all to who comes."""
+        self._send_all(peer_publish)
+
+    def replace(self) -> None:
+        """Delete what is shown of another map with the next message."""
+        self._is_replaced = True
+
+    def publish_if_changed(self) -> None:
+        """Send what changed, if anybody listens."""
+        if not self._publisher.get_num_connections():
+            return
+        with self._lock:
+            tiles, blocks = self._localiser.changed_tiles()
+            if self._is_replaced or self._markers.is_outgrown(blocks):
+                self._is_replaced = False
+                self._publisher.publish(self._markers.whole(self._localiser.blocks, header(0, self._frame)))
+            elif len(tiles):
+                changed = self._markers.changed(blocks, map(tuple, tiles.tolist()), header(0, self._frame))
+                self._publisher.publish(changed)
+
+    def _again(self, send: Callable[[Any], None]) -> None:
+        with self._lock:
+            if self._localiser.block_count:
+                send(self._markers.again(self._localiser.blocks, header(0, self._frame)))
 
 
 class MapPublisher:
-    """Publishes /MLSM/Markers and /MLSM/cloud."""
+    """Publishes /MLSM/Markers, /MLSM/cloud, /MLSM/grid and, where its messages are installed, /MLSM/octomap."""
 
-    def __init__(self, map_frame: str) -> None:
-        self._map_frame = map_frame
-        self._block_markers = BlockMarkers()
-        self._markers = rospy.Publisher(topics.MAP_MARKERS, MarkerArray, queue_size=2, latch=True)
-        self._cloud = rospy.Publisher(topics.MAP_CLOUD, PointCloud2, queue_size=2, latch=True)
-        self._changed = threading.Event()
+    def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
+        self._parameters = parameters
+        self._localiser = localiser
         self._stamp_ns = 0
+        self._tiles = _Tiles(parameters, localiser, health)
+        self._whole = [
+            _WholeMap(topics.MAP_CLOUD, PointCloud2, self._cloud, health),
+            _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, health),
+        ]
+        if has_octomap_messages():
+            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, health))
 
     def change(self, stamp_ns: Optional[int] = None) -> None:
         """Remember that the map changed, by a cloud with this stamp where there is one."""
         if stamp_ns is not None:
             self._stamp_ns = stamp_ns
-        self._changed.set()
+        for topic in self._whole:
+            topic.change()
 
-    def publish_if_changed(self, blocks: Callable[[], Blocks]) -> None:
-        """Send the whole map, which `blocks` returns, if it changed since it was sent last."""
-        if self._changed.is_set():
-            self._changed.clear()
-            self.publish(blocks(), self._stamp_ns)
+    def replace(self) -> None:
+        """Remember that there is another map now."""
+        self._tiles.replace()
+        self.change()
 
-    def publish(self, blocks: Blocks, stamp_ns: int) -> None:
-        """Send the whole map."""
-        self._markers.publish(self._block_markers.whole(blocks, header(0, self._map_frame)))
-        rows = np.column_stack([blocks.mean, blocks.height, blocks.depth, blocks.count])
-        self._cloud.publish(point_cloud(rows, stamp_ns, self._map_frame, fields=CLOUD_FIELDS))
+    def publish(self) -> None:
+        """Send what changed since the last time to those who listen."""
+        self._tiles.publish_if_changed()
+        for topic in self._whole:
+            topic.publish_if_due()
+
+    def _cloud(self) -> PointCloud2:
+        return map_cloud(self._localiser.blocks, self._stamp_ns, self._parameters.map_frame)
+
+    def _grid(self) -> OccupancyGrid:
+        parameters = self._parameters
+        grid = occupancy(self._localiser.blocks, self._localiser.free, parameters.grid_low, parameters.grid_high)
+        return occupancy_grid(grid, self._stamp_ns, parameters.map_frame)
+
+    def _octomap(self) -> Any:
+        tree = octree(self._localiser.blocks, self._localiser.free)
+        return octomap_message(tree, header(self._stamp_ns, self._parameters.map_frame))

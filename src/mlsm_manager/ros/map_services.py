@@ -1,5 +1,6 @@
-"""Services of the map: save it, forget it, find the vehicle in it."""
+"""Services of the map: save, load, reset it, cut a box out of it, find the vehicle in it."""
 
+import time
 from typing import Callable
 
 import numpy as np
@@ -8,44 +9,73 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.mapper import ScanUpdate
-from mlsm_manager.surface_map.storage import map_path, write_ply
-from underwater_map_construction.srv import SaveMap, SaveMapRequest, SaveMapResponse
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.ros.map_messages import map_cloud
+from mlsm_manager.surface_map.export.map_folder import MapFolder
+from mlsm_manager.surface_map.files.map_file import StoredMap
+from underwater_map_construction.srv import (
+    GetRegion,
+    GetRegionRequest,
+    GetRegionResponse,
+    LoadMap,
+    LoadMapRequest,
+    LoadMapResponse,
+    SaveMap,
+    SaveMapRequest,
+    SaveMapResponse,
+)
 
 
 class MapServices:
-    """Serves save_map, reset and relocalise in the namespace of mlsm_core."""
+    """Serves save_map, load_map, reset_map, get_region and relocalise in the namespace of mlsm_core."""
 
     def __init__(
         self,
         namespace: str,
         localiser: Localiser,
-        save_folder: str,
-        on_reset: Callable[[], None],
+        parameters: MlsmCoreParameters,
+        on_replaced: Callable[[], None],
         on_fix: Callable[[ScanUpdate], None],
     ) -> None:
-        """`on_reset` is called after the map was cleared, `on_fix` with the scan whose place was found."""
+        """`on_replaced` is called after the map was cleared or loaded, `on_fix` with the scan whose pose was found."""
         self._localiser = localiser
-        self._save_folder = save_folder
-        self._on_reset = on_reset
+        self._parameters = parameters
+        self._folder = MapFolder(parameters.map_directory)
+        self._on_replaced = on_replaced
         self._on_fix = on_fix
         prefix = namespace if namespace == "~" else namespace + "/"
         rospy.Service(f"{prefix}save_map", SaveMap, self._save)
-        rospy.Service(f"{prefix}reset", Trigger, self._reset)
+        rospy.Service(f"{prefix}load_map", LoadMap, self._load)
+        rospy.Service(f"{prefix}reset_map", Trigger, self._reset)
+        rospy.Service(f"{prefix}get_region", GetRegion, self._get_region)
         rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
 
     def _save(self, request: SaveMapRequest) -> SaveMapResponse:
-        blocks = self._localiser.blocks
+        stored = stored_map(self._localiser, self._parameters)
         try:
-            path = map_path(self._save_folder, request.name)
-            write_ply(path, blocks)
+            path = self._folder.save(request.name, stored, request.overwrite)
         except (OSError, ValueError) as error:
             return SaveMapResponse(False, str(error))
-        return SaveMapResponse(True, f"{len(blocks)} blocks written to {path}")
+        return SaveMapResponse(True, f"{len(stored.shown)} blocks written to {path}")
+
+    def _load(self, request: LoadMapRequest) -> LoadMapResponse:
+        try:
+            stored = self._folder.load(request.name)
+            load_into(self._localiser, stored, self._parameters, same_odometry=False)
+        except ValueError as error:
+            return LoadMapResponse(False, f"{error}; the present map stays")
+        self._on_replaced()
+        return LoadMapResponse(True, f"{self._localiser.block_count} blocks loaded")
 
     def _reset(self, _request: TriggerRequest) -> TriggerResponse:
         count = self._localiser.clear()
-        self._on_reset()
+        self._on_replaced()
         return TriggerResponse(True, f"{count} blocks deleted")
+
+    def _get_region(self, request: GetRegionRequest) -> GetRegionResponse:
+        low, high = (np.array([corner.x, corner.y, corner.z]) for corner in (request.low, request.high))
+        blocks = self._localiser.region(low, high)
+        return GetRegionResponse(map_cloud(blocks, rospy.Time.now().to_nsec(), self._parameters.map_frame))
 
     def _relocalise(self, _request: TriggerRequest) -> TriggerResponse:
         update = self._localiser.relocalise()
@@ -56,3 +86,15 @@ class MapServices:
         self._on_fix(update)
         x, y, yaw = update.result.pose
         return TriggerResponse(True, f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(yaw):.1f} deg in map")
+
+
+def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, run: str = "") -> StoredMap:
+    """Return the map as a file keeps it, made now."""
+    return localiser.stored(parameters.map_frame, parameters.calibration, time.time(), run)
+
+
+def load_into(localiser: Localiser, stored: StoredMap, parameters: MlsmCoreParameters, same_odometry: bool) -> None:
+    """Take a stored map in the place of the present one; raises ValueError for one of another frame or resolution."""
+    if stored.frame != parameters.map_frame:
+        raise ValueError(f"frame {stored.frame!r}: must be the map's, {parameters.map_frame!r}")
+    localiser.restore(stored, same_odometry)

@@ -11,7 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.surface_map.block_shapes import THINNEST, BoxList, box_lists
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
-from mlsm_manager.surface_map.export.colors import ColorBy, block_colors
+from mlsm_manager.surface_map.export.colors import ColorBy, Limits, block_colors, color_limits
 
 Tile = Tuple[int, int]
 COLORS: Dict[BlockType, ColorRGBA] = {
@@ -22,6 +22,8 @@ COLORS: Dict[BlockType, ColorRGBA] = {
 _EMPTY_LISTS_BYTES = 17
 _AFTER_STAMP_BYTES = 16
 """Of a message: sequence, seconds, nanoseconds and the length of the frame's name."""
+_OUTGROWN = 0.25
+"""Share of the range of colours by which values may lie beyond it."""
 _POWERS = 64
 """So many classes of boxes share a tile's number: heights from a sixteenth of a cell to 2 ** 59 cells."""
 
@@ -47,6 +49,13 @@ class BlockMarkers:
         self._color_by = color_by
         self._numbers: Dict[Tile, int] = {}
         self._shown: Dict[Tile, Set[int]] = {}
+        self._limits: Limits = (0.0, 0.0)
+
+    def is_outgrown(self, blocks: Blocks) -> bool:
+        """Return whether `blocks` lie so far outside of the present colours that the whole map needs new ones."""
+        low, high = color_limits(blocks, self._color_by)
+        margin = _OUTGROWN * (self._limits[1] - self._limits[0])
+        return len(blocks) > 0 and (low < self._limits[0] - margin or high > self._limits[1] + margin)
 
     def changed(self, blocks: Blocks, tiles: Iterable[Tile], header: Header) -> PackedMarkerArray:
         """Return the markers of `tiles`, which hold `blocks`, and the deletion of those that are gone from them."""
@@ -58,16 +67,20 @@ class BlockMarkers:
         return _array(packed)
 
     def whole(self, blocks: Blocks, header: Header) -> PackedMarkerArray:
-        """Return the markers of all blocks of the map, and the deletion of all others."""
+        """Return the markers of all blocks of the map, and the deletion of all others; colours span what they show."""
+        self._limits = color_limits(blocks, self._color_by)
         return self.changed(blocks, list(self._shown), header)
 
     def again(self, blocks: Blocks, header: Header) -> PackedMarkerArray:
         """Return the markers of all blocks of the map, for one who knows nothing yet."""
-        return _array(self._packed(blocks, header)[0])
+        packed, now = self._packed(blocks, header)
+        for tile, powers in now.items():
+            self._shown[tile] = self._shown.get(tile, set()) | powers
+        return _array(packed)
 
     def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, Set[int]]]:
         """Return the serialised markers of blocks, and which powers there are in each tile."""
-        colors = None if self._color_by is ColorBy.TYPE else _rgba(block_colors(blocks, self._color_by))
+        colors = None if self._color_by is ColorBy.TYPE else _rgba(block_colors(blocks, self._color_by, self._limits))
         frames: Dict[int, _Frame] = {}
         packed, powers = [], {}
         for boxes in box_lists(blocks):

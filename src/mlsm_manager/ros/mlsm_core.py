@@ -12,6 +12,7 @@ from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_verdicts
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.ros.autosave import Autosave
 from mlsm_manager.ros.fix_publisher import FixPublisher
 from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import MapServices
@@ -43,15 +44,16 @@ class MlsmCore:
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
         self._mounted = False
-        self._map = MapPublisher(parameters.map_frame)
+        self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
+        self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
         self._services = MapServices(
-            namespace, self._localiser, parameters.save_folder, self._after_reset,
+            namespace, self._localiser, parameters, self._after_replacing,
             lambda update: self._publish_fix(update, round(update.scan.reference_time * 1e9)),
         )  # fmt: skip
         rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
-        every(parameters.map_period, self._publish_map, self.health)
+        every(parameters.map_period, self._map.publish, self.health)
 
     @classmethod
     def as_node(cls) -> "MlsmCore":
@@ -175,9 +177,6 @@ class MlsmCore:
             detail = f"by {seconds:.1f} s; the map stays, the position in it starts at odom's again"
             self.health.problem("jumps back in time", detail)
 
-    def _publish_map(self) -> None:
-        self._map.publish_if_changed(lambda: self._localiser.blocks)
-
-    def _after_reset(self) -> None:
+    def _after_replacing(self) -> None:
         self._fix.clear()
-        self._map.change()
+        self._map.replace()

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Optional
+from typing import Optional, Protocol
 
 import numpy as np
 
@@ -98,6 +98,18 @@ class Blocks:
         """Return the blocks with means from `low` to `high`, (2,) x y or (3,) x y z [m]."""
         places = self.rows[:, : len(low)]
         return self.take(((places >= low) & (places <= high)).all(axis=1))
+
+
+class BlockSource(Protocol):
+    """What gives the blocks in a box: a map, or a copy of its blocks."""
+
+    def in_box(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks with means from `low` to `high`, (2,) x y or (3,) x y z [m]; infinite ends are allowed."""
+
+
+def all_of(source: BlockSource) -> Blocks:
+    """Return all blocks of a source."""
+    return source.in_box(np.full(2, -np.inf), np.full(2, np.inf))
 
 
 def cells_of(points: np.ndarray, resolution: float) -> np.ndarray:

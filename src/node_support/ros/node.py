@@ -1,4 +1,4 @@
-"""The start, the guarded callbacks and the diagnostics that all nodes share."""
+"""How all nodes start, guard their callbacks and publish diagnostics."""
 
 import logging
 import os
@@ -23,7 +23,7 @@ _END_STEP = 0.01  # s: roslaunch waits for every node
 
 
 class StartError(Exception):
-    """The node cannot start for a reason that the user must cure; the text is one line for the user."""
+    """The node cannot start until the user changes something; the text says what, in one line."""
 
 
 class Node(Protocol):
@@ -101,7 +101,7 @@ def make_health(name: str) -> Health:
 
 
 def guarded(health: Health, callback: Callable[..., None]) -> Callable[..., None]:
-    """Wrap a callback so that no message can end or silence the node: what is refused or fails is counted and said."""
+    """Wrap a callback so that no message can end or silence the node: refusals and failures are counted and logged."""
 
     def call(*arguments: Any) -> None:
         try:

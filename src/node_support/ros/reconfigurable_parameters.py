@@ -60,7 +60,7 @@ class ReconfigurableParameters:
         try:
             wanted = self.current.changed(changes)
         except ParameterError as error:
-            self._health.problem("changes of parameters refused", str(error))
+            self._health.answered_problem("changes of parameters refused", f"{error}; nothing was changed")
             wanted = self.current
         if wanted != self.current:
             before, self.current = self.current.to_mapping(), wanted

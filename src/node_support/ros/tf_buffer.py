@@ -162,7 +162,7 @@ def stamp_of(time: float) -> int:
 
 
 def _check_pose(shift: Vector3, turn: Quaternion) -> None:
-    squared_norm = turn.x**2 + turn.y**2 + turn.z**2 + turn.w**2
+    squared_norm = turn.x * turn.x + turn.y * turn.y + turn.z * turn.z + turn.w * turn.w
     if not (math.isfinite(shift.x + shift.y + shift.z) and abs(squared_norm - 1.0) < _SQUARED_NORM_ERROR):
         shown = f"translation {shift.x} {shift.y} {shift.z}, quaternion {turn.x} {turn.y} {turn.z} {turn.w}"
         raise RefusedInput(_KIND, f"{shown}, must be finite and of length 1")

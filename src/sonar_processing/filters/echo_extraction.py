@@ -37,7 +37,8 @@ class EchoExtractorParameters(ParameterSet):
     """Parameters of echo_extractor."""
 
     mode: ExtractionMode = parameter(
-        ExtractionMode.MATCHED_FILTER, "the peak of an echo, where it begins, or points all along it"
+        ExtractionMode.MATCHED_FILTER,
+        "which points of an echo are kept: its peak, its beginning, or points all along it",
     )
     pulse_sigma: float = parameter(
         0.15,
@@ -51,14 +52,16 @@ class EchoExtractorParameters(ParameterSet):
         low=0.0, high=0.9,
     )  # fmt: skip
     min_contrast: float = parameter(
-        8.0, "an echo stands out by at least this many times the spread of the ring; 15 in open water",
+        8.0, "least height of an echo above the ring, in spreads of the ring; 15 in open water",
         low=0.0, high=100.0,
     )  # fmt: skip
     min_height: float = parameter(
-        10.0, "an echo stands out of the ring by at least this", unit="echo strength", low=0.0, high=255.0
+        10.0, "least height of an echo above the ring", unit="echo strength", low=0.0, high=255.0
     )
-    min_range: float = parameter(0.5, "echoes nearer than this are ringing of the head", unit="m", low=0.0, high=100.0)
-    spacing: float = parameter(0.5, "DENSE: one point per this length of an echo", unit="m", low=0.01, high=100.0)
+    min_range: float = parameter(
+        0.5, "nearer echoes are removed: there the head itself rings", unit="m", low=0.0, high=100.0
+    )
+    spacing: float = parameter(0.5, "DENSE: distance between the points of an echo", unit="m", low=0.01, high=100.0)
 
 
 @dataclass(frozen=True)

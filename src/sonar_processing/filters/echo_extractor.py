@@ -26,7 +26,7 @@ class EchoExtractor:
         and no echo lies on them. Raises RefusedInput for a cloud that is not organised or of too few beams.
         """
         if not cloud.is_organized:
-            raise RefusedInput("clouds refused", "not organised; the echo extractor takes sonar/scan/polar")
+            raise RefusedInput("clouds refused", "not organised; subscribe the echo extractor to sonar/scan/polar")
         rows = cloud.points.reshape(cloud.height, -1, 4)
         strengths = np.nan_to_num(rows[..., 3], nan=0.0, posinf=0.0, neginf=0.0)
         echoes = extract_echoes(strengths, bin_length(rows), self.parameters)
@@ -45,7 +45,8 @@ def bin_length(rows: np.ndarray) -> float:
     """
     some = rows[:: max(len(rows) // _ROWS_MEASURED, 1), :, :3]
     lengths = np.linalg.norm(np.diff(some, axis=1), axis=2)
-    lengths = lengths[np.isfinite(lengths) & (lengths > 0.0)]
+    lengths = lengths[np.isfinite(lengths)]
+    lengths = lengths[lengths > 0.0]
     if lengths.size == 0:
         raise RefusedInput("clouds refused", "no two neighbouring bins are left; check min_range and height_limit")
     return float(np.median(lengths))

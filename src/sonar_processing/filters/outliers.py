@@ -8,6 +8,7 @@ from scipy.spatial import cKDTree
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.filters.open3d_outliers import open3d_statistical_inliers
 
 
 class OutlierMode(Enum):
@@ -59,10 +60,17 @@ def statistical_inliers(points: np.ndarray, mean_k: int, stddev_multiplier: floa
     """Return (n,) bool: whose mean distance to the `mean_k` nearest others is not above mean + multiplier * sd.
 
     points: (n, 3), finite. The standard deviation is the sample's (n - 1), as in pcl::StatisticalOutlierRemoval. With
-    fewer than `mean_k` others, all others count; fewer than three points have no outlier.
+    fewer than `mean_k` others, all others count; fewer than three points have no outlier. Open3D decides for large
+    clouds, where its rule is the same.
     """
     if len(points) < 3:
         return np.ones(len(points), dtype=bool)
+    keep = open3d_statistical_inliers(points, mean_k, stddev_multiplier)
+    return scipy_statistical_inliers(points, mean_k, stddev_multiplier) if keep is None else keep
+
+
+def scipy_statistical_inliers(points: np.ndarray, mean_k: int, stddev_multiplier: float) -> np.ndarray:
+    """Return (n,) bool as statistical_inliers does for three or more points (n, 3), without Open3D."""
     neighbors = min(mean_k, len(points) - 1)
     # Splitting in the middle instead of at the median builds ten times as fast; the neighbours are the same.
     tree = cKDTree(points, balanced_tree=False, compact_nodes=False)

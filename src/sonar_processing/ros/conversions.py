@@ -84,6 +84,8 @@ def points_from_message(message: PointCloud2) -> np.ndarray:
         or len(message.data) != count * step
     ):
         raise RefusedInput("clouds refused", f"{len(message.data)} bytes for {count} points of {step} bytes")
+    if count == 0:
+        return np.zeros((0, len(POINT_FIELDS)), dtype=np.float32)
     if [offsets[name] for name in POINT_FIELDS] == [0, 4, 8, 12] and step == 16:
         return np.frombuffer(message.data, dtype=np.float32).reshape(-1, 4)
     row = np.dtype(

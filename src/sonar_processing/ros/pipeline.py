@@ -43,7 +43,7 @@ class StageChain:
 class Pipeline:
     """Hosts the stages named by `~chain` and sonar_image, with the parameters and topics they have as nodes.
 
-    Stages that take polar scans run beside the others, and only while somebody wants what they make.
+    Stages that take polar scans run beside the others, and only while somebody subscribes to their results.
     """
 
     def __init__(self, cloud_sink: Optional[CloudSink] = None, echo_sink: Optional[CloudSink] = None) -> None:

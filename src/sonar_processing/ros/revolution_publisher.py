@@ -1,4 +1,4 @@
-"""Publishes what is made of a whole revolution of the head, and makes it only while somebody wants it."""
+"""Publishes the scans of whole revolutions of the head, and makes them only while somebody subscribes."""
 
 from typing import List, Optional
 

@@ -1,4 +1,4 @@
-"""The ROS side of sonar_image: the newest beam drawn into an image, while somebody looks at it."""
+"""The ROS side of sonar_image: draws beams into an image while somebody subscribes to it."""
 
 import threading
 import time
@@ -41,14 +41,14 @@ class SonarImage(rospy.SubscribeListener):
         self._picture = PolarImage(parameters)
 
     def peer_subscribe(self, *_: object) -> None:
-        """Begin to draw for the first who looks."""
+        """Begin to draw for the first subscriber."""
         with self._lock:
             if self._beams is None:
                 self._picture.clear()
                 self._beams = subscribe_to_beams(guarded(self.health, self._take))
 
     def peer_unsubscribe(self, _topic: str, others: int) -> None:
-        """Rest when nobody looks any more."""
+        """Stop when the last subscriber has gone."""
         with self._lock:
             if others == 0 and self._beams is not None:
                 self._beams.unregister()

@@ -66,7 +66,7 @@ class SonarToCloud:
     def _is_moving(self, stamp_ns: int) -> bool:
         parameters = self._live.current
         if not self._moving_state.was_heard:
-            self.health.show("velocity", f"never heard on {parameters.velocity_topic}: all beams count as still")
+            self.health.show("velocity", f"nothing received on {parameters.velocity_topic}: all beams count as still")
             return False
         moving, age = self._moving_state.is_moving(parameters), self._moving_state.age(stamp_ns)
         self.health.show("velocity", "moving" if moving else "still")

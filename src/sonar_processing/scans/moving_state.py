@@ -1,4 +1,4 @@
-"""Tells moving from still by the velocity that the vehicle reports (thesis 6.5.2, velocity topic)."""
+"""Whether the vehicle moves, by the velocity that it reports (thesis 6.5.2, velocity topic)."""
 
 import math
 from typing import Optional, Sequence
@@ -30,11 +30,11 @@ class MovingState:
 
     @property
     def was_heard(self) -> bool:
-        """Whether any velocity came."""
+        """Whether any velocity has been received."""
         return self._heard
 
     def is_moving(self, parameters: SonarToCloudParameters) -> bool:
-        """Whether the vehicle is faster than the dead band; a vehicle never heard of is still."""
+        """Whether the vehicle is faster than the dead band; without any velocity it is still."""
         return self._speed > parameters.still_speed or self._turn_rate > parameters.still_turn_rate
 
     def age(self, stamp_ns: int) -> float:

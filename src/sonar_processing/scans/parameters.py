@@ -49,16 +49,20 @@ class ScanParameters(ParameterSet):
     """How beams become points, points become scans, and when the vehicle counts as still."""
 
     mode: ScanMode = parameter(
-        ScanMode.SONAR, "all bins or one bin of each beam; CONT: a cloud per beam", thesis_name="mode"
+        ScanMode.SONAR,
+        "SONAR: all bins of a beam, LASER: one bin; with CONT: a cloud after every beam",
+        thesis_name="mode",
     )
     scan_size: int = parameter(120, "beams that make a scan", low=1, high=3600, thesis_name="scanSize")
     end_at_full_turn: bool = parameter(True, "end a scan before the head passes its start again")
     target_frame: str = parameter("odom", "frame the clouds are placed in", tunable=False, thesis_name="targetFrame")
-    min_range: float = parameter(0.5, "bins nearer than this are ringing of the head", unit="m", low=0.0, high=100.0)
+    min_range: float = parameter(
+        0.5, "nearer bins are removed: there the head itself rings", unit="m", low=0.0, high=100.0
+    )
     height_limit: float = parameter(
         100.0, "points higher than this in the target frame are removed", unit="m", low=-12000.0, high=12000.0
     )
-    keep_organized: bool = parameter(False, "rows are beams; removed points become NaN instead of going")
+    keep_organized: bool = parameter(False, "one row per beam, with NaN in place of removed points")
     dispersed_points: int = parameter(1, "points per bin, spread across the width of the beam", low=1, high=15)
     beam_width: float = beam_width_parameter()
     laser_pick: LaserPick = parameter(
@@ -75,7 +79,7 @@ class ScanParameters(ParameterSet):
         0, "rays of the laser scan; 0: as many as the head makes steps in a turn", low=0, high=7200
     )
     velocity_topic: str = parameter(
-        topics.VELOCITY_COMMANDS, "tells whether the vehicle moves", tunable=False, thesis_name="velocityTopic"
+        topics.VELOCITY_COMMANDS, "topic with the velocity of the vehicle", tunable=False, thesis_name="velocityTopic"
     )
     velocity_type: VelocityType = parameter(VelocityType.TWIST, "type of the velocity topic", tunable=False)
     velocity_timeout: float = parameter(

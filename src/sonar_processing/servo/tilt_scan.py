@@ -29,19 +29,21 @@ class SonarControlParameters(ParameterSet):
         ControlMode.STATIC_MAPPING, "STATIC_MAPPING: step through the range; HORIZONTAL: stay at horizontal_deg"
     )
     lowest_deg: float = parameter(-60.0, "first tilt of a sweep", unit="deg", low=-180.0, high=180.0)
-    highest_deg: float = parameter(60.0, "last tilt of a sweep, then it goes back", unit="deg", low=-180.0, high=180.0)
+    highest_deg: float = parameter(
+        60.0, "last tilt of a sweep, before the servo goes back", unit="deg", low=-180.0, high=180.0
+    )
     step_deg: float = parameter(5.0, "from scan to scan", unit="deg", low=0.1, high=180.0)
     horizontal_deg: float = parameter(0.0, "tilt in HORIZONTAL", unit="deg", low=-180.0, high=180.0)
-    tolerance_deg: float = parameter(1.0, "the servo has arrived when it is this near", unit="deg", low=0.01, high=30.0)
+    tolerance_deg: float = parameter(
+        1.0, "largest distance from the goal at which the servo has arrived", unit="deg", low=0.01, high=30.0
+    )
     settle_time: float = parameter(
-        0.3, "the servo stands still when it has not moved for so long", unit="s", low=0.0, high=60.0
+        0.3, "time without movement after which the servo is still", unit="s", low=0.0, high=60.0
     )
-    move_timeout: float = parameter(10.0, "a move that takes longer is given up", unit="s", low=0.1, high=3600.0)
-    joint_timeout: float = parameter(2.0, "joint states older than this are stale", unit="s", low=0.1, high=3600.0)
-    scan_timeout: float = parameter(120.0, "a scan that takes longer is given up", unit="s", low=0.1, high=36000.0)
-    scan_beams: int = parameter(
-        0, "beams of a scan; 0: until the head has been everywhere, full turn or sector", low=0, high=100000
-    )
+    move_timeout: float = parameter(10.0, "longest time for a move of the servo", unit="s", low=0.1, high=3600.0)
+    joint_timeout: float = parameter(2.0, "longest time between joint states", unit="s", low=0.1, high=3600.0)
+    scan_timeout: float = parameter(120.0, "longest time for a scan", unit="s", low=0.1, high=36000.0)
+    scan_beams: int = parameter(0, "beams in a scan; 0: a full turn, or both ways through a sector", low=0, high=100000)
     joint: str = parameter("sonar_servo_joint", "name of the servo's joint in /joint_states", tunable=False)
 
     def check(self) -> None:
@@ -66,7 +68,10 @@ class State(Enum):
 
 
 class TiltScan:
-    """Decides when the servo moves. Times are s, angles rad; it is told of everything and calls back with commands."""
+    """Decides when the servo moves, from joint angles, beams and time; `command` receives the goals.
+
+    Times are in s, angles in rad.
+    """
 
     def __init__(
         self, parameters: SonarControlParameters, time: float, command: Callable[[float], None], health: Health
@@ -97,7 +102,9 @@ class TiltScan:
         if self._angle is None or abs(angle - self._angle) > self._tolerance / 2.0:
             self._angle, self._still_since = angle, time
             if self.state is not State.TURNING:
-                self._health.problem("scans disturbed", f"the servo moved to {math.degrees(angle):.1f} deg by itself")
+                self._health.problem(
+                    "scans disturbed", f"the servo moved to {math.degrees(angle):.1f} deg without a command"
+                )
                 self._turn(time)
         arrived = abs(angle - self.goal) <= self._tolerance
         if self.state is State.TURNING and arrived and self._is_still(time):
@@ -111,7 +118,7 @@ class TiltScan:
             self._go_on(time)
 
     def tick(self, time: float) -> None:
-        """Look for what does not happen; call it a few times a second."""
+        """Act on what has not happened in time; call it a few times a second."""
         self._see_time(time)
         if time - self._joint_time > self.parameters.joint_timeout:
             self._miss_joint(time)

@@ -46,33 +46,33 @@ class PhysicalParameters(ParameterSet):
     side_lobe_db: float = parameter(
         -100.0, "level of side lobes over all bearings, two-way", unit="dB", low=-100.0, high=0.0
     )
-    side_rays: int = parameter(60, "rays over all bearings, if there are side lobes", low=0, high=10000)
+    side_rays: int = parameter(60, "rays over all bearings for the side lobes, if there are any", low=0, high=10000)
     frequency_khz: float = parameter(
-        675.0, "frequency of the sound: determines the absorption", unit="kHz", low=10.0, high=3000.0
+        675.0, "frequency of the sound, which determines the absorption", unit="kHz", low=10.0, high=3000.0
     )
     temperature: float = parameter(15.0, "temperature of the water", unit="C", low=-2.0, high=40.0)
     salinity: float = parameter(35.0, "salinity of the water; 0 in a tank", unit="per mille", low=0.0, high=42.0)
     pulse_length_us: float = parameter(100.0, "length of the pulse", unit="us", low=1.0, high=1000.0)
     source_level_db: float = parameter(
         105.0,
-        "level of the echo of a surface that fills the beam at 1 m and reflects everything",
+        "level of the echo from a surface 1 m away that fills the beam and reflects everything",
         unit="dB",
         low=0.0,
         high=250.0,
     )
     noise_level_db: float = parameter(0.0, "noise level of receiver and water", unit="dB", low=-300.0, high=100.0)
     volume_scattering_db: float = parameter(
-        -60.0, "level of what one metre of water returns, as if it were a surface", unit="dB", low=-300.0, high=0.0
+        -60.0, "backscatter of a metre of water, as if it were a surface", unit="dB", low=-300.0, high=0.0
     )
     ringing: float = parameter(0.3, "range up to which the transducer still rings", unit="m", low=0.0, high=10.0)
     ringing_level_db: float = parameter(60.0, "level of the ringing at its start", unit="dB", low=0.0, high=200.0)
-    speckle: float = parameter(1.0, "share of an echo that has random phases", low=0.0, high=1.0)
+    speckle: float = parameter(1.0, "share of an echo that arrives with random phase", low=0.0, high=1.0)
     gain_db: float = parameter(20.0, "gain of the head", unit="dB", low=0.0, high=40.0, thesis_name="gain")
     tvg_spreading: float = parameter(
-        20.0, "the head's gain over range: this times log10 of the range in metres", unit="dB", low=0.0, high=40.0
+        20.0, "gain over range: this times log10 of the range in metres", unit="dB", low=0.0, high=40.0
     )
     tvg_absorption: float = parameter(
-        0.2, "the head's gain over range: compensated absorption, per metre each way", unit="dB/m", low=0.0, high=2.55,
+        0.2, "gain over range: compensated absorption, per metre each way", unit="dB/m", low=0.0, high=2.55,
         thesis_name="absorption / 100",
     )  # fmt: skip
     detector: Detector = parameter(Detector.DECIBELS, "what strengths are proportional to")
@@ -80,19 +80,17 @@ class PhysicalParameters(ParameterSet):
         110.0, "level at 1 m that gives the greatest strength at gain 0", unit="dB", low=-100.0, high=250.0
     )
     dynamic_range_db: float = parameter(
-        40.0,
-        "range of levels from strength 0 to the greatest strength, for the detector in decibels",
-        unit="dB",
-        low=1.0,
-        high=150.0,
+        40.0, "range from strength 0 to the greatest, for a detector in decibels", unit="dB", low=1.0, high=150.0
     )
-    mirror_bounces: int = parameter(1, "number of mirrors off which sound is followed on its way out", low=0, high=5)
+    mirror_bounces: int = parameter(1, "reflections that are followed on the way out", low=0, high=5)
     surface_mirror: bool = parameter(False, "the water's surface, z = 0, is one of the mirrors")
-    surface_loss_db: float = parameter(
-        1.0, "loss of each reflection at the water's surface", unit="dB", low=0.0, high=60.0
-    )
+    surface_loss_db: float = parameter(1.0, "loss at each reflection off the waves", unit="dB", low=0.0, high=60.0)
     vehicle_target_db: float = parameter(
-        -100.0, "target strength of the vehicle itself, which reflects echoes again", unit="dB", low=-100.0, high=20.0
+        -100.0,
+        "target strength of the vehicle itself, which reflects echoes once more",
+        unit="dB",
+        low=-100.0,
+        high=20.0,
     )
 
 

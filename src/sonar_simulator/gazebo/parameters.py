@@ -28,11 +28,11 @@ class GazeboSonarParameters(StampParameters):
     )
     beams_per_turn: int = parameter(120, "SWEEP: beams in a full turn", low=1, high=3600, tunable=False)
     horizontal_opening_deg: float = parameter(
-        2.5, "SWEEP: width of a beam; the rays within it make one beam", unit="deg", low=0.01, high=360.0, tunable=False
+        2.5, "SWEEP: rays within this angle make one beam", unit="deg", low=0.01, high=360.0, tunable=False
     )
     vertical_opening_deg: float = parameter(
         22.0,
-        "LaserScan: angle from the ray sensor's lowest row to its highest; clouds contain it",
+        "LaserScan: angle from the ray sensor's lowest row to its highest; clouds do not need it",
         unit="deg",
         low=0.0,
         high=179.0,
@@ -40,14 +40,14 @@ class GazeboSonarParameters(StampParameters):
     )
     ray_rows: int = parameter(
         0,
-        "clouds: vertical samples of the ray sensor; 0: derived from the points, for less than 180 deg",
+        "clouds: vertical samples of the ray sensor; 0: found out, for sensors that see less than 180 deg",
         low=0,
         high=1000,
         tunable=False,
     )
     nothing_range: float = parameter(
         50.0,
-        "clouds: range of a point that means nothing was hit: the sensor's greatest range minus its smallest",
+        "clouds: distance of points that hit nothing: the ray sensor's greatest range minus its smallest",
         unit="m",
         low=0.1,
         high=10000.0,

@@ -62,7 +62,7 @@ class ScanLayout:
             return 1
         columns = round(span / self.angle_increment) + 1
         if columns < 1:
-            raise RefusedInput("scans refused", f"angle_increment {self.angle_increment} leads away from angle_max")
+            raise RefusedInput("scans refused", f"angle_increment {self.angle_increment} does not lead to angle_max")
         return columns
 
 
@@ -75,7 +75,10 @@ def rays_of_scan(layout: ScanLayout, ranges: np.ndarray, intensities: np.ndarray
     """
     columns = layout.columns
     if not len(ranges) or len(ranges) % columns:
-        raise RefusedInput("scans refused", f"{len(ranges)} ranges are no rows of {columns}, which the angles tell")
+        raise RefusedInput(
+            "scans refused",
+            f"{len(ranges)} ranges are not a multiple of the {columns} columns between angle_min and angle_max",
+        )
     rows = len(ranges) // columns
     grid = np.asarray(ranges, dtype=np.float64).reshape(rows, columns)
     retro = np.asarray(intensities, dtype=np.float64).reshape(rows, columns) if len(intensities) == grid.size else None
@@ -98,7 +101,10 @@ def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: 
     points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
     distances = np.linalg.norm(points, axis=1)
     if not len(points) or not np.isfinite(points).all() or not distances.all():
-        raise RefusedInput("scans refused", f"{len(points)} points, must be some, finite and off the sensor's centre")
+        raise RefusedInput(
+            "scans refused",
+            f"{len(points)} points; there must be at least one, all finite and none at the sensor's centre",
+        )
     bearings = np.arctan2(points[:, 1], points[:, 0])
     rows = rows or _rows(bearings)
     if len(points) % rows:
@@ -118,7 +124,9 @@ def _rows(bearings: np.ndarray) -> int:
     """Return the number of rows: how often the bearing returns to the beginning of a row, plus one."""
     span = np.ptp(bearings)
     if span > math.pi:
-        raise RefusedInput("scans refused", "points all around the sensor do not tell their rows: set ray_rows")
+        raise RefusedInput(
+            "scans refused", "the number of rows is unknown for points all around the sensor; set ray_rows"
+        )
     if span <= _NO_BEARING:
         return len(bearings)
     steps = np.diff(bearings)
@@ -127,5 +135,6 @@ def _rows(bearings: np.ndarray) -> int:
 
 def _cut(ranges: np.ndarray, nothing_range: float) -> np.ndarray:
     """Replace ranges without a hit by inf; allows for the single precision of clouds."""
+    ranges = np.where(np.isnan(ranges), np.inf, ranges)
     hit = (ranges > 0.0) & (ranges < nothing_range * (1.0 - 1e-6) - 1e-6)
     return np.where(hit, ranges, np.inf)

@@ -22,7 +22,8 @@ def contacts_of_grid(
     ranges = np.asarray(ranges, dtype=np.float64)
     if ranges.shape != (len(elevations), len(bearings)):
         raise ValueError(f"ranges {ranges.shape}, must be {len(elevations)} elevations x {len(bearings)} bearings")
-    ranges = np.where(np.isfinite(ranges) & (ranges > 0.0), ranges, np.inf)
+    ranges = np.where(np.isfinite(ranges), ranges, np.inf)
+    ranges = np.where(ranges > 0.0, ranges, np.inf)
     level = np.cos(elevations)[:, np.newaxis]
     rising = np.broadcast_to(np.sin(elevations)[:, np.newaxis], ranges.shape)
     directions = np.stack([level * np.cos(bearings), level * np.sin(bearings), rising], axis=-1)
@@ -44,7 +45,8 @@ def _cosines(ranges: np.ndarray, directions: np.ndarray) -> np.ndarray:
     left = _tangents(points, hit, axis=1) if ranges.shape[1] > 1 else np.broadcast_to([0.0, 1.0, 0.0], points.shape)
     normals = np.cross(left, up)
     lengths = np.linalg.norm(normals, axis=-1)
-    known = hit & np.isfinite(lengths) & (lengths > 0.0)
+    lengths = np.where(np.isfinite(lengths), lengths, 0.0)
+    known = hit & (lengths > 0.0)
     cosines = np.abs(np.einsum("...i,...i", normals, directions)) / np.where(known, lengths, 1.0)
     return np.where(known, np.minimum(cosines, 1.0), 1.0)
 
@@ -55,9 +57,14 @@ def _tangents(points: np.ndarray, hit: np.ndarray, axis: int) -> np.ndarray:
     steps = np.where((hit[1:] & hit[:-1])[..., np.newaxis], points[1:] - points[:-1], np.nan)
     none = np.full((1, *points.shape[1:]), np.nan)
     before, after = np.concatenate([none, steps]), np.concatenate([steps, none])
-    shorter = np.linalg.norm(before, axis=-1) < np.linalg.norm(after, axis=-1)
-    first = shorter | np.isnan(after[..., 0])
+    lengths_before, lengths_after = (_lengths_or_infinite(each) for each in (before, after))
+    first = (lengths_before < lengths_after) | np.isinf(lengths_after)
     return np.moveaxis(np.where(first[..., np.newaxis], before, after), 0, axis)
+
+
+def _lengths_or_infinite(steps: np.ndarray) -> np.ndarray:
+    """Return the lengths of steps (..., 3), inf for a missing one: numpy 1.17 warns where NaN is compared."""
+    return np.where(np.isnan(steps[..., 0]), np.inf, np.linalg.norm(steps, axis=-1))
 
 
 def _materials(shape: Tuple[int, ...], retro: Optional[np.ndarray]) -> Tuple[np.ndarray, Tuple[Material, ...]]:

@@ -38,7 +38,7 @@ def _run(options: Namespace) -> None:
     package = Path(rospkg.RosPack().get_path(PACKAGE))
     settings = Settings.from_mapping(settings_of(options, package))
     if settings.simulator.drive is not Drive.SCRIPT:
-        raise ParameterError("drive = 'CMD_VEL': nobody sends commands to a bag; must be SCRIPT")
+        raise ParameterError("drive = 'CMD_VEL': nobody sends commands while a bag is written; must be SCRIPT")
     robot = RobotDescription.from_file(options.robot or package / "urdf/charle.urdf")
     setup = make_setup(settings, package, robot, lambda line: print(f"simulate_bag: {line}", file=sys.stderr))
     start = time.monotonic()

@@ -8,6 +8,7 @@ from rospy import AnyMsg
 from sensor_msgs.msg import LaserScan, PointCloud, PointCloud2, PointField
 
 from node_support.errors import RefusedInput
+from node_support.headers import check_frame, check_stamp
 from sonar_simulator.gazebo.beams import RayScan
 from sonar_simulator.gazebo.parameters import GazeboSonarParameters
 from sonar_simulator.gazebo.rays import Rays, ScanLayout, rays_of_points, rays_of_scan
@@ -24,9 +25,10 @@ def ray_scan(message: AnyMsg, parameters: GazeboSonarParameters) -> RayScan:
         typed = _KINDS[kind]().deserialize(message._buff)
     except DeserializationError as error:
         raise RefusedInput("scans refused", f"{kind}: {error}") from error
-    return RayScan(
-        _CONVERSIONS[kind](typed, parameters), typed.header.stamp.to_nsec(), typed.header.frame_id.lstrip("/")
-    )
+    stamp_ns, frame_id = typed.header.stamp.to_nsec(), typed.header.frame_id.lstrip("/")
+    check_stamp(stamp_ns)
+    check_frame(frame_id, "scans refused")
+    return RayScan(_CONVERSIONS[kind](typed, parameters), stamp_ns, frame_id)
 
 
 def _of_laser_scan(scan: LaserScan, parameters: GazeboSonarParameters) -> Rays:
@@ -60,6 +62,8 @@ def _field(cloud: PointCloud2, name: str) -> Optional[np.ndarray]:
     kind = np.dtype((">" if cloud.is_bigendian else "<") + _NUMPY_TYPES[found[0].datatype])
     if len(cloud.data) != count * step or found[0].offset + kind.itemsize > step:
         raise RefusedInput("scans refused", f"{len(cloud.data)} bytes for {count} points of {step} bytes")
+    if count == 0:
+        return np.zeros(0)
     row = np.dtype({"names": [name], "formats": [kind], "offsets": [found[0].offset], "itemsize": step})
     return np.frombuffer(cloud.data, dtype=row)[name].astype(np.float64)
 

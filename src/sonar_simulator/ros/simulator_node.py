@@ -1,4 +1,4 @@
-"""The simulator as a node: publishes /clock, odometry, tf and the beams of the sonar."""
+"""The simulator as a node: publishes /clock, odometry, tf and the sonar's beams."""
 
 import itertools
 import math
@@ -118,6 +118,6 @@ def _robot() -> RobotDescription:
     try:
         return RobotDescription(rospy.get_param("robot_description"))
     except KeyError as error:
-        raise ParameterError("robot_description is not set: it says where the sonar is mounted") from error
+        raise ParameterError("robot_description is not set; the simulator reads the sonar's mount from it") from error
     except DescriptionError as error:
         raise ParameterError(str(error)) from error

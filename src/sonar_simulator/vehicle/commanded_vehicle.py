@@ -30,11 +30,7 @@ class VehicleParameters(ParameterSet):
         high=60.0,
     )
     command_timeout: float = parameter(
-        0.5,
-        "the vehicle stops if no command has arrived for this long, in simulated time",
-        unit="s",
-        low=0.01,
-        high=3600.0,
+        0.5, "simulated time without a command after which the vehicle stops", unit="s", low=0.01, high=3600.0
     )
 
     def limits(self) -> np.ndarray:

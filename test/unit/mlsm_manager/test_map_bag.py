@@ -13,12 +13,15 @@ import numpy as np
 import pytest
 import rosbag
 
+from mlsm_manager.surface_map.files.map_file import read_map
+
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 
 ROOT = Path(__file__).resolve().parents[3]
 BASIN = ROOT / "test/data/basin.bag"
-FILES = {"map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json"}
+FILES = {"map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json"}
+TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
 COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
 
 
@@ -134,3 +137,39 @@ def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
     assert process.wait(timeout=10) == 1
     assert time.monotonic() - start < 2.0
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(tmp_path):
+    done = run(BASIN, BASIN, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = summary_of(tmp_path)
+    (second,) = summary["sessions"]
+    assert (second["found_after_scans"], second["matched"]) == (0, second["scans"])
+    first, second = (np.loadtxt(str(tmp_path / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
+    assert np.hypot(*(first - second)[-20:, 4:6].T).max() < 0.5
+    assert read_map(tmp_path / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
+
+
+def test_several_recordings_are_not_refined(tmp_path):
+    done = run(BASIN, BASIN, "--out", tmp_path, "--refine")
+    assert (done.returncode, "--refine smooths one recording" in done.stderr) == (2, True)
+
+
+def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
+    assert refused(BASIN, tmp_path / "no.bag", "--out", tmp_path).startswith(f"map_bag: {tmp_path / 'no.bag'}")
+
+
+def test_a_dask_cluster_prepares_further_recordings(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    ) as cluster:
+        done = run(BASIN, BASIN, "--out", tmp_path, "--scheduler", cluster.scheduler_address)
+    assert done.returncode == 0, done.stderr
+    assert summary_of(tmp_path)["sessions"][0]["found_after_scans"] == 0
+
+
+def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path):
+    pytest.importorskip("distributed")
+    line = refused(BASIN, BASIN, "--out", tmp_path, "--scheduler", "tcp://127.0.0.1:9")
+    assert line.startswith("map_bag: --scheduler tcp://127.0.0.1:9: ")

@@ -7,9 +7,9 @@ import pytest
 from made_maps import content, stored_map
 
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.files.errors import MapFileError
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes
-from mlsm_manager.surface_map.files.map_folder import MapFolder
 
 
 @pytest.fixture
@@ -85,3 +85,18 @@ def test_a_link_that_leads_out_of_the_folder_is_refused(folder, tmp_path):
 def test_a_map_that_is_not_there_is_told_in_one_line_with_its_path(folder):
     with pytest.raises(MapFileError, match=r"basin\.mlsm: No such file"):
         folder.load("basin")
+
+
+def test_a_map_put_aside_has_another_name_and_only_one_is_kept(folder):
+    for seed in range(2):
+        folder.save("core.autosave", stored_map(seed), overwrite=True)
+        folder.put_aside("core.autosave")
+    assert _files(folder) == ["core.autosave.previous.mlsm"]
+    assert len(folder.load("core.autosave.previous")) == len(stored_map(1))
+
+
+def test_an_ending_tells_the_format_and_is_numbered_too(folder):
+    for _ in range(2):
+        folder.save("basin.ply", stored_map())
+    assert _files(folder) == ["basin.1.ply", "basin.ply"]
+    assert (folder.folder / "basin.ply").read_bytes().startswith(b"ply")

@@ -95,7 +95,8 @@ def test_clear_forgets_what_was_before_a_jump_of_time():
 
 
 def test_points_are_placed_by_the_stretch_of_their_time():
-    points, unplaced = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, True)).placed(cloud_at([1.0, 4.0]))
+    placed = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, True)).placed(cloud_at([1.0, 4.0]))
+    points, unplaced = placed.points, placed.unplaced
     np.testing.assert_allclose(points[:, 0], [1.0, 3.0])
     assert unplaced == 0
 
@@ -104,17 +105,19 @@ def test_between_two_times_the_correction_is_between_theirs():
     history = CorrectionHistory()
     poses = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     history.add(np.array([0.0, 2.0]), poses, Track(TIMES, still()(TIMES)), holds=True)
-    assert history.placed(cloud_at([0.5]))[0][0, 0] == pytest.approx(0.5)
+    assert history.placed(cloud_at([0.5])).points[0, 0] == pytest.approx(0.5)
 
 
 def test_points_of_a_rejected_stretch_have_no_place():
-    points, unplaced = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, False)).placed(cloud_at([1.0, 3.0, 4.0]))
+    placed = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, False)).placed(cloud_at([1.0, 3.0, 4.0]))
+    points, unplaced = placed.points, placed.unplaced
     assert len(points) == 1
     assert unplaced == 2
 
 
 def test_without_history_no_point_has_a_place():
-    points, unplaced = CorrectionHistory().placed(cloud_at([1.0, 4.0]))
+    placed = CorrectionHistory().placed(cloud_at([1.0, 4.0]))
+    points, unplaced = placed.points, placed.unplaced
     assert (len(points), unplaced) == (0, 2)
     assert CorrectionHistory().end == -np.inf
 
@@ -122,4 +125,4 @@ def test_without_history_no_point_has_a_place():
 def test_only_the_last_stretches_are_kept():
     history = history_of(*[(float(k), k + 0.5, float(k), True) for k in range(9)])
     assert history.end == 8.5
-    assert history.placed(cloud_at([0.2]))[0][0, 0] == pytest.approx(1.0)
+    assert history.placed(cloud_at([0.2])).points[0, 0] == pytest.approx(1.0)

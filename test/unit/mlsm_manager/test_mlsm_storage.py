@@ -1,6 +1,7 @@
 """Maps as PLY files."""
 
 import os
+import re
 import stat
 from pathlib import Path
 
@@ -8,7 +9,7 @@ import numpy as np
 import pytest
 
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.storage import map_path, write_ply
+from mlsm_manager.surface_map.storage import map_path, read_ply, write_ply
 
 _NUMPY_TYPES = {"double": "<f8", "uint": "<u4", "uchar": "u1"}
 
@@ -115,3 +116,50 @@ def test_a_plain_name_is_a_file_in_the_folder(tmp_path, name, file):
 
 def test_a_tilde_in_the_folder_is_the_home():
     assert map_path("~/maps", "basin") == Path.home() / "maps" / "basin.ply"
+
+
+def test_a_map_comes_back_as_it_was_saved(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    read = read_ply(tmp_path / "basin.ply")
+    np.testing.assert_allclose(read.rows, blocks.rows, rtol=1e-12, atol=1e-12)
+    assert read.resolution == blocks.resolution
+
+
+@pytest.mark.parametrize("resolution", ["nan", "inf", "0", "-1", "half"])
+def test_a_resolution_that_no_map_has_is_refused(tmp_path, blocks, resolution):
+    path = tmp_path / "basin.ply"
+    write_ply(path, blocks)
+    path.write_bytes(path.read_bytes().replace(b"resolution 0.5 m", f"resolution {resolution} m".encode()))
+    with pytest.raises(ValueError, match=re.escape(f"{path}: resolution {resolution} m")):
+        read_ply(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "fault"),
+    [
+        ("x", np.nan, "not finite"),
+        ("intensity", np.inf, "not finite"),
+        ("variance_y", -0.1, "negative variance"),
+        ("count", 0, "no points"),
+        ("z", 100.0, "not between bottom and top"),
+        ("type", 7, "unknown type"),
+    ],
+)
+def test_a_block_that_no_map_holds_is_refused(tmp_path, blocks, name, value, fault):
+    path = tmp_path / "basin.ply"
+    write_ply(path, blocks)
+    vertices = _read_ply(path)[1].copy()
+    vertices[name][3] = value
+    header = path.read_bytes().split(b"end_header\n", 1)[0]
+    path.write_bytes(header + b"end_header\n" + vertices.tobytes())
+    with pytest.raises(ValueError, match=f"1 of {len(blocks)} blocks have .*{fault}"):
+        read_ply(path)
+
+
+@pytest.mark.parametrize("change", [lambda data: data[:-1], lambda data: data + b"x", lambda data: data[5:]])
+def test_a_file_of_another_size_is_refused(tmp_path, blocks, change):
+    path = tmp_path / "basin.ply"
+    write_ply(path, blocks)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(ValueError, match=r"basin\.ply"):
+        read_ply(path)

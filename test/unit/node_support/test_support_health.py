@@ -145,3 +145,10 @@ def test_a_warning_may_use_the_health_it_comes_from():
     health = Health("stage", lambda line: health.count("warnings"), lambda: 0.0)
     health.problem("beams refused", "once")
     assert health.report().values["warnings"] == "1"
+
+
+def test_a_problem_that_somebody_waits_to_hear_of_is_warned_of_each_time(stage):
+    for value in (1, 2):
+        stage.health.answered_problem("changes of parameters refused", f"mean_k = -{value}")
+    assert stage.warnings == [f"thresholder: changes of parameters refused: mean_k = -{value}" for value in (1, 2)]
+    assert stage.health.report().values["changes of parameters refused"] == "2"

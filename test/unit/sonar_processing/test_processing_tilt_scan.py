@@ -121,7 +121,7 @@ def test_a_servo_pushed_during_a_scan_is_sent_back():
     rig.run(2.0)
     rig.stuck, rig.angle = True, 0.3
     rig.run(0.2)
-    assert "moved to 17.2 deg by itself" in rig.warnings[0]
+    assert "moved to 17.2 deg without a command" in rig.warnings[0]
     assert rig.goals == [-10, -10]
 
 

@@ -75,10 +75,10 @@ def test_points_all_around_need_their_number_of_rows():
 @pytest.mark.parametrize(
     ("ranges", "layout", "text"),
     [
-        (np.ones(7), _layout(3, 0.1), "7 ranges are no rows of 3"),
-        (np.empty(0), _layout(3, 0.1), "0 ranges are no rows of 3"),
+        (np.ones(7), _layout(3, 0.1), "7 ranges are not a multiple of the 3 columns"),
+        (np.empty(0), _layout(3, 0.1), "0 ranges are not a multiple of the 3 columns"),
         (np.ones(3), ScanLayout(0.0, math.nan, 0.1, 50.0), "must be finite"),
-        (np.ones(3), ScanLayout(0.0, 1.0, -0.1, 50.0), "leads away"),
+        (np.ones(3), ScanLayout(0.0, 1.0, -0.1, 50.0), "does not lead to angle_max"),
     ],
 )
 def test_a_laser_scan_that_makes_no_sense_is_refused(ranges, layout, text):
@@ -88,7 +88,7 @@ def test_a_laser_scan_that_makes_no_sense_is_refused(ranges, layout, text):
 
 @pytest.mark.parametrize("points", [np.empty((0, 3)), [[1.0, math.nan, 0.0]], [[0.0, 0.0, 0.0]]])
 def test_points_that_are_no_rays_are_refused(points):
-    with pytest.raises(RefusedInput, match="must be some, finite and off the sensor's centre"):
+    with pytest.raises(RefusedInput, match="all finite and none at the sensor's centre"):
         rays_of_points(np.array(points), None, 0, MAX_RANGE)
 
 

@@ -17,7 +17,7 @@ from mlsm_manager.matching.problem.scan_path import PlanarMotion
 from mlsm_manager.matching.problem.state import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW
 from mlsm_manager.matching.search.correlative_search import YAW_STEP, SearchWindow, search, separation
 from mlsm_manager.matching.search.score_field import ScoreField
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from node_support.geometry.planar import wrapped
 
 # Standard deviations of the prior that the search covers.
@@ -44,20 +44,20 @@ class DistributionMatcher:
     def __init__(self, parameters: DistributionMatcherParameters) -> None:
         self.parameters = parameters
 
-    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
         state = prior_state(prior, scan)
         motion = PlanarMotion(scan, self.parameters.beam_width / np.sqrt(12.0))
         fewest = self.parameters.min_points
         window = self._window(motion, state)
-        target = _in_reach(target, motion, state, window)
-        if len(scan) < fewest or len(target) < fewest:
-            reason = f"{len(scan)} points and {len(target)} blocks in reach, must be {fewest} or more"
+        blocks = _in_reach(target, motion, state, window)
+        if len(scan) < fewest or len(blocks) < fewest:
+            reason = f"{len(scan)} points and {len(blocks)} blocks in reach, must be {fewest} or more"
             return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
-        fits, refiner = self._fits(motion, target, state, window)
+        fits, refiner = self._fits(motion, blocks, state, window)
         best = fits[0]
-        status, reason = self._judge(best, refiner, state, target)
+        status, reason = self._judge(best, refiner, state, blocks)
         if status is MatchStatus.CONVERGED:
             best = replace(best, covariance=refiner.residual_covariance(best))
             status, reason = self._judge_second_places(best, fits[1:], refiner)
@@ -138,12 +138,12 @@ class DistributionMatcher:
         return MatchStatus.CONVERGED, ""
 
 
-def _in_reach(target: Blocks, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
+def _in_reach(target: BlockSource, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
     """Return the blocks within reach of the scan, so that the time of a match does not grow with the map."""
     offsets = motion.points(motion.path(state.mean)) - state.mean[POSITION]
     reach = float(np.linalg.norm(offsets, axis=1).max(initial=0.0)) + window.distance + _MARGIN
-    distances = np.linalg.norm(target.mean[:, :2] - state.mean[POSITION], axis=1)
-    return Blocks(target.rows[distances < reach], target.resolution)
+    blocks = target.in_box(state.mean[POSITION] - reach, state.mean[POSITION] + reach)
+    return blocks.take(np.linalg.norm(blocks.mean[:, :2] - state.mean[POSITION], axis=1) < reach)
 
 
 def _excluded(fit: Fit, theta: np.ndarray) -> bool:

@@ -9,17 +9,17 @@ from mlsm_manager.matching.matchers.parameters import DistributionMatcherParamet
 from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.parameters import ParameterSet
 
 
 class Matcher(Protocol):
     """Finds where a scan lies among blocks."""
 
-    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; never raises for a scan or a target that cannot be matched.
 
-        `target` holds the blocks around the vehicle in map; a matcher may leave out those beyond the scan's reach.
+        `target` gives the blocks in map; a matcher fetches those within the scan's reach, or all.
         """
 
 

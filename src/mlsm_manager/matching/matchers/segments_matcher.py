@@ -14,7 +14,7 @@ from mlsm_manager.matching.matchers.parameters import SegmentsMatcherParameters
 from mlsm_manager.matching.matchers.segments import SegmentFit, translate_segments
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from node_support.geometry.planar import composed, transformed, wrapped
 
 # The same as a line through times needs.
@@ -27,9 +27,10 @@ class SegmentsMatcher:
     def __init__(self, parameters: SegmentsMatcherParameters) -> None:
         self.parameters = parameters
 
-    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
+        target = all_of(target)
         order = np.argsort(scan.times, kind="stable")
         times, moving = scan.times[order], scan.moving[order]
         if len(scan) < _FEWEST_POINTS or not len(target):

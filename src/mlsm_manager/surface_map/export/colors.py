@@ -1,6 +1,7 @@
 """What the colour of a block can tell."""
 
 from enum import Enum
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -24,6 +25,8 @@ _RAMP = np.array(
 _INNER_SHARE = (2.0, 98.0)
 """Percent: a few echoes far off do not take the colours from all others."""
 
+Limits = Tuple[float, float]
+
 
 class ColorBy(Enum):
     """What blocks are coloured by."""
@@ -34,16 +37,27 @@ class ColorBy(Enum):
     AGE = "AGE"
 
 
-def block_colors(blocks: Blocks, by: ColorBy) -> np.ndarray:
-    """Return (n, 3) red, green and blue from 0 to 1.
+def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -> np.ndarray:
+    """Return (n, 3) red, green and blue from 0 to 1; `limits` are the values of the lowest and the highest colour.
 
     The age of a block is the number of beams that crossed it since a point last fell into it.
     """
     if by is ColorBy.TYPE:
         return np.array([_TYPE_COLORS[kind] for kind in BlockType if kind in _TYPE_COLORS])[blocks.type]
-    values = {ColorBy.HEIGHT: blocks.height, ColorBy.STRENGTH: blocks.mean[:, 3], ColorBy.AGE: blocks.crossed}[by]
-    low, high = np.percentile(values, _INNER_SHARE) if len(blocks) else (0.0, 0.0)
-    return ramp((values - low) / (high - low) if high > low else np.zeros(len(blocks)))
+    low, high = limits or color_limits(blocks, by)
+    return ramp((_values(blocks, by) - low) / (high - low) if high > low else np.zeros(len(blocks)))
+
+
+def color_limits(blocks: Blocks, by: ColorBy) -> Limits:
+    """Return the values between which nearly all of the blocks lie."""
+    if by is ColorBy.TYPE or not len(blocks):
+        return 0.0, 0.0
+    low, high = np.percentile(_values(blocks, by), _INNER_SHARE)
+    return float(low), float(high)
+
+
+def _values(blocks: Blocks, by: ColorBy) -> np.ndarray:
+    return {ColorBy.HEIGHT: blocks.height, ColorBy.STRENGTH: blocks.mean[:, 3], ColorBy.AGE: blocks.crossed}[by]
 
 
 def ramp(shares: np.ndarray) -> np.ndarray:

@@ -80,4 +80,6 @@ def _empty_tree(resolution: float) -> Any:
         import pyoctomap
     except ImportError:
         raise ExportError(_HOW_TO_INSTALL) from None
+    except ValueError as error:
+        raise ExportError(f"pyoctomap does not load with numpy {np.__version__}; use a newer one: {error}") from error
     return pyoctomap.OcTree(resolution)

@@ -2,11 +2,10 @@
 
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import yaml
-from PIL import Image
-from PIL.TiffImagePlugin import ImageFileDirectory_v2
 
 from mlsm_manager.surface_map.export.rasters import FREE, OCCUPIED, UNKNOWN, Raster
 from node_support.files import write_whole
@@ -51,6 +50,10 @@ def write_ascii_grid(path: Path, raster: Raster) -> None:
 
 def write_geotiff(path: Path, raster: Raster) -> None:
     """Write a raster as a GeoTIFF of float32 in a local grid, metres, with NaN for no data; raises OSError."""
+    # Pillow is for this format only: a mapping node shall not wait for it.
+    from PIL import Image
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
     tags = ImageFileDirectory_v2()
     upper = raster.origin[1] + raster.values.shape[0] * raster.resolution
     _set(tags, _PIXEL_SCALE, _DOUBLE, (raster.resolution, raster.resolution, 0.0))
@@ -62,6 +65,6 @@ def write_geotiff(path: Path, raster: Raster) -> None:
     write_whole(path, data.getvalue())
 
 
-def _set(tags: ImageFileDirectory_v2, tag: int, kind: int, value: object) -> None:
+def _set(tags: Any, tag: int, kind: int, value: object) -> None:
     tags[tag] = value
     tags.tagtype[tag] = kind

@@ -44,7 +44,7 @@ class StoredMap:
 
     frame: of the map. layers: blocks by what they are for. calibration: parameters of sensor and vehicle that the scans
     were corrected with, by name. made: seconds since 1970, 0 when not known. arrays: anything else worth keeping with
-    the map (keyframes, the vehicle's place), by name.
+    the map (keyframes, the vehicle's place), by name. run: which run of the graph made it, empty when not known.
     """
 
     frame: str
@@ -52,6 +52,7 @@ class StoredMap:
     calibration: Mapping[str, Any] = field(default_factory=dict)
     made: float = 0.0
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
+    run: str = ""
 
     def __len__(self) -> int:
         """Return the number of blocks that are occupied."""
@@ -83,6 +84,7 @@ def map_bytes(stored: StoredMap) -> bytes:
     words: Dict[str, Any] = {
         "frame": stored.frame,
         "made": stored.made,
+        "run": stored.run,
         "calibration": dict(stored.calibration),
         "layers": {layer.value: _layer_words(blocks) for layer, blocks in stored.layers.items()},
     }
@@ -101,10 +103,11 @@ def map_of_bytes(data: bytes) -> StoredMap:
             Layer(name): _blocks(_named(arrays, name), float(said["resolution"]), float(said["greatest_deviation"]))
             for name, said in words["layers"].items()
         }
-        frame, made, calibration = str(words["frame"]), float(words["made"]), dict(words["calibration"])
+        frame, made, run = str(words["frame"]), float(words["made"]), str(words["run"])
+        calibration = dict(words["calibration"])
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise ArrayFileError(f"holds no map ({error})") from None
-    return StoredMap(frame, layers, calibration, made, _named(arrays, "array"))
+    return StoredMap(frame, layers, calibration, made, _named(arrays, "array"), run)
 
 
 def _named(arrays: Mapping[str, np.ndarray], group: str) -> Dict[str, np.ndarray]:

@@ -32,14 +32,20 @@ _ENOUGH = 5
 class CarvingParameters(ParameterSet):
     """What crossing beams say."""
 
-    carve: bool = parameter(True, "mark space that beams crossed as free, and take blocks away that beams go through")
+    carve: bool = parameter(
+        True, "mark space that beams crossed as free, and take blocks away that beams go through", tunable=False
+    )
     fan_core: float = parameter(
         0.19, "vertical angle of the inner part of the fan, in which a beam surely hears what is there", unit="rad",
-        low=0.0, high=3.0,
+        low=0.0, high=3.0, tunable=False,
     )  # fmt: skip
     crossings_least: int = parameter(10, "so many beams in a row must cross a block before it goes", low=1, high=10000)
     crossings_per_point: float = parameter(
-        2.0, f"and so many more for each point that fell into it, up to {_MOST_POINTS}", low=0.0, high=1000.0
+        2.0,
+        f"and so many more for each point that fell into it, up to {_MOST_POINTS}",
+        low=0.0,
+        high=1000.0,
+        tunable=False,
     )
 
 
@@ -52,16 +58,15 @@ class CarveReport:
     removed: int
 
 
+@dataclass(frozen=True)
 class Carver:
     """Applies the beams of a scan to the map of what is occupied and to that of what is free.
 
-    The cost depends on the cells that the scan's beams cross and not on the map.
+    beam_width: horizontal, rad. The cost depends on the cells that the scan's beams cross and not on the map.
     """
 
-    def __init__(self, parameters: CarvingParameters, beam_width: float) -> None:
-        """`beam_width`: horizontal, rad."""
-        self._parameters = parameters
-        self._beam_width = beam_width
+    parameters: CarvingParameters
+    beam_width: float
 
     def carve(
         self, occupied: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray
@@ -71,7 +76,7 @@ class Carver:
         A beam says nothing about what lies behind the first block in its way, even where its echo came from farther:
         either that block or that echo is wrong. That block counts a crossing, unless the scan itself hit its cell.
         """
-        paths = beam_paths(beams, self._beam_width, occupied.resolution)
+        paths = beam_paths(beams, self.beam_width, occupied.resolution)
         hit = np.isin(cell_keys(paths.cells), cell_keys(cells_of(points, occupied.resolution)))
         blocks, rows, owners = occupied.find(paths.cells)
         pair, block = self._meetings(paths, blocks, owners)
@@ -91,7 +96,7 @@ class Carver:
         block = np.repeat(np.arange(len(owners)), number)
         rank = np.arange(len(block)) - np.repeat(np.cumsum(number) - number, number)
         pair = paths.starts[owners][block] + rank
-        half = np.maximum(paths.distance[pair] * np.tan(self._parameters.fan_core / 2.0), blocks.resolution / 2.0)
+        half = np.maximum(paths.distance[pair] * np.tan(self.parameters.fan_core / 2.0), blocks.resolution / 2.0)
         above = blocks.bottom[block] - paths.height[pair]
         below = paths.height[pair] - blocks.height[block]
         inside = np.maximum(above, below) <= half
@@ -106,7 +111,7 @@ class Carver:
         occupied.count_crossings(rows[crossed], beams[crossed])
         total = blocks.crossed[crossed] + beams[crossed]
         points = np.minimum(blocks.count[crossed], _MOST_POINTS)
-        gone = total > self._parameters.crossings_least + self._parameters.crossings_per_point * points
+        gone = total > self.parameters.crossings_least + self.parameters.crossings_per_point * points
         occupied.remove(rows[crossed[gone]])
         return len(crossed), int(np.count_nonzero(gone))
 

@@ -5,8 +5,9 @@ from itertools import count
 from pathlib import Path
 from typing import Optional
 
+from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
 from mlsm_manager.surface_map.files.errors import MapFileError
-from mlsm_manager.surface_map.files.map_file import ENDING, StoredMap, read_map, write_map
+from mlsm_manager.surface_map.files.map_file import ENDING, StoredMap, read_map
 
 
 class MapFolder:
@@ -17,18 +18,22 @@ class MapFolder:
         self.folder = Path(folder).expanduser()
 
     def path(self, name: str) -> Path:
-        """Return where the map `name` lies. Raises MapFileError for a name that would leave the folder."""
+        """Return where the map `name` lies; an ending that tells no format is part of the name.
+
+        Raises MapFileError for a name that would leave the folder.
+        """
         if not name or name.startswith(".") or Path(name).name != name or "\0" in name:
             raise MapFileError(f"name {name!r}: must be a plain file name without a path and not start with a dot")
-        path = self.folder / (name if name.endswith(ENDING) else f"{name}{ENDING}")
+        path = self.folder / (name if name.endswith(ENDINGS) else f"{name}{ENDING}")
         if path.is_symlink() and path.resolve().parent != self.folder.resolve():
             raise MapFileError(f"{path}: leads to {path.resolve()}, which is not in {self.folder}")
         return path
 
     def save(self, name: str, stored: StoredMap, overwrite: bool = False) -> Path:
-        """Write the map and return its path; a map of that name is kept under a numbered one unless `overwrite`.
+        """Write the map in the format of the name's ending and return its path.
 
-        Raises MapFileError for a bad name and for an empty map where there is one already, and OSError.
+        A file of that name is kept under a numbered one unless `overwrite`. Raises MapFileError for a bad name and for
+        an empty map where there is a file already, ExportError for what a format cannot hold, and OSError.
         """
         path = self.path(name)
         if path.exists():
@@ -36,8 +41,13 @@ class MapFolder:
                 raise MapFileError(f"{path}: not replaced, the map has no blocks")
             if not overwrite:
                 _kept(path)
-        write_map(path, stored)
+        export(stored, path, ExportOptions())
         return path
+
+    def put_aside(self, name: str) -> None:
+        """Give the map of that name the name NAME.previous; one that had it is gone. Raises OSError."""
+        path = self.path(name)
+        os.replace(str(path), str(path.with_name(f"{path.name[: -len(ENDING)]}.previous{ENDING}")))
 
     def load(self, name: str) -> StoredMap:
         """Return the map of that name. Raises MapFileError, of one line, where there is none or it is damaged."""
@@ -51,7 +61,7 @@ class MapFolder:
 def _kept(path: Path) -> Optional[Path]:
     """Give the file a second name, the first that is free of NAME.1.mlsm, NAME.2.mlsm and so on, and return it."""
     for number in count(1):
-        kept = path.with_name(f"{path.name[: -len(ENDING)]}.{number}{ENDING}")
+        kept = path.with_name(f"{path.stem}.{number}{path.suffix}")
         try:
             os.link(str(path), str(kept))
         except FileExistsError:

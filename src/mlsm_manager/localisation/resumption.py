@@ -1,0 +1,81 @@
+"""Where the vehicle was in a stored map, and whether that still holds."""
+
+from dataclasses import dataclass
+from typing import Dict, Mapping, Optional
+
+import numpy as np
+
+from mlsm_manager.matching.problem.prediction import Belief
+from mlsm_manager.matching.problem.state import POSE, STATES
+
+# m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
+_STRAYED = np.array([1.0, 1.0, 0.1])
+# So many scans in a row that do not match show that the vehicle is elsewhere.
+_MOST_REJECTED = 3
+
+
+@dataclass(frozen=True)
+class StoredPlace:
+    """correction: (3,) T_map_odom. belief: what was known then."""
+
+    correction: np.ndarray
+    belief: Belief
+
+    def arrays(self) -> Dict[str, np.ndarray]:
+        """Return it as arrays that a map's file keeps."""
+        belief = self.belief
+        return {
+            "T_map_odom": self.correction,
+            "time": np.array([belief.time]),
+            "state": belief.theta,
+            "covariance": belief.covariance,
+        }
+
+    @staticmethod
+    def of_arrays(arrays: Mapping[str, np.ndarray]) -> "Optional[StoredPlace]":
+        """Return what `arrays` gave; None where they hold no place."""
+        shapes = {"T_map_odom": (3,), "time": (1,), "state": (STATES,), "covariance": (STATES, STATES)}
+        if any(name not in arrays or arrays[name].shape != shape for name, shape in shapes.items()):
+            return None
+        if not all(np.isfinite(arrays[name]).all() for name in shapes):
+            return None
+        belief = Belief(float(arrays["time"][0]), arrays["state"], arrays["covariance"])
+        return StoredPlace(arrays["T_map_odom"], belief)
+
+    @property
+    def widened(self) -> Belief:
+        """The belief, as unsure of the pose as a restart makes it."""
+        covariance = self.belief.covariance.copy()
+        covariance[POSE, POSE] += np.diag(_STRAYED**2)
+        return Belief(self.belief.time, self.belief.theta, covariance)
+
+
+class PlaceSearch:
+    """Decides, scan by scan after a map was loaded, whether the place is known, expected or lost."""
+
+    def __init__(self) -> None:
+        self._left: Optional[int] = None
+
+    def forget(self) -> None:
+        """Take the place as known."""
+        self._left = None
+
+    def expect(self) -> None:
+        """Take the place as near to where it is expected."""
+        self._left = _MOST_REJECTED
+
+    def lose(self) -> None:
+        """Take the place as anywhere in the map."""
+        self._left = 0
+
+    @property
+    def is_lost(self) -> bool:
+        """Whether the whole map must be searched."""
+        return self._left == 0
+
+    def learn(self, accepted: bool) -> None:
+        """Learn whether a scan was matched."""
+        if accepted:
+            self._left = None
+        elif self._left:
+            self._left -= 1

@@ -1,0 +1,92 @@
+"""Further recordings of the same water: each starts in the map of those before, finds itself, and adds to it."""
+
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from dataclasses import dataclass
+from multiprocessing import cpu_count, get_context
+from pathlib import Path
+from typing import Callable, Dict, Iterator, List, Optional, Sequence, Tuple
+
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
+from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.surface_map.files.map_file import StoredMap
+from sonar_processing.beams.beam_correction import BeamCorrection
+
+Prepared = Tuple[Recording, List[Scan]]
+Reader = Callable[[Path], Recording]
+"""Reads a recording; a function at the top of a module or a partial of one, so that other processes can call it."""
+
+
+@dataclass(frozen=True)
+class Session:
+    """bag: its file. replayed: what came of it."""
+
+    bag: Path
+    replayed: Replayed
+
+    def to_mapping(self) -> Dict[str, object]:
+        """Return what summary.json tells."""
+        return {
+            "bag": self.bag.name,
+            "scans": len(self.replayed.updates),
+            "matched": self.replayed.matched,
+            "rejected": self.replayed.rejected,
+            "found_after_scans": self.scans_until_found,
+        }
+
+    @property
+    def scans_until_found(self) -> Optional[int]:
+        """Number of scans before the first that was found; None where none was, and nothing was added to the map."""
+        accepted = [index for index, update in enumerate(self.replayed.updates) if update.accepted]
+        return accepted[0] if accepted else None
+
+
+def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Prepared:
+    """Return the corrected recording and its scans. Raises RecordingError, and OSError, as `read` does."""
+    recording = read(bag).corrected(parameters.part(BeamCorrection))
+    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
+    if not scans:
+        raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head")
+    return recording, scans
+
+
+def prepared_in_parallel(
+    bags: Sequence[Path], read: Reader, parameters: ReplayParameters, executor: Executor
+) -> Iterator[Prepared]:
+    """Prepare all bags at the same time, and give them in their order."""
+    waiting = [executor.submit(prepared, bag, read, parameters) for bag in bags]
+    for one in waiting:
+        yield one.result()
+
+
+def add_session(
+    bag: Path, ready: Prepared, parameters: ReplayParameters, known: StoredMap, on_scans: Callable[[int], None]
+) -> Session:
+    """Replay a recording in a known map: the vehicle is searched in it until a scan is found, and then matched."""
+    recording, scans = ready
+    return Session(bag, replay(recording, scans, parameters, on_scans, known))
+
+
+@contextmanager
+def executor_for(jobs: int, scheduler: Optional[str]) -> Iterator[Executor]:
+    """Give what runs jobs: processes of this machine, or a running Dask cluster at the address `scheduler`.
+
+    Raises RecordingError where the cluster cannot be reached.
+    """
+    if scheduler is None:
+        # No fork: the parent may have threads that hold locks.
+        with ProcessPoolExecutor(max(min(jobs, cpu_count()), 1), get_context("spawn")) as executor:
+            yield executor
+        return
+    try:
+        from distributed import Client
+    except ImportError:
+        raise RecordingError("--scheduler needs Dask; install it with: apt install python3-distributed") from None
+    try:
+        client = Client(scheduler, timeout=10)
+    except (OSError, ValueError) as error:
+        raise RecordingError(f"--scheduler {scheduler}: {error or 'cannot be reached'}") from None
+    with client, client.get_executor() as executor:
+        yield executor

@@ -1,0 +1,179 @@
+#!/usr/bin/env python3
+"""No message on any topic that a node subscribes to ends it or is an internal error; then a sane scan passes.
+
+Arguments: the number of messages and the seed.
+"""
+
+import math
+import os
+import sys
+import threading
+import time
+import unittest
+import xmlrpc.client
+from typing import Any, Dict, List, Tuple
+
+import numpy as np
+import rosgraph
+import rospy
+import rostest
+import tf2_ros
+from diagnostic_msgs.msg import DiagnosticArray
+from geometry_msgs.msg import TransformStamped
+from graph import Inbox, wait_for_publisher_links
+from random_messages import RandomMessages
+from roslib.message import get_message_class
+from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Bool
+from std_srvs.srv import Trigger
+
+from underwater_map_construction.msg import SonarScanLine
+
+SANE_FRAME = "sane_sonar"
+FAR = 150.0
+BEAMS = 120
+PER_SECOND = 1500
+BATCH = 50
+NOT_FUZZED = {"/rosout", "/rosout_agg", "/clock"}
+
+
+class Fuzz(unittest.TestCase):
+    """One long test: what it finds depends on all messages before."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Find the nodes, their processes and what they subscribe to."""
+        cls.messages, cls.seed = int(sys.argv[1]), int(sys.argv[2])
+        cls.statuses: Dict[str, Dict[str, str]] = {}
+        cls.lock = threading.Lock()
+        rospy.Subscriber("/diagnostics", DiagnosticArray, cls._take_diagnostics, queue_size=100)
+        cls.map = Inbox("/MLSM/cloud", PointCloud2)
+        cls.map.wait_for_link()
+        cls.processes = _processes()
+        cls.topics = _subscribed(cls.processes)
+
+    @classmethod
+    def _take_diagnostics(cls, array: DiagnosticArray) -> None:
+        with cls.lock:
+            for status in array.status:
+                cls.statuses[status.name] = {item.key: item.value for item in status.values}
+
+    def test_nothing_that_comes_ends_a_node(self) -> None:
+        """Every process lives, nothing is an internal error, and a good scan arrives in the map."""
+        print(f"{self.messages} messages, seed {self.seed}, {len(self.processes)} nodes, topics {sorted(self.topics)}")
+        self._publish()
+        self._expect_all_alive()
+        self._expect_a_scan()
+        self._expect_no_internal_error()
+        self._expect_all_alive()
+
+    def _publish(self) -> None:
+        source = RandomMessages(self.seed)
+        publishers = [
+            (kind, rospy.Publisher(topic, get_message_class(kind), queue_size=1000))
+            for topic, kind in sorted(self.topics.items())
+        ]
+        for _, publisher in publishers:
+            wait_for_publisher_links(publisher, 1)
+        start = time.monotonic()
+        for number in range(self.messages):
+            kind, publisher = publishers[number % len(publishers)]
+            publisher.publish(source.message(kind))
+            if number % BATCH == 0:
+                time.sleep(max(start + number / PER_SECOND - time.monotonic(), 0.0))
+            if number % 1000 == 0:
+                self._expect_all_alive()
+        print(f"published in {time.monotonic() - start:.0f} s")
+
+    def _expect_all_alive(self) -> None:
+        dead = [node for node, pid in self.processes.items() if not _lives(pid)]
+        self.assertEqual(dead, [])
+
+    def _expect_no_internal_error(self) -> None:
+        with self.lock:
+            values = {name: items.get("internal errors", "0") for name, items in self.statuses.items()}
+        self.assertEqual({name: count for name, count in values.items() if count != "0"}, {})
+        refused = sum(int(n) for items in self.statuses.values() for key, n in items.items() if key.endswith("refused"))
+        print(f"{refused} refused, by {len(values)} stages")
+
+    def _expect_a_scan(self) -> None:
+        """Send good beams far away from all others until the map has them."""
+        rospy.Publisher("/startMatching", Bool, queue_size=1, latch=True).publish(Bool(False))
+        for service in ("/mlsm_core/reset",):
+            rospy.wait_for_service(service, timeout=20.0)
+            rospy.ServiceProxy(service, Trigger)()
+        transforms = tf2_ros.StaticTransformBroadcaster()
+        transforms.sendTransform(_mount())
+        beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
+        wait_for_publisher_links(beams, 1)
+        for _ in range(30):
+            for message in _scan():
+                beams.publish(message)
+                time.sleep(0.002)
+            if any(_reaches_far(cloud) for cloud in self.map.messages):
+                return
+            time.sleep(1.0)
+        self.fail(f"no sane scan in the map; {self.statuses}")
+
+
+def _mount() -> TransformStamped:
+    mount = TransformStamped(child_frame_id=SANE_FRAME)
+    mount.header.frame_id = "odom"
+    mount.transform.translation.x = FAR
+    mount.transform.rotation.w = 1.0
+    return mount
+
+
+def _scan() -> List[SonarScanLine]:
+    """Return a full turn with a wall around the sonar, stamped with the present time."""
+    messages = []
+    for step in range(BEAMS):
+        strengths = bytes([3] * 20 + [120] * 3 + [3] * 27)
+        message = SonarScanLine(intensities=strengths, maxrange_meters=50.0, range_resolution=1.0)
+        message.angle = 2.0 * math.pi * step / BEAMS
+        message.header.frame_id = SANE_FRAME
+        message.header.stamp = rospy.Time.from_sec(time.time() + 1e-4 * step)
+        messages.append(message)
+    return messages
+
+
+def _reaches_far(cloud: PointCloud2) -> bool:
+    points = np.frombuffer(cloud.data, np.float32).reshape(-1, len(cloud.fields))
+    return bool(np.any(np.abs(points[:, 0] - FAR) < 30.0))
+
+
+def _processes() -> Dict[str, int]:
+    """Return the process of every node but this one and those that belong to ROS."""
+    master = rosgraph.Master("/fuzz")
+    nodes = {node for part in master.getSystemState() for _, names in part for node in names}
+    own = {rospy.get_name(), "/rosout"}
+    return {node: xmlrpc.client.ServerProxy(master.lookupNode(node)).getPid("/fuzz")[2] for node in nodes - own}
+
+
+def _subscribed(processes: Dict[str, int]) -> Dict[str, str]:
+    """Return topic and type of all that the nodes subscribe to."""
+    master = rosgraph.Master("/fuzz")
+    _, subscribers, _ = master.getSystemState()
+    kinds: List[Tuple[str, str]] = master.getTopicTypes()
+    topics: Dict[str, Any] = {
+        topic: dict(kinds).get(topic, "*") for topic, nodes in subscribers if set(nodes) & set(processes)
+    }
+    # Who takes any type gets one that it can use.
+    return {
+        topic: "sensor_msgs/PointCloud2" if kind == "*" else kind
+        for topic, kind in topics.items()
+        if topic not in NOT_FUZZED
+    }
+
+
+def _lives(pid: int) -> bool:
+    try:
+        os.kill(pid, 0)
+    except OSError:
+        return False
+    return True
+
+
+if __name__ == "__main__":
+    rospy.init_node("fuzz")
+    rostest.rosrun("underwater_map_construction", "fuzz", Fuzz, sys.argv)

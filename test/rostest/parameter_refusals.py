@@ -1,0 +1,115 @@
+#!/usr/bin/env python3
+"""No value that is not allowed gets into a node: not while it runs, and not at its start."""
+
+import os
+import subprocess
+import sys
+import unittest
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import Field
+from enum import Enum
+from pathlib import Path
+from typing import Any, Dict, List, Tuple
+
+import rospy
+import rostest
+from dynamic_reconfigure.client import Client
+from graph import Diagnostics
+
+PACKAGE = "underwater_map_construction"
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+
+from document import LIVE_NODES  # noqa: E402
+
+from node_support.node_table import HOSTS  # noqa: E402
+from node_support.parameters import describe  # noqa: E402
+
+# Beyond what dynamic_reconfigure itself refuses to send: an integer has 32 bits there.
+INT_LIMIT = 2**31 - 1
+BAD_STARTS: List[Tuple[str, str]] = [
+    *((node, "no_such_parameter:=1") for node in sorted(LIVE_NODES)),
+    ("sonar_simulator", "seed:=-1"),
+    ("sonar_simulator", "world:=/nowhere.sdf"),
+    ("gazebo_sonar", "head:=TURN"),
+    ("mapping", "chain:=[none_such]"),
+    ("sonar_processing", "chain:=5"),
+    ("thresholder", "otsu_multiplier:=.nan"),
+    ("imagenex_852_driver", "max_range:=7"),
+]
+
+
+def bad_values(field: Field) -> List[Any]:
+    """Return values of the field's own type that are not allowed."""
+    if issubclass(field.type, Enum):
+        return ["NONE_SUCH", "", field.default.value.lower() + " "]
+    described = describe(field)
+    if field.type is str:
+        return [] if described.may_be_empty else [""]
+    if field.type is float:
+        bounds = [described.low - 1.0 if described.low is not None else None]
+        bounds.append(described.high * 2.0 + 1.0 if described.high is not None else None)
+        return [float("nan"), float("inf"), -float("inf"), *(bound for bound in bounds if bound is not None)]
+    if field.type is int:
+        low = [described.low - 1, described.low - 1000] if described.low is not None else []
+        return [
+            *low,
+            *(
+                [described.high + 1, described.high + 1000]
+                if described.high is not None and described.high < INT_LIMIT
+                else []
+            ),
+        ]
+    return []
+
+
+def start(case: Tuple[int, Tuple[str, str]]) -> "subprocess.CompletedProcess[str]":
+    """Run a node that must end by itself."""
+    number, (node, parameter) = case
+    command = ["rosrun", PACKAGE, node, f"__name:=bad_start_{number}", f"_{parameter}"]
+    if node in HOSTS:
+        # Else it would take the services of the nodes that it hosts from those that run.
+        command.append("__ns:=elsewhere")
+    environment = {**os.environ, "ROSCONSOLE_FORMAT": "${message}"}
+    return subprocess.run(
+        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, check=False
+    )
+
+
+class ParameterRefusals(unittest.TestCase):
+    """Sends what the parameter dataclasses say is not allowed."""
+
+    def test_every_bad_value_of_every_parameter_is_refused_while_running(self) -> None:
+        """The answer holds the value from before, and the diagnostics count every refusal."""
+        diagnostics, accepted, sent = Diagnostics(), [], 0
+        for node in sorted(LIVE_NODES):
+            client = Client(f"/{node}", timeout=20)
+            before = client.get_configuration(timeout=20)
+            refused = 0
+            for field in LIVE_NODES[node].parameters.tunable_fields():
+                for value in bad_values(field):
+                    answer: Dict[str, Any] = client.update_configuration({field.name: value})
+                    refused += 1
+                    if answer[field.name] != before[field.name]:
+                        accepted.append(f"{node} {field.name} = {value!r}")
+            client.close()
+            diagnostics.wait_for(node, "changes of parameters refused", refused)
+            sent += refused
+        print(f"{sent} bad values sent")
+        self.assertEqual(accepted, [])
+        self.assertGreater(sent, 300)
+
+    def test_every_bad_start_ends_with_one_line(self) -> None:
+        """The line names the parameter, or the file that it names."""
+        with ThreadPoolExecutor(max_workers=2) as pool:
+            ends = list(pool.map(start, enumerate(BAD_STARTS)))
+        for (node, parameter), done in zip(BAD_STARTS, ends):
+            with self.subTest(node=node, parameter=parameter):
+                lines = [line for line in done.stdout.splitlines() if line.strip()]
+                self.assertEqual(done.returncode, 1, done.stdout)
+                self.assertEqual(len(lines), 1, done.stdout)
+                self.assertTrue(any(part in lines[0] for part in parameter.split(":=")), lines[0])
+
+
+if __name__ == "__main__":
+    rospy.init_node("parameter_refusals_test")
+    rostest.rosrun(PACKAGE, "parameter_refusals", ParameterRefusals, sys.argv)

@@ -1,0 +1,31 @@
+"""Ctrl-C ends every launch file within two seconds, however many nodes it has and whatever they are doing."""
+
+import pytest
+from stopwatch import ROOT, seconds_to_stop, seconds_to_stop_without_nodes
+
+BAG = f"bag:={ROOT / 'test/data/basin.bag'}"
+LIMIT = 2.0
+# What roslaunch takes for its master alone on a machine with nothing else to do.
+QUIET = 0.7
+# Another program may take the processor during one attempt.
+ATTEMPTS = 3
+
+
+@pytest.mark.parametrize(
+    ("launch_file", "arguments"),
+    [
+        ("demo.launch", ["rviz:=false"]),
+        ("survey_simulated.launch", ["rviz:=false", "processes:=many"]),
+        ("driver_emulated.launch", ["processes:=many"]),
+        ("play_bag.launch", ["rviz:=false", BAG]),
+        ("vehicle.launch", ["standing:=true", "servo:=true", "processes:=many"]),
+    ],
+)
+def test_ctrl_c_ends_it_within_two_seconds(tmp_path, launch_file, arguments):
+    """On a busy machine the master alone takes longer: only what the nodes add is counted."""
+    given = [f"link:={tmp_path / 'head'}"] if launch_file.startswith("driver") else []
+    for _ in range(ATTEMPTS):
+        seconds = seconds_to_stop(launch_file, [*arguments, *given], tmp_path / "log")
+        if seconds < LIMIT - QUIET + max(QUIET, seconds_to_stop_without_nodes(tmp_path / "log")):
+            return
+    pytest.fail(f"{seconds:.1f} s")

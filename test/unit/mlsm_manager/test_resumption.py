@@ -1,0 +1,123 @@
+"""A localiser that starts in a stored map: where it expects the vehicle, and how it finds a lost one."""
+
+import numpy as np
+import pytest
+from made_scans import at_velocity, harbour, scan_of, still
+
+from mlsm_manager.localisation.parameters import LocaliserParameters
+from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
+from mlsm_manager.matching.problem.result import MatchStatus
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes, map_of_bytes
+
+PARAMETERS = LocaliserParameters(speed_deviation=0.05)
+TURN = 16.0
+
+
+def drifting(turn, places=None):
+    """Return a scan of a vehicle that stands still while its odometry drifts by 0.32 and 0.16 m per turn."""
+
+    def drift(times):
+        return at_velocity((0.02, 0.01, 0.0))(np.asarray(times) - TURN)
+
+    return scan_of(harbour() if places is None else places, still(), drift, start=TURN * turn)
+
+
+def elsewhere(turn):
+    """Return a scan of a place that is not in the map."""
+    return drifting(turn, np.random.RandomState(turn).uniform(-20.0, 20.0, (100, 2)))
+
+
+@pytest.fixture(scope="module")
+def stored():
+    """Return the map after five turns, as a file gives it back."""
+    localiser = PARAMETERS.build_localiser()
+    for turn in range(5):
+        localiser.take_scan(drifting(turn))
+    return map_of_bytes(map_bytes(localiser.stored("map", {"beam_width": 0.04}, 1.0, "run")))
+
+
+def restored(stored, same_odometry, **changes):
+    localiser = PARAMETERS.changed(changes).build_localiser()
+    localiser.restore(stored, same_odometry)
+    return localiser
+
+
+def test_all_layers_and_the_place_are_stored(stored):
+    assert set(stored.layers) == set(Layer)
+    assert min(len(blocks) for blocks in stored.layers.values()) > 50
+    place = StoredPlace.of_arrays(stored.arrays)
+    np.testing.assert_allclose(place.belief.theta[:2], [0.0, 0.0], atol=0.1)
+    np.testing.assert_allclose(place.correction[:2], [-0.02 * TURN * 4, -0.01 * TURN * 4], atol=0.15)
+
+
+def test_a_killed_node_goes_on_where_its_odometry_has_drifted_to(stored):
+    localiser = restored(stored, same_odometry=True)
+    assert not localiser.is_lost
+    update = localiser.take_scan(drifting(6)).scan
+    assert update.result.status is MatchStatus.CONVERGED
+    np.testing.assert_allclose(update.result.pose, np.zeros(3), atol=0.1)
+
+
+def test_until_the_first_scan_the_stored_correction_is_shown(stored):
+    localiser = restored(stored, same_odometry=True)
+    shown = localiser.correction(100.0, np.zeros(3))
+    np.testing.assert_array_equal(shown, stored.arrays["T_map_odom"])
+
+
+def test_a_vehicle_that_is_not_where_it_was_is_searched_after_three_scans(stored):
+    localiser = restored(stored, same_odometry=True)
+    for turn in (6, 7, 8):
+        assert not localiser.is_lost
+        assert not localiser.take_scan(elsewhere(turn)).scan.accepted
+    assert localiser.is_lost
+
+
+def test_another_odometry_is_found_anywhere_in_the_map(stored):
+    localiser = restored(stored, same_odometry=False)
+    assert localiser.is_lost
+    update = localiser.take_scan(scan_of(harbour(), still(), at_velocity((0.0, 0.0, 0.0), (30.0, -20.0, 0.0)))).scan
+    assert update.accepted, update.result.reason
+    np.testing.assert_allclose(update.result.pose[:2], [0.0, 0.0], atol=0.1)
+    assert not localiser.is_lost
+
+
+def test_a_lost_vehicle_does_not_write_into_the_map(stored):
+    localiser = restored(stored, same_odometry=False)
+    before = localiser.blocks.rows.copy()
+    assert not localiser.take_scan(elsewhere(1)).scan.accepted
+    np.testing.assert_array_equal(localiser.blocks.rows, before)
+    assert localiser.is_lost
+
+
+def test_a_map_of_another_resolution_is_refused_and_the_present_one_stays(stored):
+    localiser = PARAMETERS.changed({"resolution": 0.25}).build_localiser()
+    localiser.take_scan(drifting(0))
+    count = localiser.block_count
+    with pytest.raises(ValueError, match=r"resolution 0\.5 m: must be the map's, 0\.25 m"):
+        localiser.restore(stored, same_odometry=True)
+    assert (localiser.block_count, localiser.is_lost) == (count, False)
+
+
+def test_a_map_without_a_matched_layer_is_matched_with_as_it_is_shown(stored):
+    shown_only = StoredMap("map", {Layer.SHOWN: stored.layers[Layer.SHOWN]})
+    localiser = restored(shown_only, same_odometry=False)
+    assert len(localiser.mapper.matched) == len(stored.layers[Layer.SHOWN])
+
+
+@pytest.mark.parametrize("name", ["T_map_odom", "time", "state", "covariance"])
+@pytest.mark.parametrize("value", [None, np.zeros(2), np.full((8, 8), np.nan)])
+def test_a_place_that_is_not_whole_is_none(stored, name, value):
+    arrays = {**stored.arrays, name: value}
+    if value is None:
+        del arrays[name]
+    assert StoredPlace.of_arrays(arrays) is None
+
+
+def test_a_match_ends_the_search():
+    search = PlaceSearch()
+    search.expect()
+    search.learn(False)
+    search.learn(True)
+    for _ in range(5):
+        search.learn(False)
+    assert not search.is_lost
