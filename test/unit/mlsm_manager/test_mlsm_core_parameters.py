@@ -22,8 +22,3 @@ def test_an_extent_may_be_zero():
 def test_map_and_odom_must_be_two_frames():
     with pytest.raises(ParameterError, match=r"map_frame = 'odom': must differ from odom_frame"):
         MlsmCoreParameters(map_frame="odom")
-
-
-@pytest.mark.parametrize(("half_width", "told"), [(0.0, 0.0436), (0.01, 0.0436), (0.06, 0.12), (0.25, 0.5)])
-def test_the_matcher_is_told_a_beam_as_wide_as_its_edges(half_width, told):
-    assert MlsmCoreParameters(edge_half_width=half_width).build_matcher().parameters.beam_width == told
