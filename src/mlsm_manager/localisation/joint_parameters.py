@@ -37,8 +37,9 @@ class JointParameters(ParameterSet):
     """What the joint solver needs besides OdometryErrors."""
 
     estimator: Estimator = parameter(
-        Estimator.JOINT,
-        "JOINT: the newest scans find their poses together, none is rejected; SCAN_BY_SCAN: each alone, by the matcher",
+        Estimator.SCAN_BY_SCAN,
+        "JOINT: the newest scans find their poses together, none is rejected; it needs an odometry that is good to "
+        "some percent. SCAN_BY_SCAN: each alone, by the matcher",
         tunable=False,
     )  # fmt: skip
     odometry_scale: float = parameter(

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 
+from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from node_support.parameters import with_defaults
 from sonar_processing.beams.beam_correction import BeamCorrection
@@ -10,6 +11,7 @@ from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 
 @dataclass(frozen=True)
 @with_defaults(
+    estimator=Estimator.JOINT,
     range_scale_deviation=0.02,
     sonar_delay_deviation=1.0,
     scale_deviation=0.01,

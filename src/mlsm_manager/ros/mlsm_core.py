@@ -127,6 +127,15 @@ class MlsmCore:
         report_verdicts(self.health, self._localiser.verdicts())
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
+    def _mount(self, stamp_ns: int) -> None:
+        """Tell the localiser where the sonar is on the vehicle, once tf knows it."""
+        if self._mounted:
+            return
+        place = self._odometry.place_on_vehicle(self._live.current.sonar_frame, stamp_ns * 1e-9)
+        if place is not None:
+            self._localiser.mount(place)
+            self._mounted = True
+
     def _check_header(self, cloud: IntensityCloud) -> None:
         self._odometry.check_stamp(cloud.stamp_ns)
         allowed = self._live.current.odom_frame, self._live.current.map_frame

@@ -110,8 +110,8 @@ def test_a_bag_without_tf_is_refused(tmp_path):
 
 
 def test_a_parameter_out_of_range_is_answered_with_the_range(tmp_path):
-    line = refused(BASIN, "--out", tmp_path, "--set", "edge_half_width=3")
-    assert line == "map_bag: edge_half_width = 3: must be a number from 0 to 0.25 rad"
+    line = refused(BASIN, "--out", tmp_path, "--set", "echo_deviation=30")
+    assert line == "map_bag: echo_deviation = 30: must be a number from 0.01 to 10 m"
 
 
 def test_an_unknown_parameter_is_named(tmp_path):
