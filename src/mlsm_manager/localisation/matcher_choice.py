@@ -5,7 +5,11 @@ from typing import Type, TypeVar
 
 from mlsm_manager.localisation.sensor_model import BeamEdge
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, Matcher, MatcherName
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters, SegmentsMatcherParameters
+from mlsm_manager.matching.matchers.parameters import (
+    DistributionMatcherParameters,
+    GicpMatcherParameters,
+    SegmentsMatcherParameters,
+)
 from node_support.parameters import ParameterSet, parameter
 
 Part = TypeVar("Part", bound=ParameterSet)
@@ -17,12 +21,16 @@ class NamedMatcher(ParameterSet):
     """The matcher by its name."""
 
     matcher: MatcherName = parameter(
-        MatcherName.DISTRIBUTIONS, "the default matcher, or that of the thesis for comparison", tunable=False
+        MatcherName.DISTRIBUTIONS,
+        "the default matcher, or for comparison that of the thesis or Open3D's generalised ICP",
+        tunable=False,
     )
 
 
 @dataclass(frozen=True)
-class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, BeamEdge, NamedMatcher):
+class MatcherChoice(
+    GicpMatcherParameters, SegmentsMatcherParameters, DistributionMatcherParameters, BeamEdge, NamedMatcher
+):
     """The choice of a matcher, and the parameters of all matchers."""
 
     def part(self, kind: Type[Part]) -> Part:
