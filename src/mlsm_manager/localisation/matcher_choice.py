@@ -4,7 +4,11 @@ from dataclasses import dataclass, fields
 from typing import Type, TypeVar
 
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, Matcher, MatcherName
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters, SegmentsMatcherParameters
+from mlsm_manager.matching.matchers.parameters import (
+    DistributionMatcherParameters,
+    GicpMatcherParameters,
+    SegmentsMatcherParameters,
+)
 from node_support.parameters import ParameterSet, parameter
 
 Part = TypeVar("Part", bound=ParameterSet)
@@ -15,12 +19,20 @@ class NamedMatcher(ParameterSet):
     """The matcher by its name."""
 
     matcher: MatcherName = parameter(
-        MatcherName.DISTRIBUTIONS, "the default matcher, or that of the thesis for comparison", tunable=False
+        MatcherName.DISTRIBUTIONS,
+        "the default matcher, or for comparison that of the thesis or Open3D's generalised ICP",
+        tunable=False,
     )
 
 
 @dataclass(frozen=True)
+<<<<<<< HEAD
 class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, NamedMatcher):
+=======
+class MatcherChoice(
+    GicpMatcherParameters, SegmentsMatcherParameters, DistributionMatcherParameters, BeamEdge, NamedMatcher
+):
+>>>>>>> oldest2/oldest2
     """The choice of a matcher, and the parameters of all matchers."""
 
     def part(self, kind: Type[Part]) -> Part:
