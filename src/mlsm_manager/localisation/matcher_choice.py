@@ -26,13 +26,7 @@ class NamedMatcher(ParameterSet):
 
 
 @dataclass(frozen=True)
-<<<<<<< HEAD
-class MatcherChoice(SegmentsMatcherParameters, DistributionMatcherParameters, NamedMatcher):
-=======
-class MatcherChoice(
-    GicpMatcherParameters, SegmentsMatcherParameters, DistributionMatcherParameters, BeamEdge, NamedMatcher
-):
->>>>>>> oldest2/oldest2
+class MatcherChoice(GicpMatcherParameters, SegmentsMatcherParameters, DistributionMatcherParameters, NamedMatcher):
     """The choice of a matcher, and the parameters of all matchers."""
 
     def part(self, kind: Type[Part]) -> Part:
