@@ -64,6 +64,11 @@ class _Session:
         return corrected_path(self.solver.log, self.solver.state, times)
 
     @property
+    def start(self) -> float:
+        """Time [s] from which on the run knows the odometry; it begins with the first scan."""
+        return float(self.solver.log.node_times[0])
+
+    @property
     def settled_until(self) -> float:
         """Time [s] of the oldest node that may still move."""
         times = self.solver.log.node_times
@@ -207,6 +212,8 @@ class JointMapper:
         """Put a cloud into the map that is shown, or let it wait for the scan of its time."""
         if not self.matching:
             return self.take_placed(transformed(self.correction, cloud.points))
+        if self._session is not None and cloud.end <= self._session.start:
+            return self.take_placed(transformed(self._session.T_map_odom, cloud.points))
         if self._session is None or cloud.end > self._session.solver.log.node_times[-1]:
             self._waiting.append(cloud)
             return CloudUpdate(NOTHING_INSERTED, True, 0)
@@ -236,10 +243,9 @@ class JointMapper:
 
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
-        if self._session is None:
-            self._session = self._new_session()
-        session = self._session
+        session = self._session or self._new_session()
         estimate = session.add(scan)
+        self._session = session
         self._matched.add(TimedPoints.of_scan(scan))
         self._matched.draw(session.place, session.settled_until)
         self.correction = _correction(estimate.T_map_base, scan)

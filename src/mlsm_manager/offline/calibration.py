@@ -1,6 +1,6 @@
 """What a run found out about its sonar and its odometry."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any, Dict
 
 import numpy as np
@@ -9,6 +9,7 @@ from mlsm_manager.multi_view.batch_solver import BatchResult
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.state import DELAY, DIRECTION, RANGE_SCALE, SCALE
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.parameters import describe
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 NAMES = ("range_scale", "sonar_delay", "odometry_scale", "odometry_direction")
@@ -51,13 +52,18 @@ class Calibration:
         """Return `parameters` with what was found as what is known before the next run, in the sonar's own terms."""
         ranges, delay, scale, direction = (float(value) for value in self.values)
         before = parameters.part(BeamCorrection)
-        return parameters.changed(
-            {
-                "range_scale": before.range_scale * (1.0 + ranges),
-                "sonar_delay": before.sonar_delay + delay,
-                "range_scale_deviation": float(self.deviations[0]),
-                "sonar_delay_deviation": float(self.deviations[1]),
-                "odometry_scale": scale,
-                "odometry_direction": direction,
-            }
-        )
+        found = {
+            "range_scale": before.range_scale * (1.0 + ranges),
+            "sonar_delay": before.sonar_delay + delay,
+            "range_scale_deviation": float(self.deviations[0]),
+            "sonar_delay_deviation": float(self.deviations[1]),
+            "odometry_scale": scale,
+            "odometry_direction": direction,
+        }
+        return parameters.changed(_allowed(found))
+
+
+def _allowed(values: Dict[str, float]) -> Dict[str, float]:
+    """Return `values` within their ranges, so that a run that went astray can still be told."""
+    ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in values}
+    return {name: float(np.clip(value, ranges[name].low, ranges[name].high)) for name, value in values.items()}

@@ -66,7 +66,8 @@ class Trust:
             for verdict in self.verdicts
         }
         minutes = per_minute(self.deviations.times, self.deviations.radii)
-        return {"checks": checks, "deviation_per_minute": [round(float(value), 2) for value in minutes]}
+        told = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
+        return {"checks": checks, "deviation_per_minute": told}
 
 
 def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
