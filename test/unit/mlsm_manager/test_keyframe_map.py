@@ -21,7 +21,7 @@ def cloud(number):
 
 def moved_by(shift):
     """Return what places clouds `shift` m along x."""
-    return lambda cloud: cloud.points + [shift, 0.0, 0.0, 0.0]
+    return lambda cloud: cloud.points + np.array([shift, 0.0, 0.0, 0.0])
 
 
 def made_at_once(*parts):
