@@ -122,7 +122,13 @@ def _failure_texts(step: Step) -> List[str]:
 
 def _skip_reasons(step: Step) -> List[str]:
     found = [case.find("skipped") for case in _cases(step.report)] if step.report else []
-    return sorted({element.get("message") or element.text or "" for element in found if element is not None})
+    return sorted({_skip_reason(element) for element in found if element is not None})
+
+
+def _skip_reason(element: ET.Element) -> str:
+    """Return the reason of a skipped test, or of a skipped file: pytest gives that one in a tuple's repr."""
+    message, text = element.get("message") or "", element.text or ""
+    return text.rpartition("Skipped: ")[2].strip("\"')") if message == "collection skipped" else message or text
 
 
 def main(words: List[str], run: Callable[[Step], Outcome] = run_step) -> int:

@@ -5,6 +5,7 @@ Everything is derived from paths: what imports ROS stands in a folder `ros/` of 
 
 import ast
 import os
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -127,6 +128,12 @@ def test_every_core_module_can_be_imported_without_ros():
     output = subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True, text=True).stdout
     failed = {line.split()[0] for line in output.splitlines()}
     assert {name for name in failed if not _is_ros_side(name)} == set(), output
+
+
+def test_open3d_is_loaded_only_where_it_is_used():
+    """It costs a process 0.3 s and 43 MB."""
+    eager = [str(path) for path in SOURCES.rglob("*.py") if re.search("^(import|from) open3d", path.read_text(), re.M)]
+    assert eager == []
 
 
 @pytest.mark.parametrize("package", ALLOWED)

@@ -12,12 +12,12 @@ from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
-from mlsm_manager.localisation.sensor_model import without_doubtful_points
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 
@@ -46,6 +46,16 @@ class ScanMapper(Protocol):
     errors: OdometryErrors
     belief: Optional[Belief]
     correction: np.ndarray
+
+    @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after the end of a scan that its track should hold."""
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m."""
+
+    def verdicts(self) -> List[Verdict]:
+        """What the run says of itself, without any truth."""
 
     @property
     def blocks(self) -> Blocks:
@@ -104,12 +114,11 @@ class ScanMapper(Protocol):
 class LocaliserSettings:
     """matcher: for scans near their expected place. anywhere: for a vehicle that is lost.
 
-    edge_half_width: rad, see BeamEdge. blend_time: s, within which the correction goes over to a new one.
+    blend_time: s, within which the correction goes over to a new one.
     """
 
     matcher: Matcher
     anywhere: Matcher
-    edge_half_width: float
     blend_time: float
     map_input: MapInput
 
@@ -191,6 +200,21 @@ class Localiser:
         return self._changes
 
     @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after the end of a scan that are waited for before the scan is taken."""
+        return self.mapper.lookahead
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m."""
+        with self._lock:
+            self.mapper.mount(sonar_in_base)
+
+    def verdicts(self) -> List[Verdict]:
+        """Return what the run says of itself, without any truth."""
+        with self._lock:
+            return self.mapper.verdicts()
+
+    @property
     def believed_until(self) -> Optional[float]:
         """Time [s] of the newest belief; None before the first scan."""
         belief = self.mapper.belief
@@ -201,7 +225,6 @@ class Localiser:
         with self._lock:
             self.notice_time(scan.reference_time)
             self._changes += 1
-            scan = without_doubtful_points(scan, self._settings.edge_half_width)
             self._newest, self._newest_came = scan, self._clock()
             update = self._found(scan) if self.is_lost else self.mapper.take_echoes(scan)
             self._search.learn(update.accepted)

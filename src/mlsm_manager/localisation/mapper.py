@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Dict, Iterator, Mapping, Optional, Tuple
+from typing import Deque, Dict, Iterator, List, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, pre
 from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import ERRORS
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
@@ -22,8 +23,8 @@ from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
 # Clouds: with one per scan, more than a matcher is ever behind.
-_MOST_WAITING = 8
-_NOTHING = InsertReport(0, 0, 0)
+MOST_WAITING = 8
+NOTHING_INSERTED = InsertReport(0, 0, 0)
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class CloudUpdate:
     carved: Optional[CarveReport] = None
 
 
-class _Copies(Mapping[Layer, Blocks]):
+class LayerCopies(Mapping[Layer, Blocks]):
     """The blocks of maps, copied when they are asked for."""
 
     def __init__(self, maps: Dict[Layer, MultiLevelSurfaceMap]) -> None:
@@ -116,7 +117,7 @@ class Mapper:
     @property
     def layers(self) -> Mapping[Layer, Blocks]:
         """Copies of all maps, to be stored, each made when it is asked for."""
-        return _Copies({Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free})
+        return LayerCopies({Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free})
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
@@ -153,7 +154,19 @@ class Mapper:
         self._start: Optional[Belief] = None
         self.correction = np.zeros(3)
         self._history = CorrectionHistory()
-        self._waiting: Deque[TimedPoints] = deque(maxlen=_MOST_WAITING)
+        self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
+
+    @property
+    def lookahead(self) -> float:
+        """A scan is matched as soon as it has ended."""
+        return 0.0
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Points are matched wherever the sonar is."""
+
+    def verdicts(self) -> List[Verdict]:
+        """Each match is judged alone: its status says it."""
+        return []
 
     @property
     def blocks(self) -> Blocks:
@@ -193,7 +206,7 @@ class Mapper:
             return self._show(transformed(self.correction, cloud.points), cloud.times, 0)
         if cloud.end > self._history.end:
             self._waiting.append(cloud)
-            return CloudUpdate(_NOTHING, True, 0)
+            return CloudUpdate(NOTHING_INSERTED, True, 0)
         placed = self._history.placed(cloud)
         return self._show(placed.points, placed.times, placed.unplaced)
 

@@ -3,12 +3,17 @@
 from dataclasses import dataclass
 from enum import Enum
 from importlib.util import find_spec
-from typing import Any, Dict, Optional
+from typing import Any, Dict, Optional, Sequence
 
-from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
+import numpy as np
+
+from mlsm_manager.localisation.joint_mapper import JointMapper
+from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
+from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput, ScanMapper
 from mlsm_manager.localisation.mapper import Mapper, MapSettings
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.surface_map.export.colors import ColorBy
@@ -47,22 +52,27 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class LocaliserParameters(MatcherChoice, OdometryErrors, CarvingParameters, MapParameters):
+class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, CarvingParameters, MapParameters):
     """All that a localiser is made from."""
 
-    def build_localiser(self) -> Localiser:
-        """Return a localiser with an empty map."""
+    def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
+        """Return a localiser with an empty map; sonar_in_base: m, x y of the sonar in base_link."""
         settings = self.localiser_settings()
-        mapper = Mapper(self.map_settings(), self.part(OdometryErrors), settings.matcher)
+        mapper = self._build_mapper(settings.matcher, np.array(sonar_in_base, dtype=np.float64))
         mapper.matching = self.matches_from_start
         return Localiser(mapper, settings)
 
+    def _build_mapper(self, matcher: Matcher, sonar_in_base: np.ndarray) -> ScanMapper:
+        errors = self.part(OdometryErrors)
+        if self.estimator is Estimator.SCAN_BY_SCAN:
+            return Mapper(self.map_settings(), errors, matcher)
+        solver = self.solver_parameters(errors, self.range_scale_deviation)
+        return JointMapper(self.map_settings(), errors, solver, matcher, sonar_in_base)
+
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""
-        anywhere = relocaliser(self.with_effective_beam_width().part(DistributionMatcherParameters))
-        return LocaliserSettings(
-            self.build_matcher(), anywhere, self.edge_half_width, self.blend_time, self.chosen_map_input
-        )
+        anywhere = relocaliser(self.part(DistributionMatcherParameters))
+        return LocaliserSettings(self.build_matcher(), anywhere, self.blend_time, self.chosen_map_input)
 
     def map_settings(self) -> MapSettings:
         """Return what the grids are made from."""
@@ -123,6 +133,7 @@ class MlsmNodeParameters(ParameterSet):
     map_frame: str = parameter("map", "frame of the map", tunable=False)
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
     base_frame: str = parameter("base_link", "frame of the vehicle, which the dead reckoning places", tunable=False)
+    sonar_frame: str = parameter("sonar", "frame of the sonar, whose place on the vehicle tf knows", tunable=False)
     transform_rate: float = parameter(
         20.0, "how often map -> odom is sent", unit="1/s", low=0.1, high=1000.0, tunable=False
     )
@@ -186,7 +197,7 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     @property
     def calibration(self) -> Dict[str, Any]:
         """The parameters that a map's blocks depend on, by name, to be stored with it."""
-        names = ("map_input", "match_input", "edge_half_width", "beam_width", "range_scale_deviation")
+        names = ("map_input", "match_input", "beam_width", "range_scale_deviation")
         values = self.to_mapping()
         return {name: values[name] for name in names}
 

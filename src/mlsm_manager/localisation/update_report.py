@@ -1,6 +1,9 @@
 """Reports to the diagnostics what was done with scans and clouds."""
 
+from typing import Sequence
+
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health
 
 
@@ -22,6 +25,14 @@ def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     health.show("odometry direction error [rad]", f"{result.motion[1]:.4f}")
     if not update.accepted:
         health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction are kept")
+
+
+def report_verdicts(health: Health, verdicts: Sequence[Verdict]) -> None:
+    """Show what a run says of itself, and warn where it is not to be trusted."""
+    for verdict in verdicts:
+        health.show(verdict.name, verdict.line())
+        if verdict.fires:
+            health.problem("position doubtful", f"{verdict.line()}; the map may be smeared: relocalise, or begin anew")
 
 
 def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:

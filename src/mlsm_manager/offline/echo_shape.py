@@ -26,7 +26,13 @@ class EchoShape(Enum):
 
 _SUITED = {
     EchoShape.PEAK: {"mode": ExtractionMode.MATCHED_FILTER, "match_resolution": 0.5},
-    EchoShape.PLATEAU: {"mode": ExtractionMode.LEADING_EDGE, "match_resolution": 1.0},
+    # Plateaus lengthen with range, and the middle of their points moves outwards with them: by some percent of range.
+    EchoShape.PLATEAU: {
+        "mode": ExtractionMode.DENSE,
+        "spacing": 1.0,
+        "match_resolution": 1.0,
+        "range_scale_deviation": 0.05,
+    },
 }
 
 

@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Tuple
 
 import yaml
 
+from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -27,14 +28,16 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
     )
     parser.add_argument("--out", type=Path, required=True, help="folder to write to; created if missing")
-    parser.add_argument("--matcher", choices=[name.value for name in MatcherName], help="which matcher")
+    parser.add_argument(
+        "--matcher", choices=[name.value for name in MatcherName], help="match scan by scan, with this matcher"
+    )
     parser.add_argument("--truth", help="topic of the true position, from which errors are measured")
     parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
     parser.add_argument(
         "--no-calibrate",
         dest="calibrate",
         action="store_false",
-        help="use sonar_delay, range_scale and edge_half_width as they are set instead of estimating them",
+        help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
     )
     parser.add_argument("--parameters", type=Path, help="yaml file, such as a live.yaml; --set overrides it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
@@ -47,10 +50,14 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         parser.error("--refine smooths one recording, not several")
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(_pair(text, parser) for text in options.set)
-    options.fixed = frozenset(values)
     if options.matcher:
-        values["matcher"] = options.matcher
+        values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
+    if not options.calibrate:
+        values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
+    options.fixed = frozenset(values)
     options.parameters = ReplayParameters.from_mapping(values)
+    if options.refine and options.parameters.estimator is not Estimator.JOINT:
+        raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
     return options
 
 

@@ -4,19 +4,21 @@ from dataclasses import dataclass
 from io import BytesIO
 from itertools import cycle
 from pathlib import Path
-from typing import Sequence
+from typing import List, Optional, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Rectangle
+from matplotlib.patches import Ellipse, Rectangle
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from node_support.files import write_whole
 
 _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
+_DOUBT_COLOR = "#cc3377"
+_ELLIPSE_DEVIATIONS = 2.0
 _LINE_STYLES = ("-", "--", ":", "-.")
 
 
@@ -29,8 +31,26 @@ class Path2d:
     color: str
 
 
-def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarray], paths: Sequence[Path2d]) -> None:
-    """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m] and paths."""
+@dataclass(frozen=True)
+class Doubts:
+    """How certain the last path is. centers: (k, 2) m. covariances: (k, 2, 2) m^2 there. stretches: each (n, 2) m,
+    parts of the path that a check found doubtful.
+    """
+
+    centers: np.ndarray
+    covariances: np.ndarray
+    stretches: List[np.ndarray]
+
+
+def draw_map(
+    file: Path,
+    title: str,
+    blocks: Blocks,
+    outlines: Sequence[np.ndarray],
+    paths: Sequence[Path2d],
+    doubts: Optional[Doubts] = None,
+) -> None:
+    """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m], paths, and how certain the last one is."""
     figure = Figure(figsize=(14, 8), dpi=110)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(1, 1, 1)
@@ -40,6 +60,8 @@ def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarr
     _draw_blocks(axes, blocks)
     for path, style in zip(paths, cycle(_LINE_STYLES)):
         axes.plot(*path.points.T, style, color=path.color, linewidth=1.6, label=path.label, zorder=5)
+    if doubts is not None:
+        _draw_doubts(axes, doubts)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
     axes.grid(True, color="#dddddd", linewidth=0.5, zorder=0)
@@ -49,6 +71,20 @@ def draw_map(file: Path, title: str, blocks: Blocks, outlines: Sequence[np.ndarr
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
     write_whole(file, picture.getvalue())
+
+
+def _draw_doubts(axes: Axes, doubts: Doubts) -> None:
+    ellipses = []
+    for center, covariance in zip(doubts.centers, doubts.covariances):
+        values, vectors = np.linalg.eigh(covariance)
+        width, height = 2.0 * _ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0))
+        angle = np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0]))
+        ellipses.append(Ellipse(tuple(center), width, height, angle=angle))
+    axes.add_collection(PatchCollection(ellipses, facecolor="none", edgecolor=_DOUBT_COLOR, linewidth=0.8, zorder=6))
+    axes.plot([], [], "o", markerfacecolor="none", color=_DOUBT_COLOR, label="two standard deviations")
+    for number, stretch in enumerate(doubts.stretches):
+        label = "doubtful" if number == 0 else None
+        axes.plot(*stretch.T, color=_DOUBT_COLOR, linewidth=6.0, alpha=0.35, label=label, zorder=4)
 
 
 def _draw_blocks(axes: Axes, blocks: Blocks) -> None:

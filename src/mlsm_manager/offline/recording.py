@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan, Track
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed, inverse, matrices
+from node_support.geometry.planar import composed, inverse, matrices, transformed
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
@@ -62,6 +62,13 @@ class Recording:
             if kept
         ]
         return replace(self, beams=beams, unplaced=self.unplaced + len(self.beams) - len(beams))
+
+    @property
+    def sonar_in_base(self) -> np.ndarray:
+        """(2,) x y [m] of the sonar in base_link, from the first beam."""
+        first = self.beams[0]
+        pose = self.track.at(first.beam.stamp_ns * 1e-9)
+        return transformed(inverse(pose), first.T_target_sonar[np.newaxis, :2, 3])[0]
 
     @property
     def seconds(self) -> float:

@@ -5,9 +5,11 @@ from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.mapper import Mapper, ScanUpdate
+from mlsm_manager.localisation.joint_mapper import JointMapper
+from mlsm_manager.localisation.localiser import Localiser, ScanMapper
+from mlsm_manager.localisation.mapper import ScanUpdate
 from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.files.map_file import StoredMap
@@ -25,8 +27,18 @@ class Replayed:
     times: np.ndarray
     odometry: np.ndarray
     corrected: np.ndarray
-    mapper: Mapper
+    mapper: ScanMapper
     updates: List[ScanUpdate] = field(default_factory=list)
+
+    @property
+    def scans(self) -> List[Scan]:
+        """All scans, oldest first."""
+        return [update.scan for update in self.updates]
+
+    @property
+    def solver(self) -> Optional[LiveSolver]:
+        """The joint solver that has taken all scans; None where each was matched alone."""
+        return self.mapper.solver if isinstance(self.mapper, JointMapper) else None
 
     @property
     def matched(self) -> int:
@@ -50,15 +62,15 @@ def replay(
 
     `known` is a map to start in, at a place in it that has to be found.
 
-    A scan is used from the moment on at which its last beam and the odometry of that time were known.
+    A scan is used from the moment on at which its last beam and the odometry that the localiser waits for were known.
     """
-    localiser, track = parameters.build_localiser(), recording.track
+    localiser, track = parameters.build_localiser(recording.sonar_in_base), recording.track
     if known is not None:
         localiser.restore(known, same_odometry=False)
     corrections, updates = np.empty((len(track.times), 3)), []
     done = 0
     for scan in scans:
-        known = max(done, int(np.searchsorted(track.times, scan.reference_time, side="left")))
+        known = max(done, int(np.searchsorted(track.times, scan.reference_time + localiser.lookahead, side="left")))
         corrections[done:known] = _corrections(localiser, track, done, known)
         done = known
         updates.append(localiser.take_scan(scan).scan)

@@ -8,8 +8,9 @@ from typing import Any, Dict, List, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.offline.evaluation import aligned_truth, position_error
-from mlsm_manager.offline.picture import Path2d, draw_map
+from mlsm_manager.offline.picture import Doubts, Path2d, draw_map
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.trust import Trust
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
 from mlsm_manager.surface_map.storage import write_ply
@@ -23,16 +24,21 @@ _LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined
 _COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
 _TRUTH_COLOR = "#111111"
+# More would hide the path.
+_MOST_ELLIPSES = 40
 
 
 @dataclass(frozen=True)
 class Run:
-    """times: (m,) s. poses: name -> (m, 3) x y yaw. counts: what goes into the summary. stored: the final map."""
+    """times: (m,) s. poses: name -> (m, 3) x y yaw, the last one is the best. counts: what goes into the summary.
+    stored: the final map. trust: what the checks say; None where there are none.
+    """
 
     times: np.ndarray
     poses: Dict[str, np.ndarray]
     counts: Dict[str, Any]
     stored: StoredMap
+    trust: Optional[Trust] = None
 
     @property
     def blocks(self) -> Blocks:
@@ -45,7 +51,7 @@ def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
     write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
     write_trajectory(folder / "trajectory.csv", run.times, run.poses)
-    draw_map(folder / "map.png", name, run.blocks, [], _paths(run, recording))
+    draw_map(folder / "map.png", name, run.blocks, [], _paths(run, recording), _doubts(run))
 
 
 def write_summary(folder: Path, summary: Dict[str, Any]) -> None:
@@ -74,6 +80,17 @@ def trajectory_csv(times: np.ndarray, poses: Mapping[str, np.ndarray]) -> str:
     rows = np.concatenate(columns, axis=1)
     lines = [",".join([f"{row[0]:.6f}", *(f"{value:.4f}" for value in row[1:])]) for row in rows]
     return "\n".join([",".join(header), *lines]) + "\n"
+
+
+def _doubts(run: Run) -> Optional[Doubts]:
+    if run.trust is None:
+        return None
+    told = list(run.poses.values())[-1]
+    deviations = run.trust.deviations
+    shown = slice(None, None, max(1, len(deviations.times) // _MOST_ELLIPSES))
+    centers = np.stack([np.interp(deviations.times, run.times, told[:, axis]) for axis in (0, 1)], axis=-1)
+    stretches = [told[(run.times >= start) & (run.times <= end), :2] for start, end in run.trust.doubtful]
+    return Doubts(centers[shown], deviations.covariances[shown], stretches)
 
 
 def _paths(run: Run, recording: Recording) -> List[Path2d]:

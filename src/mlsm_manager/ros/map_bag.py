@@ -11,8 +11,8 @@ import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.offline.calibration import calibrated
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
+from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.north_east_down import suspicions
@@ -60,29 +60,32 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth, options.ned)
     recording = read_recording(options.bags[0], names)
     options.out.mkdir(parents=True, exist_ok=True)
-    parameters = _fitted_to_echoes(recording, options)
+    shape = echo_shape_of([placed.beam for placed in recording.beams])
+    parameters = suited(options.parameters, shape, options.fixed)
+    recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)
-    parameters = _calibrated(scans, parameters, options)
-    recording = recording.corrected(parameters.part(BeamCorrection))
-    replayed = _replayed(recording, _scans(recording, parameters, options), parameters)
+    replayed = _replayed(recording, scans, parameters)
     refined = _refined(recording, replayed, parameters) if options.refine else None
-    sessions = _further_sessions(replayed, parameters, names, options)
-    run = _run(replayed, refined, sessions, parameters)
-    errors = errors_of(run, recording)
+    found = None if replayed.solver is None else Found.of(replayed, refined)
+    known = parameters if found is None else found.calibration.applied(parameters)
+    sessions = _further_sessions(replayed, known, names, options)
+    run = _run(replayed, refined, sessions, known)
+    run = run if found is None else replace(run, trust=found.trust)
     write_run(options.out, " ".join(bag.name for bag in options.bags), run, recording)
     for number, session in enumerate(sessions, start=2):
         write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, _poses(session.replayed))
-    write_live(options.out / "live.yaml", parameters, names.odom_frame, names.base_frame)
+    write_live(options.out / "live.yaml", known, names.odom_frame, names.base_frame)
     seconds = time.monotonic() - start
     summary = {
         **run.counts,
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
-        "calibration": _calibration(parameters),
+        "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
+        **({} if found is None else found.to_mapping()),
         **({"sessions": [session.to_mapping() for session in sessions]} if sessions else {}),
-        **errors,
+        **errors_of(run, recording),
     }
     write_summary(options.out, summary)
     return summary
@@ -93,13 +96,6 @@ def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace)
     advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
     for sign in suspicions(heights, scans):
         print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
-
-
-def _fitted_to_echoes(recording: Recording, options: Namespace) -> ReplayParameters:
-    if not options.calibrate:
-        return options.parameters
-    form = echo_shape_of([placed.beam for placed in recording.beams])
-    return suited(options.parameters, form, options.fixed)
 
 
 def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
@@ -113,19 +109,6 @@ def _scans(recording: Recording, parameters: ReplayParameters, options: Namespac
     return scans
 
 
-def _calibrated(scans: List[Scan], parameters: ReplayParameters, options: Namespace) -> ReplayParameters:
-    if not options.calibrate:
-        return parameters
-    with _bar(None, "", "calibrate"):
-        return calibrated(scans, parameters, options.fixed)
-
-
-def _calibration(parameters: ReplayParameters) -> Dict[str, Any]:
-    model = {name: round(value, 4) for name, value in parameters.sensor_model().to_mapping().items()}
-    chosen = parameters.to_mapping()
-    return {**{name: chosen[name] for name in ("mode", "match_resolution", "scale_deviation")}, **model}
-
-
 def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParameters) -> Replayed:
     with _bar(len(scans), "scan", "match") as bar:
         return replay(recording, scans, parameters, bar.update)
@@ -136,8 +119,8 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
 
 
 def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
-    with _bar(len(replayed.updates), "scan", "refine") as bar:
-        return refine(recording, replayed, parameters.for_few_scans().build_matcher(), bar.update)
+    with _bar(None, "", "refine"):
+        return refine(recording.track, replayed.scans, replayed.solver, parameters.resolution)
 
 
 def _further_sessions(
@@ -159,7 +142,8 @@ def _further_sessions(
 
 def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
     """Return the map as made when the recording ended: equal runs write equal files."""
-    return StoredMap(_MAP_FRAME, dict(replayed.mapper.layers), _calibration(parameters), replayed.times[-1])
+    calibration = parameters.part(BeamCorrection).to_mapping()
+    return StoredMap(_MAP_FRAME, dict(replayed.mapper.layers), calibration, replayed.times[-1])
 
 
 def _poses(replayed: Replayed) -> Dict[str, np.ndarray]:
@@ -169,11 +153,10 @@ def _poses(replayed: Replayed) -> Dict[str, np.ndarray]:
 def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
     poses = _poses(replayed)
     stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
-    counts = {"scans": len(replayed.updates), "matched": replayed.matched, "rejected": replayed.rejected}
+    counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
     if refined is not None:
         poses[REFINED] = refined.poses
         stored = replace(stored, layers={Layer.SHOWN: refined.blocks})
-        counts["edges"] = refined.edges
     return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored)
 
 
@@ -190,4 +173,6 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         found = session["found_after_scans"]
         place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
         lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
+    if "trust" in summary:
+        lines.append(summary["trust"])
     return [*lines, f"in {options.out}: map.mlsm map.ply map.png trajectory.csv live.yaml summary.json"]

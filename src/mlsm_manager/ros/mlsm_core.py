@@ -10,7 +10,7 @@ from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.localisation.update_report import report_cloud, report_scan
+from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_verdicts
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.ros.autosave import Autosave
 from mlsm_manager.ros.fix_publisher import FixPublisher
@@ -43,6 +43,7 @@ class MlsmCore:
         self._odometry = OdometryTrack(
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
+        self._mounted = False
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
@@ -118,11 +119,22 @@ class MlsmCore:
         scan = self._scan(cloud)
         if scan is None:
             return
+        self._mount(cloud.stamp_ns)
         taken = self._localiser.take_scan(scan)
         for update in taken.clouds:
             self._report_cloud(update, cloud.stamp_ns)
         report_scan(self.health, taken.scan, self._localiser.matching)
+        report_verdicts(self.health, self._localiser.verdicts())
         self._publish_fix(taken.scan, cloud.stamp_ns)
+
+    def _mount(self, stamp_ns: int) -> None:
+        """Tell the localiser where the sonar is on the vehicle, once tf knows it."""
+        if self._mounted:
+            return
+        place = self._odometry.place_on_vehicle(self._live.current.sonar_frame, stamp_ns * 1e-9)
+        if place is not None:
+            self._localiser.mount(place)
+            self._mounted = True
 
     def _check_header(self, cloud: IntensityCloud) -> None:
         self._odometry.check_stamp(cloud.stamp_ns)
@@ -136,7 +148,7 @@ class MlsmCore:
         known = self._localiser.believed_until
         start = min([time, *times[:1], *([] if known is None else [known])])
         try:
-            track = self._odometry.track(start, times, time)
+            track = self._odometry.track(start, times, time, self._localiser.lookahead)
         except RefusedInput:
             self.health.count("scans not used")
             if self._localiser.matching:

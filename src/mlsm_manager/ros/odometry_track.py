@@ -34,16 +34,18 @@ class OdometryTrack:
         """Forget the past, because time jumped."""
         self._transforms.clear()
 
-    def track(self, start: float, times: np.ndarray, end: float) -> Track:
-        """Return the track from `start` to `end` [s], exact at `times` (n,).
+    def track(self, start: float, times: np.ndarray, end: float, lookahead: float = 0.0) -> Track:
+        """Return the track from `start` to `end` and, where it is known, `lookahead` beyond [s], exact at `times` (n,).
 
         What tf no longer knows of the past is left out. Raises RefusedInput when tf does not learn the vehicle's place
         at `end` within a second.
         """
-        obstacle = self._transforms.wait_for(*self._frames, stamp_of(end), _PATIENCE)
+        self._transforms.wait_for(*self._frames, stamp_of(end + lookahead), _PATIENCE + lookahead)
+        obstacle = self._transforms.wait_for(*self._frames, stamp_of(end), 0.0)
         if obstacle:
             raise self._without_odometry(obstacle)
-        wanted = np.unique(np.concatenate([np.linspace(start, end, _STEADY), times[(times >= start) & (times <= end)]]))
+        steady = np.append(np.linspace(start, end, _STEADY), end + lookahead)
+        wanted = np.unique(np.concatenate([steady, times[(times >= start) & (times <= end)]]))
         found = [(time, self._pose(time)) for time in wanted]
         known = [(time, pose) for time, pose in found if pose is not None]
         if not known:
@@ -53,6 +55,13 @@ class OdometryTrack:
     def matrix(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_odom_base at `time` [s], which a track has been made of."""
         return self._transforms.matrix(*self._frames, stamp_of(time))
+
+    def place_on_vehicle(self, frame: str, time: float) -> Optional[np.ndarray]:
+        """Return (2,) x y [m] of `frame` in base_link at `time` [s]; None where tf does not know it."""
+        try:
+            return self._transforms.matrix(self._frames[1], frame, stamp_of(time))[:2, 3]
+        except RefusedInput:
+            return None
 
     def newest(self) -> Optional[Tuple[Optional[float], np.ndarray]]:
         """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none.

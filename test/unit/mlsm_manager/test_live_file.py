@@ -17,7 +17,7 @@ from node_support.parameters import ParameterError, describe
 
 ROOT = Path(__file__).resolve().parents[3]
 USED = ReplayParameters().changed(
-    {"sonar_delay": 0.9, "range_scale": 0.97, "edge_half_width": 0.06, "matcher": "SEGMENTS", "spacing": 0.7}
+    {"sonar_delay": 0.9, "range_scale": 0.97, "echo_deviation": 0.3, "matcher": "SEGMENTS", "spacing": 0.7}
 )
 
 
@@ -32,7 +32,7 @@ def test_every_node_takes_its_part(written):
     values = yaml.safe_load(written.read_text())
     assert set(values) == set(NODES)
     cloud, echoes, core = (NODES[name].from_mapping(values[name]) for name in NODES)
-    assert (cloud.sonar_delay, cloud.range_scale, echoes.spacing, core.edge_half_width) == (0.9, 0.97, 0.7, 0.06)
+    assert (cloud.sonar_delay, cloud.range_scale, echoes.spacing, core.echo_deviation) == (0.9, 0.97, 0.7, 0.3)
     assert (cloud.target_frame, core.odom_frame, core.base_frame) == ("dead_reckoning", "dead_reckoning", "hull")
     assert core.start_matching
     assert core.map_input is MapInput.MATCHED
@@ -117,7 +117,7 @@ def test_launch_files_load_it_over_the_nodes_own(launch, written):
 
 
 def test_without_it_the_nodes_own_hold():
-    assert launched("mapping.launch")["/mlsm_core/edge_half_width"] == 0.0
+    assert launched("mapping.launch")["/mlsm_core/sonar_delay_deviation"] == 0.0
 
 
 def test_an_argument_goes_before_it(written):

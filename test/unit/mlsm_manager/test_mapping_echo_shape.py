@@ -26,11 +26,13 @@ def test_a_recording_of_silence_has_no_plateaus():
     assert echo_shape_of(beams([0, 0, 0])) is EchoShape.PEAK
 
 
-def test_plateaus_are_taken_where_they_begin_and_matched_coarsely():
+def test_plateaus_are_taken_as_dense_points_with_a_less_certain_range():
     parameters = suited(ReplayParameters(), EchoShape.PLATEAU, fixed=())
-    assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.LEADING_EDGE, 1.0)
+    assert (parameters.mode, parameters.match_resolution, parameters.range_scale_deviation) == (
+        ExtractionMode.DENSE, 1.0, 0.05,
+    )  # fmt: skip
 
 
 def test_what_the_user_set_is_held():
     parameters = suited(ReplayParameters(match_resolution=0.7), EchoShape.PLATEAU, fixed=("match_resolution",))
-    assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.LEADING_EDGE, 0.7)
+    assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.DENSE, 0.7)

@@ -24,11 +24,6 @@ def test_map_and_odom_must_be_two_frames():
         MlsmCoreParameters(map_frame="odom")
 
 
-@pytest.mark.parametrize(("half_width", "told"), [(0.0, 0.0436), (0.01, 0.0436), (0.06, 0.12), (0.25, 0.5)])
-def test_the_matcher_is_told_a_beam_as_wide_as_its_edges(half_width, told):
-    assert MlsmCoreParameters(edge_half_width=half_width).build_matcher().parameters.beam_width == told
-
-
 def test_compiled_insertion_without_numba_is_refused_in_one_line(monkeypatch):
     monkeypatch.setattr("mlsm_manager.localisation.parameters.find_spec", lambda name: None)
     with pytest.raises(ParameterError, match="insertion = NUMBA: needs numba; install it with"):

@@ -5,7 +5,12 @@ from enum import Enum
 from typing import Callable, Dict, Protocol, Type
 
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters, SegmentsMatcherParameters
+from mlsm_manager.matching.matchers.gicp_matcher import GicpMatcher
+from mlsm_manager.matching.matchers.parameters import (
+    DistributionMatcherParameters,
+    GicpMatcherParameters,
+    SegmentsMatcherParameters,
+)
 from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
 from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.matching.problem.scan import Scan
@@ -28,6 +33,7 @@ class MatcherName(Enum):
 
     DISTRIBUTIONS = "DISTRIBUTIONS"
     SEGMENTS = "SEGMENTS"
+    GICP = "GICP"
 
 
 @dataclass(frozen=True)
@@ -41,4 +47,5 @@ class MatcherType:
 MATCHERS: Dict[MatcherName, MatcherType] = {
     MatcherName.DISTRIBUTIONS: MatcherType(DistributionMatcherParameters, DistributionMatcher),
     MatcherName.SEGMENTS: MatcherType(SegmentsMatcherParameters, SegmentsMatcher),
+    MatcherName.GICP: MatcherType(GicpMatcherParameters, GicpMatcher),
 }

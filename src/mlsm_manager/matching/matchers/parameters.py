@@ -7,7 +7,22 @@ from sonar_processing.beams.beam_width import beam_width_parameter
 
 
 @dataclass(frozen=True)
-class DistributionMatcherParameters(ParameterSet):
+class FixLimits(ParameterSet):
+    """What any fix must hold to."""
+
+    min_points: int = parameter(15, "a scan with fewer points on the map is not matched", low=3, high=10000)
+    max_position_deviation: float = parameter(
+        0.5, "a fix with a greater standard deviation in its least certain direction is rejected",
+        unit="m", low=0.001, high=100.0,
+    )  # fmt: skip
+    max_jump: float = parameter(
+        4.0, "greatest distance of a fix from the expected pose, in the prior's standard deviations",
+        low=1.0, high=100.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DistributionMatcherParameters(FixLimits):
     """Parameters of the default matcher."""
 
     search_distance: float = parameter(
@@ -25,11 +40,6 @@ class DistributionMatcherParameters(ParameterSet):
         low=0.0,
         high=0.5,
     )
-    min_points: int = parameter(15, "a scan with fewer points on the map is not matched", low=3, high=10000)
-    max_position_deviation: float = parameter(
-        0.5, "a fix with a greater standard deviation in its least certain direction is rejected",
-        unit="m", low=0.001, high=100.0,
-    )  # fmt: skip
     max_yaw_deviation: float = parameter(
         0.1, "a fix with a greater standard deviation of the heading is rejected", unit="rad", low=0.001, high=3.1416
     )
@@ -48,10 +58,6 @@ class DistributionMatcherParameters(ParameterSet):
     min_agreement: float = parameter(
         0.8, "least share of echoes that the map explains times share of the map that no echo contradicts",
         low=0.0, high=1.0,
-    )  # fmt: skip
-    max_jump: float = parameter(
-        4.0, "greatest distance of a fix from the expected pose, in the prior's standard deviations",
-        low=1.0, high=100.0,
     )  # fmt: skip
     max_steps: int = parameter(40, "Gauss-Newton steps from each candidate, at most", low=1, high=1000)
 
@@ -72,3 +78,12 @@ class SegmentsMatcherParameters(ParameterSet):
         0.1, "segments: distance of these places, as a share of the estimated movement", low=0.0, high=10.0,
         thesis_name="sampleStep",
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class GicpMatcherParameters(FixLimits):
+    """Parameters of Open3D's generalised ICP."""
+
+    gicp_distance: float = parameter(
+        2.0, "GICP: greatest distance from an echo to its block", unit="m", low=0.01, high=100.0
+    )

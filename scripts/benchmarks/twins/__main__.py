@@ -1,0 +1,58 @@
+"""Prints how far live and batch paths are from the truth on twins of a recorded run.
+
+PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.twins RUN.bag [TWIN ...]
+"""
+
+import argparse
+from pathlib import Path
+from typing import Tuple
+
+import numpy as np
+
+from benchmarks.twins.parameters import TWINS, TwinParameters
+from benchmarks.twins.recording import twin_of
+from mlsm_manager.multi_view.batch_solver import solved
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.path import live_path, solved_path
+from mlsm_manager.offline.evaluation import position_error
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.ros.bag_recording import BagNames, read_recording
+from node_support.geometry.planar import inverse, transformed
+from sonar_processing.filters.echo_extraction import EchoExtractorParameters, ExtractionMode
+
+
+def main() -> None:
+    """Print one line per twin."""
+    parser = argparse.ArgumentParser(prog="benchmarks.twins", description=__doc__)
+    parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
+    parser.add_argument("twins", nargs="*", default=list(TWINS), help="which ones; default: " + ", ".join(TWINS))
+    arguments = parser.parse_args()
+    source = read_recording(arguments.bag, BagNames("/sonar/raw", "odom", "base_link", None))
+    for name in arguments.twins:
+        for path, error in zip(("live", "batch"), errors(twin_of(source, TWINS[name]), TWINS[name])):
+            print(f"{name}, {path}: {error.mean:.2f} m in the mean, {error.max:.2f} m at most")
+
+
+def errors(twin: Recording, conditions: TwinParameters) -> Tuple:
+    """Return the position errors of the live and of the batch path."""
+    mode = ExtractionMode.DENSE if conditions.binary else ExtractionMode.MATCHED_FILTER
+    parameters = MultiViewParameters()
+    solver = LiveSolver(parameters, sonar_in_base(twin))
+    for scan, _ in scans_of(twin, EchoExtractorParameters(mode=mode, spacing=1.0)):
+        solver.add(scan)
+    batch, times = solved(solver), twin.track.times
+    known = live_path(twin.track, solver.estimates, solver.odometry, parameters.window.lookahead, times)
+    fitted = solved_path(twin.track, batch.node_times, batch.state.nodes, times)
+    return tuple(position_error(times, path[:, :2], twin.truth) for path in (known, fitted))
+
+
+def sonar_in_base(recording: Recording) -> np.ndarray:
+    """Return where the sonar is in base_link (2,) [m]."""
+    first = recording.beams[0]
+    T_odom_base = recording.track.at(np.array([first.beam.stamp_ns * 1e-9]))
+    return transformed(inverse(T_odom_base), first.T_target_sonar[:2, 3][np.newaxis])[0]
+
+
+if __name__ == "__main__":
+    main()

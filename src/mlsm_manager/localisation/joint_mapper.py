@@ -1,0 +1,306 @@
+"""The joint solver as a ScanMapper: scans in, a map drawn from keyframes and the vehicle's place in it out."""
+
+from collections import deque
+from dataclasses import dataclass, replace
+from time import perf_counter
+from typing import Deque, List, Mapping, Optional, Tuple
+
+import numpy as np
+
+from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.mapper import (
+    MOST_WAITING,
+    NOTHING_INSERTED,
+    CloudUpdate,
+    LayerCopies,
+    MapSettings,
+    ScanUpdate,
+)
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.matchers.matcher_table import Matcher
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
+from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.matching.problem.state import MOTION, POSE, RATE, STATES
+from mlsm_manager.multi_view.drawing import corrected_path, drawn
+from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.state import DIRECTION, POSE_COLUMNS, SCALE
+from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.path_spread import told_deviation
+from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry.planar import composed, inverse, transformed, wrapped
+
+# Points of the path within a scan: about one per second of a slow head's revolution.
+_PATH_POINTS = 17
+_ORIGIN = np.zeros(3)
+# Scans that are checked for their agreement with the map: about the window of the solver.
+_CHECKED_SCANS = 20
+
+
+@dataclass
+class _Session:
+    """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small."""
+
+    solver: LiveSolver
+    T_map_odom: np.ndarray
+
+    def add(self, scan: Scan) -> LiveEstimate:
+        return self.solver.add(self._moved(scan))
+
+    def follow(self, track: Track, time: float) -> None:
+        self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
+
+    def place(self, cloud: TimedPoints) -> np.ndarray:
+        points = transformed(self.T_map_odom, cloud.points)
+        return drawn(self.solver.log, self.solver.state, points, cloud.times)
+
+    def path(self, times: np.ndarray) -> np.ndarray:
+        return corrected_path(self.solver.log, self.solver.state, times)
+
+    @property
+    def start(self) -> float:
+        """Time [s] from which on the run knows the odometry; it begins with the first scan."""
+        return float(self.solver.log.node_times[0])
+
+    @property
+    def settled_until(self) -> float:
+        """Time [s] of the oldest node that may still move."""
+        times = self.solver.log.node_times
+        return float(times[max(0, len(times) - 1 - self.solver.parameters.window.free_nodes)])
+
+    def _moved(self, scan: Scan) -> Scan:
+        track = _moved_track(scan.track, self.T_map_odom)
+        return replace(scan, points=transformed(self.T_map_odom, scan.points), track=track)
+
+
+class JointMapper:
+    """Follows the vehicle with all scans at once: the newest may still move, the older ones are the map.
+
+    No scan is rejected: one that says little moves little, and its covariance grows. While `matching` is off scans and
+    clouds are placed by the odometry as corrected so far. What is in the map when a run begins, or begins again after
+    a relocalisation, is a surface that its scans are compared with.
+    """
+
+    def __init__(
+        self, settings: MapSettings, errors: OdometryErrors, parameters: MultiViewParameters, matcher: Matcher,
+        sonar_in_base: np.ndarray,
+    ) -> None:  # fmt: skip
+        """`sonar_in_base`: (2,) m; `mount` changes it."""
+        self.settings = settings
+        self.errors = errors
+        self.parameters = parameters
+        self.matcher = matcher
+        self.matching = False
+        self._sonar_in_base = sonar_in_base
+        self._shown = self._matched = self._new_map(1.0, 0)
+        self.clear()
+
+    def _new_map(self, resolution: float, expected_blocks: int) -> KeyframeMap:
+        return KeyframeMap(resolution, self.settings.limit, expected_blocks, self.settings.kernel)
+
+    def clear(self) -> None:
+        """Forget the map and the place in it."""
+        self._session: Optional[_Session] = None
+        self._shown = self._new_map(self.settings.resolution, self.settings.expected_blocks)
+        self._matched = self._new_map(self.settings.match_resolution, 0)
+        self._free = MultiLevelSurfaceMap(self.settings.resolution, self.settings.limit)
+        self.forget_place()
+
+    def forget_place(self) -> None:
+        """Keep the map but forget where the vehicle is, because time jumped."""
+        self._end_session()
+        self.belief: Optional[Belief] = None
+        self.correction = _ORIGIN
+        self._start: Optional[np.ndarray] = None
+        self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
+
+    @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after a scan's end that it is placed better with, because beams may be late."""
+        return self.parameters.window.lookahead
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m; it counts from the next run on."""
+        self._sonar_in_base = sonar_in_base
+
+    def verdicts(self) -> List[Verdict]:
+        """Return whether the newest scans of the run agree with the map, and how uncertain its path has become."""
+        if self._session is None:
+            return []
+        newest = self._session.solver.estimates[-_CHECKED_SCANS:]
+        times = np.array([estimate.time for estimate in newest])
+        radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
+        agreements = np.array([estimate.agreement for estimate in newest])
+        return [recent_agreement(times, agreements, _CHECKED_SCANS), told_deviation(times, np.array(radii))]
+
+    @property
+    def solver(self) -> Optional[LiveSolver]:
+        """The solver of the current run; None where none runs."""
+        return self._session.solver if self._session is not None else None
+
+    @property
+    def blocks(self) -> Blocks:
+        """The map that is shown."""
+        return self._shown.map.blocks
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks of the map that is shown."""
+        return len(self._shown.map)
+
+    @property
+    def target(self) -> BlockSource:
+        """The map in which a lost vehicle is searched."""
+        return self._matched.map
+
+    @property
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of both maps, to be stored, each made when it is asked for; no free space is known."""
+        return LayerCopies({Layer.SHOWN: self._shown.map, Layer.MATCHED: self._matched.map, Layer.FREE: self._free})
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+        return self._shown.map.in_box(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        tiles = self._shown.map.take_changed_tiles()
+        return tiles, self._shown.map.in_tiles(tiles)
+
+    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+        """Take stored maps in the place of the present ones, and forget the place.
+
+        A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
+        other resolutions than those of the settings.
+        """
+        settings = self.settings
+        shown = self._new_map(settings.resolution, settings.expected_blocks)
+        matched = self._new_map(settings.match_resolution, 0)
+        blocks = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        shown.map.insert_blocks(blocks)
+        matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
+        self.forget_place()
+        self._shown, self._matched = shown, matched
+
+    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
+        self.correction = np.array(correction, dtype=np.float64)
+        self._start = np.sqrt(np.diag(belief.covariance)[POSE])
+
+    def take_echoes(self, scan: Scan) -> ScanUpdate:
+        """Find the pose of a scan together with those of the scans before it, and draw the map anew."""
+        return self._solve(scan) if self.matching else self._place(scan)
+
+    def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
+        """Begin a new run at a pose that was found elsewhere, in the map as it is."""
+        self._end_session()
+        self.correction = result.correction(scan)
+        self._start = np.sqrt(np.diag(result.covariance)[POSE])
+        theta = np.concatenate([result.pose, np.zeros(STATES - POSE_COLUMNS)])
+        covariance = self.errors.covariance()
+        covariance[POSE, POSE] = result.covariance[POSE, POSE]
+        self.belief = Belief(scan.reference_time, theta, covariance)
+        return ScanUpdate(scan, result, True, self.belief)
+
+    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
+        """Put a cloud into the map that is shown, or let it wait for the scan of its time."""
+        if not self.matching:
+            return self.take_placed(transformed(self.correction, cloud.points))
+        if self._session is not None and cloud.end <= self._session.start:
+            return self.take_placed(transformed(self._session.T_map_odom, cloud.points))
+        if self._session is None or cloud.end > self._session.solver.log.node_times[-1]:
+            self._waiting.append(cloud)
+            return CloudUpdate(NOTHING_INSERTED, True, 0)
+        self._shown.add(cloud)
+        return CloudUpdate(self._shown.draw(self._session.place, self._session.settled_until), False, 0)
+
+    def take_placed(self, points: np.ndarray) -> CloudUpdate:
+        """Insert points (n, 4) that are in map already into the map that is shown."""
+        return CloudUpdate(self._shown.insert(points), False, 0)
+
+    def take_waiting(self) -> Optional[CloudUpdate]:
+        """Insert the next cloud that waited, if its time is known now; None when there is none."""
+        if not self._waiting:
+            return None
+        known = -np.inf if self._session is None else self._session.solver.log.node_times[-1]
+        if self.matching and self._waiting[0].end > known:
+            return None
+        return self.take_cloud(self._waiting.popleft())
+
+    def follow(self, track: Track, time: float) -> None:
+        """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
+        if self.belief is None or time <= self.belief.time:
+            return
+        if self._session is not None:
+            self._session.follow(track, time)
+        self.belief = predicted(self.belief, track, time, self.errors)
+
+    def _solve(self, scan: Scan) -> ScanUpdate:
+        start = perf_counter()
+        session = self._session or self._new_session()
+        estimate = session.add(scan)
+        self._session = session
+        self._matched.add(TimedPoints.of_scan(scan))
+        self._matched.draw(session.place, session.settled_until)
+        self.correction = _correction(estimate.T_map_base, scan)
+        self.belief = self._belief(estimate)
+        if not estimate.comparisons:
+            return ScanUpdate(scan, None, True, self.belief)
+        return ScanUpdate(scan, self._result(scan, estimate, perf_counter() - start), True, self.belief)
+
+    def _place(self, scan: Scan) -> ScanUpdate:
+        self._end_session()
+        pose = composed(self.correction, scan.reference_pose)
+        theta = np.concatenate([pose, np.zeros(STATES - POSE_COLUMNS)])
+        self.belief = Belief(scan.reference_time, theta, self.errors.covariance())
+        self._matched.insert(transformed(self.correction, scan.points))
+        return ScanUpdate(scan, None, True, self.belief)
+
+    def _new_session(self) -> _Session:
+        known = KnownSurfaces(self._matched.map.blocks.mean[:, :2]) if len(self._matched.map) else None
+        solver = LiveSolver(self.parameters, self._sonar_in_base, self._start, known)
+        return _Session(solver, self.correction.copy())
+
+    def _end_session(self) -> None:
+        if self._session is not None:
+            self._shown.settle(self._session.place)
+            self._matched.settle(self._session.place)
+        self._session = None
+        self._start = None
+
+    def _belief(self, estimate: LiveEstimate) -> Belief:
+        columns = np.array([0, 1, 2, SCALE, DIRECTION])
+        states = np.append(np.arange(STATES)[POSE], np.arange(STATES)[MOTION])
+        theta, covariance = np.zeros(STATES), self.errors.covariance()
+        theta[POSE], theta[MOTION] = estimate.T_map_base, estimate.node[[SCALE, DIRECTION]]
+        covariance[np.ix_(states, states)] = estimate.covariance[np.ix_(columns, columns)]
+        return Belief(estimate.time, theta, covariance)
+
+    def _result(self, scan: Scan, estimate: LiveEstimate, seconds: float) -> MatchResult:
+        belief = self.belief
+        times = np.linspace(min(scan.start, estimate.time - 1e-3), estimate.time, _PATH_POINTS)
+        return MatchResult(
+            status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=scan.track.velocity_at(estimate.time),
+            covariance=belief.covariance[:6, :6], rate=belief.theta[RATE], motion=belief.theta[MOTION],
+            state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
+            iterations=self.parameters.window.live_iterations, seconds=seconds, beam_times=times,
+            beam_poses=self._session.path(times),
+        )  # fmt: skip
+
+
+def _correction(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
+    correction = composed(T_map_base, inverse(scan.reference_pose))
+    correction[2] = wrapped(correction[2])
+    return correction
+
+
+def _moved_track(track: Track, T_map_odom: np.ndarray) -> Track:
+    if not T_map_odom.any():
+        return track
+    return Track(track.times, composed(T_map_odom, track.poses))

@@ -1,0 +1,87 @@
+"""Fits a whole run at once, starting from what the live solver found."""
+
+from dataclasses import dataclass
+from typing import Tuple
+
+import numpy as np
+
+from mlsm_manager.multi_view.association import blocks_of, pairs_between
+from mlsm_manager.multi_view.comparisons import add_comparisons
+from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.placement import place
+from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS, Layout, State
+
+_CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """The whole run. steps: how many were taken. converged: the last one moved nothing by more than the tolerance.
+
+    node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2).
+    """
+
+    state: State
+    node_times: np.ndarray
+    pose_covariances: np.ndarray
+    run_covariance: np.ndarray
+    steps: int
+    converged: bool
+
+
+def solved(live: LiveSolver) -> BatchResult:
+    """Return the fit of all scans that `live` has taken; its own state stays as it is."""
+    problem = _Batch(live.log, live.odometry, live.parameters, live.state.copy())
+    window = live.parameters.window
+    steps, converged = 0, False
+    while steps < window.batch_iterations and not converged:
+        converged = problem.step() < window.tolerance
+        steps += 1
+    poses, run = problem.covariances()
+    return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
+
+
+class _Batch:
+    def __init__(self, log: RunLog, odometry: DvlFactors, parameters: MultiViewParameters, state: State) -> None:
+        self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
+        self._layout = Layout(0, log.scan_count, odometry.width)
+        self._poses = log.node_poses(np.arange(log.scan_count + 1))
+        self._solution = None
+
+    def step(self) -> float:
+        """Take one Gauss-Newton step and return the largest move of a node along x or y [m]."""
+        equations = NormalEquations(self._layout.size)
+        odometry, sonar, matching = self._odometry, self._parameters.sonar, self._parameters.matching
+        add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
+        add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
+        odometry.add_steps(equations, self._layout, self.state.nodes, self._log.node_times, self._poses)
+        points = place(self._log, self.state, self._log.rows(0, self._layout.last))
+        pairs = pairs_between(points, points, blocks_of(points, matching.block_scans), matching.cut, matching)
+        add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
+        self._solution = solution_of(equations)
+        nodes = self._solution.step[: self._layout.run_start].reshape(-1, self._layout.width)
+        self.state.nodes += nodes
+        self.state.run += self._solution.step[self._layout.run_start :]
+        return float(np.abs(nodes[:, :2]).max())
+
+    def covariances(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""
+        run = self._layout.run_start + np.arange(RUN_COLUMNS)
+        nodes = np.arange(self._layout.last + 1)
+        poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
+        return np.concatenate(poses), self._columns_of_inverse(run)[run]
+
+    def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
+        columns = self._layout.pose_columns(nodes)
+        inverse = self._columns_of_inverse(columns.ravel()).reshape(self._layout.size, len(nodes), POSE_COLUMNS)
+        return np.stack([inverse[own, number] for number, own in enumerate(columns)])
+
+    def _columns_of_inverse(self, columns: np.ndarray) -> np.ndarray:
+        unit = np.zeros((self._layout.size, len(columns)))
+        unit[columns, np.arange(len(columns))] = 1.0
+        return self._solution.solve(unit)

@@ -1,0 +1,71 @@
+"""Follows the vehicle scan by scan: the newest nodes are free, what is older stays where it was found."""
+
+from typing import List, Optional
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.live_window import LiveWindow
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.priors import run_mean
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import State
+
+_CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
+
+
+class LiveSolver:
+    """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
+
+    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan. state: of all nodes so far.
+    """
+
+    def __init__(
+        self,
+        parameters: MultiViewParameters,
+        sonar_in_base: np.ndarray,
+        start: Optional[np.ndarray] = None,
+        known: Optional[KnownSurfaces] = None,
+    ) -> None:
+        """`start`: (3,) standard deviations of the first pose in the map, m, m, rad; None: it defines the map.
+
+        `known`: surfaces that the map has already.
+        """
+        self.parameters = parameters
+        self.log = RunLog(sonar_in_base)
+        self.odometry = DvlFactors(parameters.odometry)
+        self.estimates: List[LiveEstimate] = []
+        self._nodes = GrowingArray(self.odometry.width)
+        self._nodes.extend(self.odometry.first_node()[np.newaxis])
+        self._node_covariances = GrowingArray(3, 3)
+        self._run = run_mean(parameters.sonar)
+        self._start, self._known = start, known
+
+    @property
+    def state(self) -> State:
+        """The unknowns as they are known now; a view that the next scan makes invalid."""
+        return State(self._nodes.values, self._run)
+
+    def add(self, scan: Scan) -> LiveEstimate:
+        """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
+
+        Raises RefusedInput for a scan that does not end later than the one before.
+        """
+        self.log.append(scan, self.parameters.window.lookahead)
+        before, after = self.log.node_poses(np.array([-2, -1]))
+        self._nodes.extend(self.odometry.next_node(self._nodes.values[-1], before, after)[np.newaxis])
+        window = LiveWindow(
+            self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
+            self._start, self._known,
+        )  # fmt: skip
+        cut = self.parameters.matching.wide_cut
+        for _ in range(self.parameters.window.live_iterations):
+            window.step(cut)
+            cut = max(self.parameters.matching.cut, _CUT_FACTOR * cut)
+        self._node_covariances.replace_from(window.oldest, window.covariances_of_oldest())
+        self.estimates.append(window.estimate())
+        return self.estimates[-1]

@@ -1,0 +1,152 @@
+"""The problem of one scan: the newest nodes against each other and against the frozen map."""
+
+from typing import Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.multi_view.agreement import agreement
+from mlsm_manager.multi_view.association import blocks_of, pairs_between
+from mlsm_manager.multi_view.comparisons import add_comparisons
+from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.placement import place
+from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
+from node_support.geometry.planar import composed, inverse
+
+_MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
+
+
+class LiveWindow:
+    """Moves the free nodes of `state` and its run's unknowns in place.
+
+    estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
+    standard deviations of the first node's pose, None where it defines the map. known: what was in the map before.
+    """
+
+    def __init__(
+        self, log: RunLog, odometry: DvlFactors, parameters: MultiViewParameters, state: State,
+        estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
+        known: Optional[KnownSurfaces],
+    ) -> None:  # fmt: skip
+        self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
+        last = log.scan_count
+        first = max(0, last - parameters.window.free_nodes)
+        self._scans_per_block = parameters.matching.block_scans
+        self._recent = first // self._scans_per_block * self._scans_per_block
+        self._frozen = nearest_blocks(
+            log, state, first // self._scans_per_block, log.node_poses(last)[:2] + state.nodes[last, :2], parameters
+        )
+        self._layout = Layout(first, last, odometry.width, self._groups(first))
+        self._held_covariance = self._covariance_of_frozen(covariances, first)
+        self._anchor = estimates[first - 1] if first else None
+        self._poses = log.node_poses(np.arange(first, last + 1))
+        self._start, self._known = start, known
+        self._solution: Optional[DenseSolution] = None
+        self._comparisons = 0
+        self._met = ()
+
+    def _groups(self, first: int) -> np.ndarray:
+        """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
+        group_of_block = np.full(first // self._scans_per_block + 1, -1)
+        group_of_block[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
+        group_of_block[-1] = len(self._frozen.numbers)
+        return group_of_block[np.arange(first) // self._scans_per_block]
+
+    def _covariance_of_frozen(self, covariances: np.ndarray, first: int) -> np.ndarray:
+        """Return (3 g, 3 g) of the groups' poses."""
+        if not first:
+            return np.zeros((0, 0))
+        middles = self._frozen.numbers * self._scans_per_block + self._scans_per_block // 2
+        return joint_covariance(covariances[np.append(middles, first)])
+
+    def step(self, cut: float) -> None:
+        """Take one Gauss-Newton step with points up to `cut` [m] apart."""
+        equations = NormalEquations(self._layout.size, len(self._held_covariance))
+        self._add_beliefs(equations)
+        free, times = self._state.nodes[self._layout.first :], self._log.node_times[self._layout.first :]
+        self._odometry.add_steps(equations, self._layout, free, times, self._poses)
+        self._comparisons = self._add_surfaces(equations, cut)
+        self._solution = DenseSolution(equations)
+        self._move(self._solution.step)
+
+    def _add_beliefs(self, equations: NormalEquations) -> None:
+        mean, deviations, run, of_run = self._beliefs()
+        add_belief(equations, 0, self._state.nodes[self._layout.first], mean, deviations)
+        add_belief(equations, self._layout.run_start, self._state.run, run, of_run)
+        if self._anchor is not None:
+            own = np.arange(POSE_COLUMNS)
+            held = self._layout.size + len(self._held_covariance) - POSE_COLUMNS + own
+            weight = deviations[POSE] ** -2.0
+            cross = np.zeros((POSE_COLUMNS, 2, 2))
+            cross[:, 0, 1] = cross[:, 1, 0] = -weight
+            equations.add_blocks(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
+
+    def _beliefs(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return mean and deviations of the first free node and of the run's unknowns.
+
+        Of a frozen node it is what was known when it was the newest: the window's scans are not in that.
+        """
+        sonar = self._parameters.sonar
+        if self._anchor is None:
+            deviations = self._odometry.first_deviations()
+            if self._start is not None:
+                deviations[POSE] = self._start
+            return self._odometry.first_node(), deviations, run_mean(sonar), run_deviations(sonar)
+        pose = self._state.nodes[self._layout.first, POSE]
+        mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
+        deviations = self._odometry.frozen_deviations(self._anchor.node_deviations)
+        return mean, deviations, self._anchor.run, self._anchor.run_deviations
+
+    def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
+        matching = self._parameters.matching
+        recent = place(self._log, self._state, self._log.rows(self._recent, self._layout.last))
+        sources = recent.selected(recent.scans >= self._layout.first)
+        frozen = self._frozen.moved_by_run(self._state.run)
+        to_frozen = pairs_between(sources, frozen, self._frozen.indices, cut, matching)
+        importance = self._frozen.importance
+        self._met = ()
+        count = add_comparisons(equations, self._layout, to_frozen, sources, frozen, matching, cut, importance)
+        if self._known is not None:
+            to_known, known = self._known.compared(sources, cut, matching)
+            count += add_comparisons(equations, self._layout, to_known, sources, known, matching, cut)
+            self._met += ((to_known, sources, known),)
+        to_recent = pairs_between(sources, recent, blocks_of(recent, matching.block_scans), cut, matching)
+        self._met += ((to_frozen, sources, frozen), (to_recent, sources, recent))
+        return count + add_comparisons(equations, self._layout, to_recent, sources, recent, matching, cut)
+
+    def _move(self, step: np.ndarray) -> None:
+        nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)
+        self._state.nodes[self._layout.first :] += nodes
+        for column, most in _MOST_RUN_STEP.items():
+            self._state.run[column] += np.clip(step[self._layout.run_start + column], -most, most)
+
+    @property
+    def oldest(self) -> int:
+        """The oldest free node."""
+        return self._layout.first
+
+    def covariances_of_oldest(self) -> np.ndarray:
+        """Return the pose covariances (2, 3, 3) of the two oldest free nodes, the next ones to be frozen."""
+        columns = self._layout.pose_columns(np.array([self._layout.first, self._layout.first + 1]))
+        return np.stack([self._solution.covariance(own, self._held_covariance) for own in columns])
+
+    def estimate(self) -> LiveEstimate:
+        """Return what is known of the newest node."""
+        newest = np.arange(self._layout.size - self._layout.width - RUN_COLUMNS, self._layout.size)
+        T_odom_base, node = self._poses[-1], self._state.nodes[-1].copy()
+        T_map_base = T_odom_base + node[POSE]
+        share, distance = agreement(self._met, self._layout.last - 1, self._parameters.matching)
+        return LiveEstimate(
+            time=float(self._log.node_times[-1]), T_odom_base=T_odom_base, T_map_base=T_map_base,
+            T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
+            covariance=self._solution.covariance(newest, self._held_covariance),
+            own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
+            comparisons=self._comparisons,
+            agreement=share, distance=distance,
+        )  # fmt: skip

@@ -1,0 +1,75 @@
+"""What was measured during a run: surface points of every scan, the nodes' times and the odometry."""
+
+from dataclasses import fields
+from typing import List
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.surface_points import SurfacePoints
+from node_support.errors import RefusedInput
+
+_SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
+
+
+class RunLog:
+    """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
+
+    sonar_in_base: (2,) m.
+    """
+
+    def __init__(self, sonar_in_base: np.ndarray) -> None:
+        self.sonar_in_base = np.asarray(sonar_in_base, dtype=np.float64)
+        self.odometry = OdometryTimeline()
+        self._node_times = GrowingArray()
+        self._starts: List[int] = [0]
+        self._scans = GrowingArray()
+        self._points = {field.name: GrowingArray() for field in fields(SurfacePoints)}
+        self._points["normals"] = GrowingArray(2)
+
+    @property
+    def scan_count(self) -> int:
+        """Number of scans so far."""
+        return len(self._starts) - 1
+
+    @property
+    def node_times(self) -> np.ndarray:
+        """(scan_count + 1,) s; a view that the next scan makes invalid."""
+        return self._node_times.values
+
+    def append(self, scan: Scan, lookahead: float) -> None:
+        """Append a scan and the odometry of its track up to `lookahead` seconds after its end.
+
+        Raises RefusedInput for a scan that does not end later than the one before.
+        """
+        if not len(self._node_times):
+            self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
+        newest = self.node_times[-1]
+        if scan.reference_time <= newest:
+            text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
+            raise RefusedInput("scans out of order", text)
+        self._node_times.extend([scan.reference_time])
+        self.odometry.extend(scan.track, scan.reference_time + lookahead)
+        points = SurfacePoints.of(scan, self.sonar_in_base)
+        for name, array in self._points.items():
+            array.extend(getattr(points, name))
+        self._scans.extend(np.full(len(points), self.scan_count))
+        self._starts.append(self._starts[-1] + len(points))
+
+    def rows(self, first: int, last: int) -> np.ndarray:
+        """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
+        return np.arange(self._starts[first], self._starts[last])
+
+    def points(self, rows: np.ndarray) -> SurfacePoints:
+        """Return the points in `rows`."""
+        return SurfacePoints(**{name: array.values[rows] for name, array in self._points.items()})
+
+    def scans(self, rows: np.ndarray) -> np.ndarray:
+        """Return the scan (n,) int of each point in `rows`."""
+        return self._scans.values[rows].astype(np.int64)
+
+    def node_poses(self, nodes: np.ndarray) -> np.ndarray:
+        """Return T_odom_base (n, 3) at `nodes` (n,)."""
+        return self.odometry.at(self.node_times[nodes])

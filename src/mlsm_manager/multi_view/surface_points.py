@@ -1,0 +1,89 @@
+"""Points of a scan that lie on a surface, as the sonar heard them: range, bearing and the surface's normal."""
+
+from dataclasses import dataclass, fields
+from typing import Sequence, Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.matching.problem.scan import Scan
+from node_support.geometry.planar import inverse, rotated, transformed
+
+_NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
+_REACH = 2.3  # m: neighbours at short range
+_REACH_PER_RANGE = 0.14  # rad: beams fan out; about four steps of a head with 1.8 deg
+_NEAR = 0.75  # share of the reach within which a neighbour counts fully; from there to the reach it fades out
+_FEWEST = (4.0, 5.0)  # neighbours, the point included: from no line at all to a line
+_FLATNESS = (0.35, 0.25)  # variance across over variance along: from a heap to a line
+_NOTHING = 1e-9  # m: keeps points on top of each other, or of the sonar, from dividing by zero
+_GRAZING = (0.02, 0.1)  # cosine of incidence: from no telling which side of a surface was heard to certainty
+
+
+@dataclass(frozen=True)
+class SurfacePoints:
+    """n points that lie on surfaces.
+
+    times: (n,) s, stamps of their beams. ranges: (n,) m from the sonar as reported. bearings: (n,) rad from the sonar,
+    in base_link. normals: (n, 2) of the surface in base_link at the point's own time, pointing away from the sonar.
+    slants: (n,) m, range times the sine of the angle of incidence. qualities: (n,) from above 0 to 1, how certainly the
+    point lies on a surface; what makes a point drop out takes its quality to 0 first, so that nothing hangs on a
+    rounding error.
+    """
+
+    times: np.ndarray
+    ranges: np.ndarray
+    bearings: np.ndarray
+    normals: np.ndarray
+    slants: np.ndarray
+    qualities: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    @classmethod
+    def joined(cls, parts: Sequence["SurfacePoints"]) -> "SurfacePoints":
+        """Return the points of all `parts`, at least one."""
+        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
+
+    @classmethod
+    def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "SurfacePoints":
+        """Return the points of a scan that lie on surfaces; sonar_in_base: (2,) m, where the sonar is in base_link."""
+        poses = scan.track.at(scan.times)
+        sight = transformed(inverse(poses), scan.points[:, :2]) - sonar_in_base
+        ranges = np.hypot(sight[:, 0], sight[:, 1])
+        normals, qualities = surface_normals(scan.points[:, :2], ranges)
+        normals = rotated(normals, -poses[:, 2])
+        outward = np.einsum("na,na->n", normals, sight)
+        normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
+        slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
+        qualities = qualities * ramp(np.abs(outward) / np.maximum(ranges, _NOTHING), *_GRAZING)
+        known = qualities > 0.0
+        bearings = np.arctan2(sight[:, 1], sight[:, 0])
+        return cls(*(array[known] for array in (scan.times, ranges, bearings, normals, slants, qualities)))
+
+
+def surface_normals(points: np.ndarray, ranges: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and how certain these are (n,), 0 to 1.
+
+    ranges: (n,) m from the sonar.
+    """
+    count = min(_NEIGHBOURS + 1, len(points))
+    if count < _FEWEST[0]:
+        return np.zeros((len(points), 2)), np.zeros(len(points))
+    distance, index = cKDTree(points).query(points, k=count)
+    reach = np.minimum(np.maximum(_REACH, _REACH_PER_RANGE * ranges), distance[:, -1])
+    reach = np.maximum(reach, _NOTHING)[:, np.newaxis]
+    weight = ramp(distance, reach, _NEAR * reach)
+    total = weight.sum(axis=1)
+    group = points[index]
+    mean = (group * weight[..., np.newaxis]).sum(axis=1) / total[:, np.newaxis]
+    offset = group - mean[:, np.newaxis]
+    covariance = np.einsum("nk,nka,nkb->nab", weight, offset, offset) / total[:, np.newaxis, np.newaxis]
+    values, vectors = np.linalg.eigh(covariance)
+    flatness = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
+    return vectors[:, :, 0], ramp(total, *_FEWEST) * ramp(flatness, *_FLATNESS)
+
+
+def ramp(values: np.ndarray, zero: np.ndarray, one: np.ndarray) -> np.ndarray:
+    """Return 0 for values at `zero` and beyond, 1 at `one` and beyond, and linearly between."""
+    return np.clip((values - zero) / (one - zero), 0.0, 1.0)

@@ -1,0 +1,118 @@
+"""Whether a run can be trusted, told without any truth: the checks of map_bag."""
+
+from dataclasses import dataclass
+from typing import Any, Dict, List, Optional
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.offline.calibration import NAMES, Calibration
+from mlsm_manager.offline.refinement import Refined
+from mlsm_manager.offline.replay import Replayed
+from mlsm_manager.self_check.calibration_agreement import halves_agree
+from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.odometry_agreement import against_odometry
+from mlsm_manager.self_check.path_spread import per_minute, told_deviation
+from mlsm_manager.self_check.verdict import Verdict
+
+# A window's worth of scans: fewer say too little of scale and delay.
+_FEWEST_SCANS = 20
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How certain the path is. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map."""
+
+    times: np.ndarray
+    covariances: np.ndarray
+
+    @property
+    def radii(self) -> np.ndarray:
+        """(k,) m, root of the sum of both variances."""
+        return np.sqrt(np.trace(self.covariances, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True)
+class Trust:
+    """verdicts: of all checks. deviations: of the path that is told."""
+
+    verdicts: List[Verdict]
+    deviations: Deviations
+
+    @property
+    def line(self) -> str:
+        """One line for people."""
+        firing = [verdict for verdict in self.verdicts if verdict.fires]
+        if not firing:
+            return f"trust: all {len(self.verdicts)} checks are fine"
+        return "trust: DOUBTFUL; " + "; ".join(verdict.line() for verdict in firing)
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """(k, 2) s, beginnings and ends of the stretches that made a check fire."""
+        return np.concatenate([np.empty((0, 2)), *(v.doubtful for v in self.verdicts if v.fires)])
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return the checks and the deviation per minute for summary.json."""
+        checks = {
+            verdict.name: {
+                "value": None if np.isnan(verdict.value) else round(verdict.value, 3),
+                "limit": verdict.limit,
+                "fires": verdict.fires,
+                "meaning": verdict.text,
+            }
+            for verdict in self.verdicts
+        }
+        minutes = per_minute(self.deviations.times, self.deviations.radii)
+        told = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
+        return {"checks": checks, "deviation_per_minute": told}
+
+
+def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
+    """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
+    solver = replayed.solver
+    estimates = solver.estimates
+    ends = np.array([estimate.time for estimate in estimates])
+    odometry = solver.parameters.odometry
+    path = replayed.corrected if refined is None else refined.poses
+    deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
+    verdicts = [
+        *against_odometry(
+            replayed.times, replayed.odometry, path,
+            scale_deviation=odometry.scale_deviation, position_walk=odometry.position_walk,
+        ),
+        recent_agreement(ends, np.array([estimate.agreement for estimate in estimates])),
+        told_deviation(deviations.times, deviations.radii),
+    ]  # fmt: skip
+    halves = _halves(replayed.scans, solver)
+    return Trust(verdicts if halves is None else [*verdicts, halves], deviations)
+
+
+def _live_deviations(solver: LiveSolver) -> Deviations:
+    covariances = [estimate.pose_covariance[:2, :2] for estimate in solver.estimates]
+    return Deviations(np.array([estimate.time for estimate in solver.estimates]), np.array(covariances))
+
+
+def _batch_deviations(refined: Refined) -> Deviations:
+    return Deviations(refined.batch.node_times, refined.batch.pose_covariances[:, :2, :2])
+
+
+def _halves(scans: List[Scan], solver: LiveSolver) -> Optional[Verdict]:
+    """Compare the calibration of each half of the run, made without the other one."""
+    middle = len(scans) // 2
+    found = []
+    for half in (scans[:middle], scans[middle:]):
+        if len(half) < _FEWEST_SCANS:
+            return None
+        found.append(_calibrated(half, solver.parameters, solver.log.sonar_in_base))
+    first, second = found
+    return halves_agree(NAMES, first.values, first.deviations, second.values, second.deviations)
+
+
+def _calibrated(scans: List[Scan], parameters: MultiViewParameters, sonar_in_base: np.ndarray) -> Calibration:
+    solver = LiveSolver(parameters, sonar_in_base)
+    for scan in scans:
+        solver.add(scan)
+    return Calibration.of_live(solver)

@@ -1,0 +1,1 @@
+"""Tells without any truth whether a run can be trusted."""

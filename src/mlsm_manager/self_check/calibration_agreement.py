@@ -1,0 +1,23 @@
+"""Do parts of a run find the same calibration?"""
+
+from typing import Sequence
+
+import numpy as np
+
+from mlsm_manager.self_check.verdict import Verdict
+
+
+def halves_agree(
+    names: Sequence[str],
+    first: np.ndarray,
+    first_deviations: np.ndarray,
+    second: np.ndarray,
+    second_deviations: np.ndarray,
+    limit: float = 3.0,
+) -> Verdict:
+    """Return by how many deviations the halves' calibrations (n,) differ at most; `names` (n,) are what they are."""
+    spread = np.sqrt(np.asarray(first_deviations) ** 2 + np.asarray(second_deviations) ** 2)
+    distances = np.abs(np.asarray(first) - np.asarray(second)) / spread
+    worst = int(np.argmax(distances))
+    text = f"halves differ most in {names[worst]}: {first[worst]:.4g} and {second[worst]:.4g}, deviations"
+    return Verdict("calibration of the halves", float(distances[worst]), limit, text)

@@ -1,0 +1,57 @@
+"""Does the corrected path go as far as the odometry says, within what the odometry may err?
+
+A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step. The
+odometry's scale is known far better than that.
+"""
+
+from typing import Tuple
+
+import numpy as np
+
+from mlsm_manager.self_check.verdict import Verdict, merged
+
+_STEP = 14.0  # s between windows: about one turn of a head
+_SHORTEST = 15.0  # m that the vehicle must have gone in a window, so that a ratio means something
+_HEADING_SPREAD = 0.05  # rad by which the direction of motion may differ along a run: compass and mounting
+
+
+def against_odometry(
+    times: np.ndarray,
+    odometry: np.ndarray,
+    corrected: np.ndarray,
+    window: float = 350.0,
+    scale_deviation: float = 0.01,
+    position_walk: float = 0.12,
+    limit: float = 4.0,
+) -> Tuple[Verdict, Verdict]:
+    """Return verdicts on the distances along and across the odometry's, in standard deviations.
+
+    times: (m,) s. odometry, corrected: (m, >= 2) positions. window: s, about 25 scans. scale_deviation and
+    position_walk [m/sqrt(s)]: of the odometry.
+    """
+    starts = np.arange(times[0], times[-1] - window, _STEP)
+    by_odometry, by_map = (_moves(times, path, starts, window) for path in (odometry, corrected))
+    far = np.abs(by_odometry) > _SHORTEST
+    starts, by_odometry, by_map = starts[far], by_odometry[far], by_map[far]
+    ratio = by_map / by_odometry
+    walk = position_walk**2 * window / np.abs(by_odometry) ** 2
+    along = (np.abs(ratio) - 1.0) / np.sqrt(scale_deviation**2 + walk)
+    direction = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
+    across = direction / np.sqrt(_HEADING_SPREAD**2 + walk)
+    return (
+        _verdict("distance against odometry", "longest or shortest stretch, deviations", along, starts, window, limit),
+        _verdict("direction against odometry", "most turned stretch, deviations", across, starts, window, limit),
+    )
+
+
+def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray, window: float) -> np.ndarray:
+    """Return moves (n,) as complex numbers [m] in windows from `starts` on."""
+    x, y = (
+        np.interp(starts + window, times, path[:, axis]) - np.interp(starts, times, path[:, axis]) for axis in (0, 1)
+    )
+    return x + 1j * y
+
+
+def _verdict(name: str, text: str, deviations: np.ndarray, starts: np.ndarray, window: float, limit: float) -> Verdict:
+    worst = float(np.abs(deviations).max()) if len(deviations) else np.nan
+    return Verdict(name, worst, limit, text, doubtful=merged(starts[np.abs(deviations) > limit], window))

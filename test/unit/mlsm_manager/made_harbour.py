@@ -1,0 +1,68 @@
+"""A vehicle tours a walled harbour; its odometry errs in direction and its beams are late. The truth is known."""
+
+from dataclasses import dataclass
+from typing import List
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan, Track
+from node_support.geometry.planar import inverse, rotated, transformed
+
+TURN = 14.0  # s per turn of the head
+BEAMS = 120
+SONAR_IN_BASE = np.array([0.3, 0.0])
+_CORNERS = np.array(
+    [[-25.0, -18.0], [20.0, -18.0], [20.0, -6.0], [30.0, -6.0], [30.0, 20.0], [4.0, 20.0], [4.0, 14.0], [-25.0, 14.0]]
+)
+
+
+@dataclass(frozen=True)
+class Tour:
+    """scans: as heard. truth, odometry: the vehicle's path."""
+
+    scans: List[Scan]
+    truth: Track
+    odometry: Track
+
+
+def tour(count: int, direction: float = 0.0, delay: float = 0.0, noise: float = 0.1, seed: int = 0) -> Tour:
+    """Return a tour of `count` scans whose odometry goes `direction` [rad] beside the truth, with late beams."""
+    rng = np.random.RandomState(seed)
+    times = np.arange(0.0, count * TURN + 5.0, 0.2)
+    truth = Track(times, _path(times))
+    steps = rotated(np.diff(truth.poses[:, :2], axis=0), np.full(len(times) - 1, -direction))
+    positions = np.vstack([np.zeros((1, 2)), np.cumsum(steps, axis=0)]) + truth.poses[0, :2]
+    odometry = Track(times, np.column_stack([positions, truth.poses[:, 2]]))
+    scans = [_scan(truth, odometry, number, delay, noise, rng) for number in range(count)]
+    return Tour(scans, truth, odometry)
+
+
+def _path(times: np.ndarray) -> np.ndarray:
+    phase = times / 60.0
+    return np.column_stack([12.0 * np.cos(phase), 7.0 * np.sin(2.0 * phase), 1.2 * np.sin(times / 13.0)])
+
+
+def _scan(truth: Track, odometry: Track, number: int, delay: float, noise: float, rng: np.random.RandomState) -> Scan:
+    stamps = number * TURN + TURN * (np.arange(BEAMS) + 1.0) / BEAMS
+    bearings = 2.0 * np.pi * np.arange(BEAMS) / BEAMS
+    poses = truth.at(stamps + delay)
+    sonar = poses[:, :2] + rotated(np.tile(SONAR_IN_BASE, (BEAMS, 1)), poses[:, 2])
+    ranges = _ranges(sonar, bearings + poses[:, 2]) + rng.normal(0.0, noise, BEAMS)
+    seen = SONAR_IN_BASE + ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    points = np.column_stack([transformed(odometry.at(stamps), seen), np.zeros(BEAMS), np.full(BEAMS, 100.0)])
+    return Scan(points, stamps, np.ones(BEAMS, dtype=bool), odometry, float(stamps[-1]))
+
+
+def _ranges(places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])[:, np.newaxis]
+    along = np.roll(_CORNERS, -1, axis=0) - _CORNERS
+    to_corner = _CORNERS - places[:, np.newaxis]
+    cross = rays[..., 0] * along[:, 1] - rays[..., 1] * along[:, 0]
+    ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
+    share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross
+    return np.where((ranges > 0.0) & (share >= 0.0) & (share <= 1.0), ranges, np.inf).min(axis=1)
+
+
+def relative(path: np.ndarray) -> np.ndarray:
+    """Return positions (n, 2) of poses (n, 3) as seen from the first one."""
+    return transformed(inverse(path[0]), path[:, :2])

@@ -1,0 +1,85 @@
+"""A map drawn from keyframes is that of their last places."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_maps import random_points
+
+from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+RESOLUTION, LIMIT = 0.5, 1000.0
+
+
+def cloud(number):
+    """Return keyframe `number`: a flat patch of points that ends at that second."""
+    points = random_points(number, 40, extent=3.0) * [1.0, 1.0, 0.0, 1.0]
+    return TimedPoints(points, np.full(len(points), float(number)), float(number))
+
+
+def moved_by(shift):
+    """Return what places clouds `shift` m along x."""
+    return lambda cloud: cloud.points + np.array([shift, 0.0, 0.0, 0.0])
+
+
+def made_at_once(*parts):
+    made = MultiLevelSurfaceMap(RESOLUTION, LIMIT)
+    for points in parts:
+        made.insert(points)
+    return made.blocks
+
+
+def assert_same(found, wanted):
+    order, other = (np.lexsort(np.column_stack([b.cells, b.mean[:, 2]]).T) for b in (found, wanted))
+    np.testing.assert_array_equal(found.cells[order], wanted.cells[other])
+    np.testing.assert_allclose(found.mean[order], wanted.mean[other], atol=1e-9)
+
+
+STEP = st.tuples(st.sampled_from(["add", "draw", "insert"]), st.integers(-4, 4))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(STEP, max_size=10), st.integers(-4, 4))
+def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
+    shown, keyframes, inserted = KeyframeMap(RESOLUTION, LIMIT), [], []
+    for number, (step, shift) in enumerate(steps):
+        if step == "add":
+            keyframes.append(cloud(number))
+            shown.add(keyframes[-1])
+        elif step == "draw":
+            shown.draw(moved_by(0.3 * shift), -np.inf)
+        else:
+            inserted.append(cloud(number).points)
+            shown.insert(inserted[-1])
+    place = moved_by(0.3 * last)
+    shown.settle(place)
+    assert_same(shown.map.blocks, made_at_once(*inserted, *(place(keyframe) for keyframe in keyframes)))
+    assert shown.keyframes == 0
+
+
+def test_a_keyframe_that_moves_leaves_nothing_behind():
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    shown.add(cloud(1))
+    shown.draw(moved_by(0.0), -np.inf)
+    shown.draw(moved_by(50.0), -np.inf)
+    assert_same(shown.map.blocks, made_at_once(moved_by(50.0)(cloud(1))))
+
+
+def test_a_settled_keyframe_stays_where_it_was_drawn():
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    for number in (1, 2):
+        shown.add(cloud(number))
+    shown.draw(moved_by(0.0), settled_until=1.0)
+    assert shown.keyframes == 1
+    shown.draw(moved_by(50.0), settled_until=1.0)
+    assert_same(shown.map.blocks, made_at_once(cloud(1).points, moved_by(50.0)(cloud(2))))
+
+
+@pytest.mark.parametrize("settled_until", [-np.inf, np.inf])
+def test_the_report_is_that_of_the_newest_keyframe(settled_until):
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    for number in (1, 2):
+        shown.add(cloud(number))
+    assert shown.draw(moved_by(2.0 * LIMIT), settled_until).outside == len(cloud(2))

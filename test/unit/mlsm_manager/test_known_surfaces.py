@@ -1,0 +1,49 @@
+"""A run finds itself in a map that was there before it."""
+
+import numpy as np
+import pytest
+from made_harbour import tour
+
+from mlsm_manager.multi_view.association import Pairs
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
+from mlsm_manager.multi_view.placement import place
+from node_support.geometry.planar import transformed
+
+HARBOUR = tour(4)
+PARAMETERS = MultiViewParameters(sonar=SonarCalibration(sonar_delay_deviation=0.01))
+SONAR = np.array([0.3, 0.0])
+
+
+def known_places():
+    return np.concatenate([scan.points[:, :2] for scan in tour(4, seed=1).scans])
+
+
+def pairs_with(known):
+    solver = LiveSolver(PARAMETERS, SONAR)
+    solver.add(HARBOUR.scans[0])
+    sources = place(solver.log, solver.state, solver.log.rows(0, 1))
+    return known.compared(sources, 2.2, SurfaceMatching()), sources
+
+
+@pytest.mark.parametrize("places", [np.empty((0, 2)), np.array([[1.0, 2.0]])])
+def test_a_map_without_a_line_is_compared_with_nothing(places):
+    (pairs, targets), _ = pairs_with(KnownSurfaces(places))
+    assert isinstance(pairs, Pairs)
+    assert len(pairs.rows) == len(targets) == 0
+
+
+def test_normals_of_the_map_point_as_those_of_the_scan():
+    (pairs, targets), sources = pairs_with(KnownSurfaces(known_places()))
+    assert len(pairs.rows) > 40
+    assert (np.einsum("na,na->n", sources.normals[pairs.rows], targets.normals[pairs.neighbours]) > 0.0).all()
+
+
+def test_a_run_that_starts_beside_its_map_is_drawn_onto_it():
+    shift = np.array([0.6, -0.4, 0.0])
+    known = KnownSurfaces(transformed(shift, known_places()))
+    solver = LiveSolver(PARAMETERS, SONAR, start=np.array([1.0, 1.0, 0.05]), known=known)
+    for scan in HARBOUR.scans:
+        estimate = solver.add(scan)
+    np.testing.assert_allclose(estimate.T_map_base - estimate.T_odom_base, shift, atol=0.1)
