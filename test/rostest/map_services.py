@@ -29,7 +29,8 @@ class MapServices(unittest.TestCase):
         """Insert the points and wait until the map shows them."""
         cls.folder = Path(rospy.get_param("~folder"))
         points = np.array([[0.1, 0.1, z, 100] for z in np.arange(0, 3, 0.2)] + [[5.1, 5.1, 0, 90]], np.float32)
-        cloud = IntensityCloud(points, np.full(len(points), -1.0), 10**9, "odom")
+        now = rospy.Time.now()
+        cloud = IntensityCloud(points, np.full(len(points), -now.to_sec()), now.to_nsec(), "odom")
         cls.publisher = rospy.Publisher("/sonar/scan/cleaned", StampedIntensityCloud, queue_size=1)
         wait_for_publisher_links(cls.publisher, 1)
         cls.publisher.publish(cloud_to_message(cloud))

@@ -12,6 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 import rosbag
+import yaml
+
+from mlsm_manager.offline.live_file import replay_values
 
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
@@ -62,7 +65,21 @@ def test_the_summary_has_the_promised_keys(basin):
     assert counts <= set(summary)
     for name in ("dead_reckoning", "corrected", "refined"):
         assert set(summary[name]) == {"mean", "sd", "max"}
-    assert summary["matched"] >= 8
+    assert summary["matched"] >= 5
+    assert set(summary["calibration"]) == {"range_scale", "sonar_delay", "odometry_scale", "odometry_direction"}
+    for check in summary["checks"].values():
+        assert set(check) == {"value", "limit", "fires", "meaning"}
+    assert all(deviation is None or deviation > 0.0 for deviation in summary["deviation_per_minute"])
+
+
+def test_a_run_without_doubts_says_so_in_its_last_figure(basin):
+    assert summary_of(basin)["trust"] == f"trust: all {len(summary_of(basin)['checks'])} checks are fine"
+
+
+def test_the_scan_by_scan_matcher_makes_no_checks(tmp_path):
+    done = run(BASIN, "--out", tmp_path, "--matcher", "DISTRIBUTIONS")
+    assert done.returncode == 0, done.stderr
+    assert not {"checks", "trust", "calibration"} & set(summary_of(tmp_path))
 
 
 def test_a_simulated_basin_is_mapped_where_it_is(basin):
@@ -71,16 +88,15 @@ def test_a_simulated_basin_is_mapped_where_it_is(basin):
     summary = summary_of(basin)
     assert summary["corrected"]["mean"] < 1.2
     assert summary["refined"]["mean"] < 1.0
-    assert summary["calibration"]["edge_half_width"] == 0.0
-    assert summary["calibration"]["mode"] == "MATCHED_FILTER"
+    assert summary["echoes"]["mode"] == "MATCHED_FILTER"
 
 
-def test_what_it_used_is_left_for_the_live_nodes_and_for_another_run(basin, tmp_path):
+def test_what_it_found_is_what_another_run_begins_with(basin, tmp_path):
     assert run(BASIN, "--out", tmp_path, "--parameters", basin / "live.yaml").returncode == 0
-    assert (tmp_path / "live.yaml").read_text() == (basin / "live.yaml").read_text()
-    tables = [np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True) for folder in (basin, tmp_path)]
-    for name in ("corrected_x", "corrected_y", "corrected_yaw"):
-        np.testing.assert_array_equal(tables[0][name], tables[1][name])
+    found, again = (summary_of(folder)["calibration"] for folder in (basin, tmp_path))
+    for name in ("range_scale", "sonar_delay"):
+        assert abs(again[name]["value"]) <= found[name]["deviation"], name
+        assert again[name]["deviation"] <= found[name]["deviation"], name
 
 
 def test_a_missing_bag_is_named(tmp_path):
@@ -119,8 +135,11 @@ def test_parameters_of_a_file_are_taken_and_held(tmp_path):
     (tmp_path / "mine.yaml").write_text("sonar_delay: 0.25\nmin_points: 20\n")
     done = run(BASIN, "--out", tmp_path / "out", "--parameters", tmp_path / "mine.yaml", "--set", "range_scale=0.99")
     assert done.returncode == 0, done.stderr
+    mine = replay_values(yaml.safe_load((tmp_path / "out/live.yaml").read_text()))
+    assert mine["min_points"] == 20
     calibration = summary_of(tmp_path / "out")["calibration"]
-    assert (calibration["sonar_delay"], calibration["range_scale"]) == (0.25, 0.99)
+    assert mine["sonar_delay"] == pytest.approx(0.25 + calibration["sonar_delay"]["value"], abs=1e-4)
+    assert mine["range_scale"] == pytest.approx(0.99 * (1.0 + calibration["range_scale"]["value"]), abs=1e-4)
 
 
 def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
