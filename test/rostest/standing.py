@@ -18,7 +18,6 @@ from underwater_map_construction.msg import StampedIntensityCloud
 
 SCANS = 4
 SECONDS = 16.0
-START = 1_400_000_000.0
 WALLS = [((-12, 12), (14, 12)), ((14, 12), (14, -10)), ((-10, -8), (-4, -10)), ((3, 6), (5, 8))]
 
 
@@ -33,8 +32,9 @@ class Standing(unittest.TestCase):
         publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
         wait_for_publisher_links(publisher, 1)
         cls.transforms.wait_for()
+        start = rospy.Time.now().to_sec()
         for turn in range(SCANS):
-            publisher.publish(cloud_to_message(scan(START + turn * SECONDS, 0.5 * (turn > 0))))
+            publisher.publish(cloud_to_message(scan(start + turn * SECONDS, 0.5 * (turn > 0))))
         cls.diagnostics.wait_for("mlsm_core", "scans in", SCANS)
         cls.publisher = publisher
 

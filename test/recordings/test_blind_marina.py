@@ -1,0 +1,53 @@
+"""The joint solver on the whole marina, whose truth is kept aside: nothing may hang on one bit."""
+
+import os
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.offline.echo_shape import EchoShape, suited
+from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+
+ROOT = Path(__file__).resolve().parents[2]
+# Longer than the solver's window, so that frozen scans take part.
+_SCANS = 80
+
+
+@pytest.fixture(scope="module")
+def recorded():
+    bag_recording = pytest.importorskip("mlsm_manager.ros.bag_recording")
+    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_whole_blind.bag"
+    if not bag.is_file():
+        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
+    recording = bag_recording.read_recording(bag, bag_recording.BagNames("/sonar/raw", "odom", "base_link", None))
+    parameters = suited(ReplayParameters(), EchoShape.PLATEAU, fixed=())
+    found = scans_of(recording, parameters.echoes())
+    scans = [scan for _, (scan, _) in zip(range(_SCANS), found)]
+    return recording, parameters, scans
+
+
+def path_of(recording, parameters, scans):
+    errors = parameters.part(OdometryErrors)
+    solver = LiveSolver(
+        parameters.solver_parameters(errors, parameters.range_scale_deviation), np.array(recording.sonar_in_base)
+    )
+    for scan in scans:
+        solver.add(scan)
+    return np.array([estimate.T_map_base for estimate in solver.estimates])
+
+
+def test_points_moved_by_a_nanometre_move_the_path_by_less_than_a_millimetre(recorded):
+    recording, parameters, scans = recorded
+    rng = np.random.RandomState(1)
+    moved = [replace(scan, points=scan.points + 1e-9 * rng.standard_normal(scan.points.shape)) for scan in scans]
+    distance = path_of(recording, parameters, moved) - path_of(recording, parameters, scans)
+    assert 0.0 < np.abs(distance[:, :2]).max() < 1e-3
+
+
+def test_the_same_scans_give_the_same_path_to_the_last_bit(recorded):
+    assert path_of(*recorded).tobytes() == path_of(*recorded).tobytes()

@@ -1,0 +1,120 @@
+"""The joint solver as the localiser sees it: matching on and off, lost and found, and clouds that wait."""
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, tour
+
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.timed_points import TimedPoints
+from node_support.errors import RefusedInput
+
+SCANS = tour(12).scans
+PARAMETERS = MlsmCoreParameters(
+    estimator=Estimator.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
+    speed_deviation=0.025, rate_time=12.0, heading_deviation=0.0175, size_x_meters=0.0, size_y_meters=0.0,
+)  # fmt: skip
+
+
+def localiser_after(count, **changes):
+    localiser = PARAMETERS.changed(changes).build_localiser(SONAR_IN_BASE)
+    return localiser, [localiser.take_scan(scan).scan for scan in SCANS[:count]]
+
+
+def test_no_scan_is_rejected_and_those_with_neighbours_give_a_fix():
+    _, updates = localiser_after(8)
+    assert all(update.accepted for update in updates)
+    assert updates[0].result is None
+    assert updates[-1].result.points_used > 100
+
+
+def test_the_map_has_all_points_of_all_scans():
+    localiser, _ = localiser_after(4)
+    assert localiser.blocks.mean[:, 3].min() > 0.0
+    assert localiser.block_count == len(localiser.blocks) > 100
+
+
+def test_matching_off_and_on_again_goes_on_from_the_same_place():
+    localiser, _ = localiser_after(6)
+    localiser.match(False)
+    localiser.take_scan(SCANS[6])
+    assert localiser.verdicts() == []
+    localiser.match(True)
+    update = localiser.take_scan(SCANS[7]).scan
+    assert np.hypot(*(update.belief.theta[:2] - SCANS[7].reference_pose[:2])) < 0.3
+
+
+def test_a_map_that_was_made_without_matching_is_matched_with():
+    localiser, _ = localiser_after(4, start_matching=False)
+    localiser.match(True)
+    assert localiser.take_scan(SCANS[4]).scan.result.points_used > 20
+
+
+def test_a_vehicle_that_was_found_again_goes_on_from_there():
+    localiser, _ = localiser_after(6)
+    update = localiser.relocalise()
+    assert update.accepted, update.result.reason
+    assert localiser.mapper.solver is None
+    found = localiser.take_scan(SCANS[6]).scan
+    assert found.result is not None
+    assert np.hypot(*(found.belief.theta[:2] - SCANS[6].reference_pose[:2])) < 0.5
+
+
+def test_a_jump_in_time_keeps_the_map_and_begins_at_the_odometry():
+    localiser, _ = localiser_after(6)
+    count = localiser.block_count
+    assert localiser.notice_time(0.0) > 0.0
+    assert (localiser.block_count, localiser.believed_until, localiser.mapper.solver) == (count, None, None)
+    np.testing.assert_array_equal(localiser.mapper.correction, np.zeros(3))
+
+
+def test_clear_forgets_everything():
+    localiser, _ = localiser_after(3)
+    localiser.clear()
+    assert (localiser.block_count, localiser.believed_until, localiser.verdicts()) == (0, None, [])
+    assert localiser.take_scan(SCANS[3]).scan.result is None
+
+
+def test_a_cloud_waits_for_the_scan_of_its_time():
+    localiser, _ = localiser_after(2, map_input=MapInput.CLEANED)
+    cloud = TimedPoints.of_scan(SCANS[2])
+    assert localiser.take_cloud(cloud).waiting
+    (waited,) = localiser.take_scan(SCANS[2]).clouds
+    assert waited.report.inserted == len(cloud)
+
+
+def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
+    localiser = PARAMETERS.changed({"map_input": MapInput.CLEANED}).build_localiser(SONAR_IN_BASE)
+    localiser.take_scan(SCANS[5])
+    early = TimedPoints.of_scan(SCANS[3])
+    assert localiser.take_cloud(early).report.inserted == len(early)
+    low, high = early.points[:, :2].min(axis=0), early.points[:, :2].max(axis=0)
+    assert (localiser.blocks.mean[:, :2] >= low - 1e-6).all()
+    assert (localiser.blocks.mean[:, :2] <= high + 1e-6).all()
+
+
+def test_a_long_silence_is_followed_by_the_odometry():
+    localiser, _ = localiser_after(3)
+    later = SCANS[8].reference_time
+    localiser.follow(SCANS[8].track, later)
+    assert localiser.believed_until == later
+    update = localiser.take_scan(SCANS[9]).scan
+    assert np.hypot(*(update.belief.theta[:2] - SCANS[9].reference_pose[:2])) < 0.5
+
+
+def test_a_scan_that_comes_twice_is_refused_and_the_run_goes_on():
+    localiser, _ = localiser_after(3)
+    with pytest.raises(RefusedInput, match="the one before at"):
+        localiser.take_scan(SCANS[2])
+    assert localiser.take_scan(SCANS[3]).scan.accepted
+
+
+def test_a_run_says_whether_it_can_be_trusted():
+    localiser, _ = localiser_after(6)
+    assert [verdict.fires for verdict in localiser.verdicts()] == [False, False]
+
+
+def test_late_beams_make_it_wait_for_odometry():
+    assert localiser_after(0)[0].lookahead == 0.0
+    assert localiser_after(0, sonar_delay_deviation=0.1)[0].lookahead == pytest.approx(0.3)
