@@ -84,9 +84,9 @@ def test_the_demo_maps_until_it_is_interrupted(prefix):
     reader = threading.Thread(target=lambda: output.extend(demo.stdout), daemon=True)
     reader.start()
     try:
-        listen = "timeout 40 rostopic echo -n 1 /MLSM/cloud/width"
+        listen = 'timeout 40 rostopic echo -n 1 --noarr --filter "m.width > 100" /MLSM/cloud'
         told = _run(prefix, f"bash -c 'until rostopic list >/dev/null 2>&1; do sleep 0.2; done; {listen}'")
-        width = int(re.search(r"^\d+$", told, re.MULTILINE)[0])
+        width = int(re.search(r"^width: (\d+)$", told, re.MULTILINE)[1])
     finally:
         demo.send_signal(signal.SIGINT)
         demo.wait(timeout=20)

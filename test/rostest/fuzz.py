@@ -99,7 +99,7 @@ class Fuzz(unittest.TestCase):
     def _expect_a_scan(self) -> None:
         """Send good beams far away from all others until the map has them."""
         rospy.Publisher("/startMatching", Bool, queue_size=1, latch=True).publish(Bool(False))
-        for service in ("/mlsm_core/reset",):
+        for service in ("/mlsm_core/reset_map",):
             rospy.wait_for_service(service, timeout=20.0)
             rospy.ServiceProxy(service, Trigger)()
         transforms = tf2_ros.StaticTransformBroadcaster()

@@ -83,4 +83,5 @@ class KeyframeMap:
         self.map.insert_blocks(self._covered)
 
     def _cells(self) -> np.ndarray:
-        return np.unique(self._above.cells, axis=0)
+        # Without blocks numpy 1.17 cannot tell their rows apart.
+        return np.unique(self._above.cells, axis=0) if len(self._above) else self._above.cells
