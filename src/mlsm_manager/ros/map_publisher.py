@@ -29,16 +29,18 @@ _MOST_TIME = 0.1
 class _WholeMap(rospy.SubscribeListener):
     """A topic that carries the whole map in each message: built only for those who listen, and not all the time."""
 
-    def __init__(self, topic: str, kind: Any, build: Callable[[], Any], health: Health) -> None:
+    def __init__(self, topic: str, kind: Any, build: Callable[[], Any], localiser: Localiser, health: Health) -> None:
         self._build = build
+        self._localiser = localiser
         self._next = 0.0
         self._is_due = False
         self._guarded = guarded(health, self._send)
         self._publisher = rospy.Publisher(topic, kind, subscriber_listener=self, queue_size=2)
 
     def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], peer_publish: Callable[[Any], None]) -> None:
-        """Send all to who comes."""
-        self._guarded(peer_publish)
+        """Send all to who comes, once there is something."""
+        if self._localiser.block_count:
+            self._guarded(peer_publish)
 
     def change(self) -> None:
         """Remember that the map changed."""
@@ -109,11 +111,11 @@ class MapPublisher:
         self._stamp_ns = 0
         self._tiles = _Tiles(parameters, localiser, health)
         self._whole = [
-            _WholeMap(topics.MAP_CLOUD, PointCloud2, self._cloud, health),
-            _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, health),
+            _WholeMap(topics.MAP_CLOUD, PointCloud2, self._cloud, localiser, health),
+            _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, localiser, health),
         ]
         if has_octomap_messages():
-            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, health))
+            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, localiser, health))
 
     def change(self, stamp_ns: Optional[int] = None) -> None:
         """Remember that the map changed, by a cloud with this stamp where there is one."""
