@@ -1,12 +1,12 @@
 """The joint solver as a ScanMapper: scans in, a map drawn from keyframes and the vehicle's place in it out."""
 
 from collections import deque
-from dataclasses import dataclass, replace
 from time import perf_counter
 from typing import Deque, List, Mapping, Optional, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.mapper import (
     MOST_WAITING,
@@ -22,7 +22,6 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, pre
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import MOTION, POSE, RATE, STATES
-from mlsm_manager.multi_view.drawing import corrected_path, drawn
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
@@ -41,42 +40,6 @@ _PATH_POINTS = 17
 _ORIGIN = np.zeros(3)
 # Scans that are checked for their agreement with the map: about the window of the solver.
 _CHECKED_SCANS = 20
-
-
-@dataclass
-class _Session:
-    """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small."""
-
-    solver: LiveSolver
-    T_map_odom: np.ndarray
-
-    def add(self, scan: Scan) -> LiveEstimate:
-        return self.solver.add(self._moved(scan))
-
-    def follow(self, track: Track, time: float) -> None:
-        self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
-
-    def place(self, cloud: TimedPoints) -> np.ndarray:
-        points = transformed(self.T_map_odom, cloud.points)
-        return drawn(self.solver.log, self.solver.state, points, cloud.times)
-
-    def path(self, times: np.ndarray) -> np.ndarray:
-        return corrected_path(self.solver.log, self.solver.state, times)
-
-    @property
-    def start(self) -> float:
-        """Time [s] from which on the run knows the odometry; it begins with the first scan."""
-        return float(self.solver.log.node_times[0])
-
-    @property
-    def settled_until(self) -> float:
-        """Time [s] of the oldest node that may still move."""
-        times = self.solver.log.node_times
-        return float(times[max(0, len(times) - 1 - self.solver.parameters.window.free_nodes)])
-
-    def _moved(self, scan: Scan) -> Scan:
-        track = _moved_track(scan.track, self.T_map_odom)
-        return replace(scan, points=transformed(self.T_map_odom, scan.points), track=track)
 
 
 class JointMapper:
@@ -106,7 +69,7 @@ class JointMapper:
 
     def clear(self) -> None:
         """Forget the map and the place in it."""
-        self._session: Optional[_Session] = None
+        self._session: Optional[JointSession] = None
         self._shown = self._new_map(self.settings.resolution, self.settings.expected_blocks)
         self._matched = self._new_map(self.settings.match_resolution, 0)
         self._free = MultiLevelSurfaceMap(self.settings.resolution, self.settings.limit)
@@ -262,10 +225,10 @@ class JointMapper:
         self._matched.insert(transformed(self.correction, scan.points))
         return ScanUpdate(scan, None, True, self.belief)
 
-    def _new_session(self) -> _Session:
+    def _new_session(self) -> JointSession:
         known = KnownSurfaces(self._matched.map.blocks.mean[:, :2]) if len(self._matched.map) else None
         solver = LiveSolver(self.parameters, self._sonar_in_base, self._start, known)
-        return _Session(solver, self.correction.copy())
+        return JointSession(solver, self.correction.copy())
 
     def _end_session(self) -> None:
         if self._session is not None:
@@ -298,9 +261,3 @@ def _correction(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
     correction = composed(T_map_base, inverse(scan.reference_pose))
     correction[2] = wrapped(correction[2])
     return correction
-
-
-def _moved_track(track: Track, T_map_odom: np.ndarray) -> Track:
-    if not T_map_odom.any():
-        return track
-    return Track(track.times, composed(T_map_odom, track.poses))

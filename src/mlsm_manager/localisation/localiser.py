@@ -4,7 +4,7 @@ import threading
 import time as wall
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Callable, List, Mapping, Optional, Protocol, Tuple
+from typing import Any, Callable, List, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -12,13 +12,12 @@ from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
+from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
-from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
@@ -32,82 +31,6 @@ class MapInput(Enum):
 
     CLEANED = "CLEANED"
     MATCHED = "MATCHED"
-
-
-class ScanMapper(Protocol):
-    """Finds the poses of scans and draws the map. `Mapper` does it scan by scan, with a matcher.
-
-    A solver over many scans can take its place: it may change the poses of earlier scans with each one that it takes,
-    as long as `belief`, `blocks` and the places of clouds are what it knows at the time they are asked for.
-    """
-
-    matching: bool
-    matcher: Matcher
-    errors: OdometryErrors
-    belief: Optional[Belief]
-    correction: np.ndarray
-
-    @property
-    def lookahead(self) -> float:
-        """Seconds of odometry after the end of a scan that its track should hold."""
-
-    def mount(self, sonar_in_base: np.ndarray) -> None:
-        """Learn where the sonar is in base_link, (2,) m."""
-
-    def verdicts(self) -> List[Verdict]:
-        """What the run says of itself, without any truth."""
-
-    @property
-    def blocks(self) -> Blocks:
-        """The map that is shown and saved."""
-
-    @property
-    def block_count(self) -> int:
-        """Number of those blocks, without a copy of them."""
-
-    @property
-    def target(self) -> BlockSource:
-        """The map in which a lost vehicle is searched."""
-
-    @property
-    def layers(self) -> Mapping[Layer, Blocks]:
-        """Copies of all maps, to be stored, each made when it is asked for."""
-
-    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
-        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
-
-    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
-        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
-
-    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
-        """Take stored maps in the place of the present ones; raises ValueError for other resolutions."""
-
-    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
-        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
-
-    def take_echoes(self, scan: Scan) -> ScanUpdate:
-        """Find the pose of a scan, and keep the scan where that holds."""
-
-    def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
-        """Take a match that was made elsewhere as the pose of a scan."""
-
-    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
-        """Insert a cloud, or let it wait until the pose of its time is known."""
-
-    def take_placed(self, points: np.ndarray) -> CloudUpdate:
-        """Insert points (n, 4) that are in map already."""
-
-    def take_waiting(self) -> Optional[CloudUpdate]:
-        """Insert the next cloud that waited; None when none can be inserted now."""
-
-    def follow(self, track: Track, time: float) -> None:
-        """Bring the belief to a later `time` by the odometry alone."""
-
-    def forget_place(self) -> None:
-        """Keep the map, forget the pose."""
-
-    def clear(self) -> None:
-        """Forget map and pose."""
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,11 @@ import numpy as np
 
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
-from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput, ScanMapper
+from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
 from mlsm_manager.localisation.mapper import Mapper, MapSettings
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
+from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors

@@ -6,8 +6,9 @@ from typing import Callable, List, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.localisation.joint_mapper import JointMapper
-from mlsm_manager.localisation.localiser import Localiser, ScanMapper
+from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.offline.recording import Recording

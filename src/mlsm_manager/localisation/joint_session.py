@@ -1,0 +1,58 @@
+"""One run of the joint solver in the map."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.drawing import corrected_path, drawn
+from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from node_support.geometry.planar import composed, transformed
+
+
+@dataclass
+class JointSession:
+    """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small."""
+
+    solver: LiveSolver
+    T_map_odom: np.ndarray
+
+    def add(self, scan: Scan) -> LiveEstimate:
+        """Take the next scan; see LiveSolver.add."""
+        return self.solver.add(self._moved(scan))
+
+    def follow(self, track: Track, time: float) -> None:
+        """Learn the odometry up to `time` [s], which `track` holds."""
+        self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
+
+    def place(self, cloud: TimedPoints) -> np.ndarray:
+        """Return the points (n, 4) of a cloud in map, as they are known now."""
+        points = transformed(self.T_map_odom, cloud.points)
+        return drawn(self.solver.log, self.solver.state, points, cloud.times)
+
+    def path(self, times: np.ndarray) -> np.ndarray:
+        """Return T_map_base (m, 3) at `times` (m,) [s]."""
+        return corrected_path(self.solver.log, self.solver.state, times)
+
+    @property
+    def start(self) -> float:
+        """Time [s] from which on the run knows the odometry; it begins with the first scan."""
+        return float(self.solver.log.node_times[0])
+
+    @property
+    def settled_until(self) -> float:
+        """Time [s] of the oldest node that may still move."""
+        times = self.solver.log.node_times
+        return float(times[max(0, len(times) - 1 - self.solver.parameters.window.free_nodes)])
+
+    def _moved(self, scan: Scan) -> Scan:
+        track = _moved_track(scan.track, self.T_map_odom)
+        return replace(scan, points=transformed(self.T_map_odom, scan.points), track=track)
+
+
+def _moved_track(track: Track, T_map_odom: np.ndarray) -> Track:
+    if not T_map_odom.any():
+        return track
+    return Track(track.times, composed(T_map_odom, track.poses))
