@@ -86,7 +86,9 @@ class GazeboSonar(unittest.TestCase):
         nan.points[3].x = math.nan
         away = laser_scan(header(203.0, "sonar"), BEAM, 5, WALL)
         away.angle_min, away.angle_max = 1.0, 1.0 + BEAM
-        bad = [(String, String("rays")), (LaserScan, LaserScan()), (PointCloud, PointCloud()), (PointCloud2, cut),
+        stamped = header(204.0, "sonar")
+        nothing = LaserScan(header=stamped), PointCloud(header=stamped)
+        bad = [(String, String("rays")), (LaserScan, nothing[0]), (PointCloud, nothing[1]), (PointCloud2, cut),
                (PointCloud, nan), (LaserScan, away)]  # fmt: skip
         for number, (kind, message) in enumerate(bad, 1):
             rays = _publisher("/sonar/rays", kind)
