@@ -4,7 +4,6 @@ import numpy as np
 
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.parameters import SonarCalibration
-from mlsm_manager.multi_view.state import Layout
 
 _HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 
@@ -16,13 +15,6 @@ def add_belief(
     columns = start + np.arange(len(value))[:, np.newaxis]
     weight = np.maximum(deviation, _HELD_DEVIATION) ** -2.0
     equations.add(columns, np.ones((len(value), 1)), value - mean, weight)
-
-
-def add_run_belief(
-    equations: NormalEquations, layout: Layout, run: np.ndarray, mean: np.ndarray, deviation: np.ndarray
-) -> None:
-    """Add what is believed of the run's unknowns (2,)."""
-    add_belief(equations, layout.run_start, run, mean, deviation)
 
 
 def run_mean(sonar: SonarCalibration) -> np.ndarray:
