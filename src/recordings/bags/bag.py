@@ -1,7 +1,5 @@
 """Reads bags: ROS 1 files, and ROS 2 folders or single files (sqlite3, mcap)."""
 
-import sqlite3
-import struct
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,21 +7,12 @@ from typing import Any, Dict, Iterator, List, Tuple, Union
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader as Ros1Reader
-from rosbags.rosbag1 import ReaderError as Ros1Error
 from rosbags.rosbag2 import Reader as Ros2Reader
-from rosbags.rosbag2 import ReaderError as Ros2Error
-from rosbags.typesys.base import TypesysError
 from rosbags.typesys.store import Typestore
 
 from recordings.bags.message_types import defined_in, ros2_types
 from recordings.bags.single_file import LONE_FILES, folder_of
 from recordings.errors import RecordingError
-
-# What rosbags, its decompressors and the system raise for a damaged file.
-_DAMAGES = (
-    Ros1Error, Ros2Error, TypesysError, AssertionError, struct.error, sqlite3.Error, EOFError, LookupError, MemoryError,
-    OverflowError, RuntimeError, TypeError, ValueError,
-)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -113,14 +102,14 @@ def _reader(path: Path, stack: ExitStack) -> Union[Ros1Reader, Ros2Reader]:
 
 @contextmanager
 def _told(path: Path) -> Iterator[None]:
-    """Turn whatever a damaged file leads to into one line."""
+    """Turn what a damaged file leads to into one line: rosbags and its decompressors raise almost any error."""
     try:
         yield
     except RecordingError:
         raise
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
-    except _DAMAGES as error:
+    except Exception as error:
         if "not indexed" in str(error):
             told = f"{path}: not indexed, the recording was cut off; run: rosbag reindex {path}"
             raise RecordingError(told) from None
