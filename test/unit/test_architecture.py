@@ -16,7 +16,8 @@ SOURCES = Path(__file__).resolve().parents[2] / "src"
 ALLOWED = {
     "node_support": set(),
     "dead_reckoning": {"node_support"},
-    "imagenex_852_driver": {"node_support"},
+    "sonar_driver": {"node_support"},
+    "imagenex_852_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
     "mlsm_manager": {"node_support", "sonar_processing"},
     "sonar_simulator": {"node_support", "sonar_processing"},
