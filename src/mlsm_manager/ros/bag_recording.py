@@ -18,7 +18,8 @@ from node_support.errors import RefusedInput
 from node_support.ros.conversions import matrix_from_message
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.ros.conversions import beam_from_message
+from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.messages.reader import BeamReader
 from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
@@ -124,29 +125,30 @@ def _beams(bag: rosbag.Bag, buffer: tf2_py.BufferCore, path: Path, names: BagNam
     moving_state, parameters = MovingState(), SonarToCloudParameters()
     velocities = iter(_messages(bag, _VELOCITY_TOPIC))
     velocity = next(velocities, None)
+    reader = BeamReader(BeamMessageParameters())
     placed, unplaced, reason = [], 0, ""
     for time, message in _messages(bag, names.beams):
         while velocity is not None and velocity[0] <= time:
             _take_velocity(moving_state, velocity[1])
             velocity = next(velocities, None)
-        beam = _beam(message)
-        matrix = None
-        if beam is not None:
+        beams = _beams_of(reader, message)
+        unplaced += not beams
+        for beam in beams:
             matrix, reason = _matrix(buffer, names.odom_frame, beam.frame_id, beam.stamp_ns)
-        if matrix is None:
-            unplaced += 1
-        else:
-            placed.append(PlacedBeam(beam, matrix, moving_state.is_moving(parameters)))
+            if matrix is None:
+                unplaced += 1
+            else:
+                placed.append(PlacedBeam(beam, matrix, moving_state.is_moving(parameters)))
     if not placed:
         raise RecordingError(f"{path}: none of {unplaced} beams could be placed in {names.odom_frame}: {reason}")
     return sorted(placed, key=lambda one: one.beam.stamp_ns), unplaced
 
 
-def _beam(message: Any) -> Optional[Beam]:
+def _beams_of(reader: BeamReader, message: Any) -> List[Beam]:
     try:
-        return beam_from_message(message)
+        return reader.read(message._type, message).beams
     except RefusedInput:
-        return None
+        return []
 
 
 def _take_velocity(moving_state: MovingState, message: Any) -> None:
