@@ -13,6 +13,7 @@ from sonar_processing.cloud_sink import CloudSink
 from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.publishers import CloudPublisher, PointsPublisher
 from sonar_processing.ros.revolution_publisher import RevolutionPublisher
+from sonar_processing.ros.sonar_mount import SonarMount
 from sonar_processing.ros.subscribers import subscribe_to_velocity
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_processing.scans.assembler import ScanAssembler
@@ -46,7 +47,11 @@ class SonarToCloud:
         self._revolutions = RevolutionPublisher(self.health, polar_sink)
         parameters = self._live.current
         self._filter = TransformFilter(
-            parameters.target_frame, self.health, self._forget_scan, parameters.stamp_tolerance
+            parameters.target_frame,
+            self.health,
+            self._forget_scan,
+            parameters.stamp_tolerance,
+            SonarMount(parameters, self.health.name),
         )
         self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)
