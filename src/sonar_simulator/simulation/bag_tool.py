@@ -16,6 +16,11 @@ from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
 
+def run_simulate_bag() -> None:
+    """Run simulate_bag with the command line."""
+    sys.exit(main(sys.argv[1:]))
+
+
 def main(arguments: List[str]) -> int:
     """Write the bag that a command line asks for; return the exit status. An error is reported in one line."""
     options = parse(arguments)
