@@ -11,6 +11,7 @@ from mlsm_manager.offline.evaluation import aligned_truth, position_error
 from mlsm_manager.offline.picture import Doubts, Path2d, draw_map
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.trust import Trust
+from mlsm_manager.offline.tum_files import tum_files
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
 from mlsm_manager.surface_map.storage import write_ply
@@ -47,10 +48,12 @@ class Run:
 
 
 def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
-    """Write map.mlsm, map.ply, map.png and trajectory.csv, each whole or not at all; raises OSError."""
+    """Write map.mlsm, map.ply, map.png, trajectory.csv and the .tum files, each whole or not at all; raises OSError."""
     write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
     write_trajectory(folder / "trajectory.csv", run.times, run.poses)
+    for path, text in tum_files(run.times, run.poses, recording.truth).items():
+        write_whole(folder / path, text.encode("ascii"))
     draw_map(folder / "map.png", name, run.blocks, [], _paths(run, recording), _doubts(run))
 
 
