@@ -11,6 +11,7 @@ from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support import topics
+from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
 
 
@@ -19,7 +20,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
-    parser = argparse.ArgumentParser("map_bag", description="Map a recording without a ROS master.")
+    parser = CommandLine("map_bag", description="Map a recording without a ROS master.")
     parser.add_argument(
         "bags", type=Path, nargs="+", metavar="bag",
         help="recording with beams and tf (odom, base_link, sonar); each further one starts in the map of those before",
