@@ -12,6 +12,11 @@ _PROBLEMS = {
     "timeouts": ("timeouts", "no reply; check the head's power, the cable, baud_rate and head_id"),
     "bad_frames": ("bad frames", "a broken reply; check the cable"),
     "unexpected_replies": ("unexpected replies", "a reply came late or twice and was dropped"),
+    "early_replies": (
+        "early replies",
+        "a reply came before the sound can have returned and was dropped; check speed_of_sound, baud_rate and whether "
+        "another head is on the line",
+    ),
     "overruns": ("overruns", "the head lost characters of a command"),
     "rejected_switches": ("rejected switches", "the head did not accept the switches of a command"),
 }

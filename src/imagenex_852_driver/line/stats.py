@@ -11,7 +11,8 @@ class DeviceStats:
 
     `timeouts`: nothing was received. `bad_frames`: something was received, but no valid answer. `interrupted`: the
     port was lost or the driver stopped before the answer. `unexpected_replies`: whole replies that answered no
-    outstanding command, late or sent twice; they are dropped. `overruns` and `rejected_switches` are reported by
+    outstanding command, late or sent twice. `early_replies`: whole replies that began before the sound of the
+    outstanding command can have returned. Both are dropped. `overruns` and `rejected_switches` are reported by
     the head in replies that are otherwise valid. `parser` holds the parser's own counts.
     """
 
@@ -22,6 +23,7 @@ class DeviceStats:
     bad_frames: int = 0
     interrupted: int = 0
     unexpected_replies: int = 0
+    early_replies: int = 0
     overruns: int = 0
     rejected_switches: int = 0
     connections: int = 0
