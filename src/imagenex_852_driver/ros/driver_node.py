@@ -13,6 +13,7 @@ from imagenex_852_driver.line.scanner import Scanner
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.ros.messages import scan_line
 from node_support import topics
+from node_support.headers import check_stamp
 from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import StartError, guarded
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
@@ -72,6 +73,7 @@ class DriverNode:
 
     def _publish(self, ping: Ping) -> None:
         parameters = self._live.current
+        check_stamp(round(ping.stamp * 1e9))
         message = scan_line(
             ping.stamp,
             ping.reply,
