@@ -10,12 +10,13 @@ from typing import List
 
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
-from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FaultRates
+from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.scanner import Scanner
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol.settings import HeadSettings
+from sonar_driver.emulator import EchoSource, Fault, FaultInjector
+from sonar_driver.line.scanner import Scanner
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
 WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
@@ -67,11 +68,11 @@ class Account:
     seconds: float
 
 
-def fault_rates(rate: float, reply_margin: float) -> FaultRates:
+def fault_rates(rate: float, reply_margin: float) -> FaultRates852:
     """Return `rate` for every fault; late replies come after the driver's wait, `reply_margin` s, is over."""
     names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
     lasting = {"lateness": reply_margin + LATENESS, "silence_duration": 0.2, "absence_duration": 0.05}
-    return FaultRates(**dict.fromkeys(names, rate), **lasting)
+    return FaultRates852(**dict.fromkeys(names, rate), **lasting)
 
 
 def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.1) -> Account:
@@ -81,11 +82,13 @@ def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.1) ->
     faults = RecordingInjector(fault_rates(rate, reply_margin), seed, commands, stop)
     connection = ConnectionParameters(reply_margin=reply_margin, late_window=2 * LATENESS, byte_gap=reply_margin / 2)
     timing = connection.timing()
-    line = VirtualLine(EmulatedHead(NumberedEchoes(), faults, timing), timing, time)
+    line = VirtualLine(Emulated852(NumberedEchoes(), faults, timing), timing, time)
     device = SonarDevice(connection, stop, time.elapsed, time.elapsed, line.open)
     delivered: List[int] = []
     scanner = Scanner(
-        device, HeadSettings(max_range=50), lambda ping: delivered.append(int.from_bytes(ping.reply.echoes[:4], "big"))
+        device,
+        HeadSettings(max_range=50).command(),
+        lambda ping: delivered.append(int.from_bytes(ping.reply.echoes[:4], "big")),
     )
     scanner.connect()
     scanner.run()

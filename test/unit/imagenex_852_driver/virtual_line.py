@@ -4,10 +4,9 @@ import threading
 from collections import deque
 from typing import Deque, Optional
 
-from imagenex_852_driver.emulator import EmulatedHead
-from imagenex_852_driver.emulator.head import Transmission
-from imagenex_852_driver.line.port import READ_TIMEOUT, PortUnavailableError
 from imagenex_852_driver.line.timing import LineTiming
+from sonar_driver.emulator import EmulatedHead, Transmission
+from sonar_driver.line.port import READ_TIMEOUT, PortUnavailableError
 
 
 class VirtualTime:
@@ -52,11 +51,12 @@ class VirtualLine:
         """Lose what nobody has read."""
         self._arrived.clear()
 
-    def write(self, data: bytes) -> None:
+    def write(self, data: bytes) -> int:
         """Hand a command to the head, which acts when its last byte has arrived."""
         self._check_present()
         arrival = self._time.now + self._timing.transmission(len(data))
         self._outgoing.extend(self._head.receive(data, arrival))
+        return len(data)
 
     @property
     def in_waiting(self) -> int:
@@ -65,7 +65,7 @@ class VirtualLine:
         self._deliver()
         return len(self._arrived)
 
-    def read(self, size: int) -> bytes:
+    def read(self, size: int = 1) -> bytes:
         """Return `size` bytes, or what has come until the timeout."""
         deadline = self._time.now + READ_TIMEOUT
         while self.in_waiting < size and self._outgoing and self._outgoing[0].time <= deadline:
