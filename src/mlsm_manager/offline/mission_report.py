@@ -7,12 +7,12 @@ import numpy as np
 from mlsm_manager.localisation.mapper import ScanUpdate
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.drawing import drawn
+from mlsm_manager.offline.evaluation import aligned_truth
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.run_files import COLORS, LABELS, ODOMETRY, TRUTH_COLOR, Run
-from mlsm_manager.offline.evaluation import aligned_truth
 from mlsm_manager.report.mission import Mission, Path, ScanRecord, Uncertainty
 from node_support.geometry.planar import composed, inverse, transformed
 
@@ -70,9 +70,7 @@ def _facts(recording: Recording, run: Run) -> Dict[str, str]:
     }
 
 
-def _scan_records(
-    recording: Recording, replayed: Replayed, refined: Optional[Refined], run: Run
-) -> List[ScanRecord]:
+def _scan_records(recording: Recording, replayed: Replayed, refined: Optional[Refined], run: Run) -> List[ScanRecord]:
     stamps = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
     pace = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
     records, before = [], 0

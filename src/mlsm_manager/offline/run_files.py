@@ -20,6 +20,7 @@ from node_support.geometry.planar import wrapped
 ODOMETRY = "dead_reckoning"
 CORRECTED = "corrected"
 REFINED = "refined"
+REPORT = "report.html"
 LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
 COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}

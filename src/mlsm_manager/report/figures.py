@@ -11,10 +11,13 @@ from mlsm_manager.report.mission import Mission, Path, Uncertainty
 SCAN_TRACE = "scan at the chosen time"
 VEHICLE_TRACE = "vehicle at the chosen time"
 _MOST_ELLIPSES = 60  # more would hide the path
+_MOST_BLOCKS = 100_000  # in 3-D: with more, computers without a graphics card can hardly turn the view
 _MOST_PATH_POINTS = 5000  # of a path: more cannot be told apart on a screen
 _ELLIPSE_DEVIATIONS = 2.0
 _DOUBT = "#cc3377"
 _SCAN = "#e07b00"
+_LEAST_EXTENT = 0.08  # of the longest side: keeps a flat map from being a line
+_FULL_VIEW = 2.0  # plotly's unit of length: the longest side then fills the view
 _ELLIPSE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 25)
 
 
@@ -47,12 +50,20 @@ def map_from_above(mission: Mission) -> go.Figure:
 
 
 def map_in_3d(mission: Mission) -> go.Figure:
-    """Return all blocks as points at their means, coloured by height, and the best path."""
-    mean = mission.blocks.mean.astype(np.float32)
+    """Return the blocks as points at their means, and the best path.
+
+    Their colour is their height or, in a flat map, the number of their points.
+    """
+    step = max(1, -(-len(mission.blocks) // _MOST_BLOCKS))
+    blocks = mission.blocks.take(np.arange(0, len(mission.blocks), step))
+    mean = blocks.mean.astype(np.float32)
+    flat = not len(mean) or np.ptp(mean[:, 2]) < blocks.resolution
+    shade, told = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
+    name = "map" if step == 1 else f"map, one block of {step}"
     figure = go.Figure(
         go.Scatter3d(
-            x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name="map", hoverinfo="skip",
-            marker={"size": 1.5, "color": mean[:, 2], "colorscale": "Turbo", "colorbar": {"title": "z [m]"}},
+            x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
+            marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": told}},
         )
     )  # fmt: skip
     path = thinned(mission.best)
@@ -63,7 +74,13 @@ def map_in_3d(mission: Mission) -> go.Figure:
             line={"color": path.color, "width": 4},
         )
     )  # fmt: skip
-    figure.update_scenes(aspectmode="data", xaxis_title="x [m]", yaxis_title="y [m]", zaxis_title="z [m]")
+    places = np.concatenate([mean[:, :3], np.column_stack([path.poses[:, :2], height])])
+    extent = np.maximum(np.ptp(places, axis=0) / max(np.ptp(places, axis=0).max(), 1e-3), _LEAST_EXTENT) * _FULL_VIEW
+    figure.update_scenes(
+        aspectmode="manual", aspectratio=dict(zip("xyz", extent.tolist())),
+        camera={"eye": {"x": 0.0, "y": -1.3, "z": 1.4}},
+        xaxis_title="x [m]", yaxis_title="y [m]", zaxis_title="z [m]",
+    )  # fmt: skip
     return _laid_out(figure, 600)
 
 

@@ -37,8 +37,8 @@ def light_of_run(lights: "list[Light]") -> Light:
 
 
 def sentence(verdict: Verdict) -> str:
-    """Return what a check found, as one sentence."""
+    """Return what a check found, in words."""
     if np.isnan(verdict.value):
-        return f"{verdict.text}: the run is too short to tell."
+        return "The run is too short to tell."
     bound = "at least" if verdict.more_is_better else "at most"
-    return f"{verdict.text}: {verdict.value:.2f}, should be {bound} {verdict.limit:g}."
+    return f"{verdict.value:.2f}, should be {bound} {verdict.limit:g} ({verdict.text})"

@@ -40,14 +40,14 @@ def report_page(mission: Mission) -> str:
     """Return the page; it needs no other file and no network."""
     lights = [light_of(verdict) for verdict in mission.verdicts]
     of_run = light_of_run(lights)
-    checks = [(_lamp(light), escape(verdict.name), escape(sentence(verdict)), light.value)
+    checks = [(_lamp(light), escape(verdict.question or verdict.name), escape(sentence(verdict)), light.value)
               for verdict, light in zip(mission.verdicts, lights)]  # fmt: skip
     return Template(PAGE).substitute(
         title=escape(mission.title),
         plotly=get_plotlyjs(),
         summary=f"{_lamp(of_run)} {_RUN_WORDS[of_run]}",
         facts=_table(("", ""), [(escape(name), escape(value)) for name, value in mission.facts.items()]),
-        checks=_table(("", "check", "what was found", ""), checks) if checks else "<p>No checks were made.</p>",
+        checks=_table(("", "question", "what was found", ""), checks) if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
         above=_figure(map_from_above(mission), "above"),
         solid=_figure(map_in_3d(mission), "solid"),

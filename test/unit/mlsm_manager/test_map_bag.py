@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +23,7 @@ pytest.importorskip("tf2_py")
 ROOT = Path(__file__).resolve().parents[3]
 BASIN = ROOT / "test/data/basin.bag"
 FILES = {"map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json"}
+FILES |= {"report.html"} if find_spec("plotly") else set()
 TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
 COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
 
