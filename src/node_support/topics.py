@@ -15,6 +15,9 @@ LASER_POINTS = "sonar/scan/laserCloud"
 LASER_SCANS = "sonar/scan/laserScan"
 """LaserScan: whole revolutions of the head as a planar laser would measure them."""
 
+TURNS = "sonar/scan/turn"
+"""PointCloud2 with a time per point: whole revolutions of the head, seen from the pose of the newest beam."""
+
 POLAR_SCANS = "sonar/scan/polar"
 """StampedIntensityCloud, organised: whole revolutions of the head, one row for each beam."""
 
