@@ -5,6 +5,7 @@ import time
 from argparse import Namespace
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Dict, List, Optional
 
 import numpy as np
@@ -16,6 +17,7 @@ from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
+from mlsm_manager.offline.mission_report import mission_of
 from mlsm_manager.offline.north_east_down import suspicions
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
@@ -25,6 +27,7 @@ from mlsm_manager.offline.run_files import (
     CORRECTED,
     ODOMETRY,
     REFINED,
+    REPORT,
     Run,
     errors_of,
     write_run,
@@ -32,6 +35,7 @@ from mlsm_manager.offline.run_files import (
     write_trajectory,
 )
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
+from mlsm_manager.report.mission import Mission
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
@@ -90,7 +94,19 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         **errors_of(run, recording),
     }
     write_summary(options.out, summary)
+    errors, title = errors_of(run, recording), " ".join(bag.name for bag in options.bags)
+    _write_report(options.out, mission_of(title, recording, replayed, refined, run, found, errors, known.to_mapping()))
     return summary
+
+
+def _write_report(folder: Path, mission: Mission) -> None:
+    """Write report.html where plotly is installed, else say what to install."""
+    try:
+        from mlsm_manager.report.page import write_report
+    except ImportError:
+        print("map_bag: report.html needs plotly; install it with: pip install plotly", file=sys.stderr)
+        return
+    write_report(folder / REPORT, mission)
 
 
 def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
@@ -175,4 +191,7 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
     if "trust" in summary:
         lines.append(summary["trust"])
-    return [*lines, f"in {options.out}: map.mlsm map.ply map.png trajectory.csv *.tum live.yaml summary.json"]
+    files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]
+    if (options.out / REPORT).exists():
+        files.append(REPORT)
+    return [*lines, f"in {options.out}: {' '.join(files)}"]

@@ -10,6 +10,7 @@ from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
 from recordings.reading.arguments import add_reading_arguments, request_of
 from recordings.reading.parameters import ReadingParameters
@@ -20,7 +21,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
-    parser = argparse.ArgumentParser("map_bag", description="Map a recording without a ROS master.")
+    parser = CommandLine("map_bag", description="Map a recording without a ROS master.")
     parser.add_argument(
         "bags", type=Path, nargs="+", metavar="bag",
         help="recording: a bag of ROS 1 or ROS 2, or the log of a sonar's maker; each further one starts in the map of "

@@ -21,10 +21,11 @@ from node_support.geometry.planar import wrapped
 ODOMETRY = "dead_reckoning"
 CORRECTED = "corrected"
 REFINED = "refined"
-_LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
-_COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
+REPORT = "report.html"
+LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
+COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
-_TRUTH_COLOR = "#111111"
+TRUTH_COLOR = "#111111"
 # More would hide the path.
 _MOST_ELLIPSES = 40
 
@@ -97,7 +98,7 @@ def _doubts(run: Run) -> Optional[Doubts]:
 
 
 def _paths(run: Run, recording: Recording) -> List[Path2d]:
-    paths = [Path2d(poses[:, :2], _LABELS[name], _COLORS[name]) for name, poses in run.poses.items()]
+    paths = [Path2d(poses[:, :2], LABELS[name], COLORS[name]) for name, poses in run.poses.items()]
     truth = _truth_path(run, recording)
     return paths if truth is None else [*paths, truth]
 
@@ -106,4 +107,4 @@ def _truth_path(run: Run, recording: Recording) -> Optional[Path2d]:
     if recording.truth is None:
         return None
     positions = aligned_truth(run.times, run.poses[ODOMETRY], recording.truth)
-    return Path2d(positions, "truth", _TRUTH_COLOR)
+    return Path2d(positions, "truth", TRUTH_COLOR)

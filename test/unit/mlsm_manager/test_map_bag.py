@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +25,7 @@ BASIN = ROOT / "test/data/basin.bag"
 FILES = {
     "map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json",
     "dead_reckoning.tum", "corrected.tum", "refined.tum", "truth.tum",
+    *(["report.html"] if find_spec("plotly") else []),
 }  # fmt: skip
 TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
 COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
