@@ -51,3 +51,8 @@ def test_a_simulated_bag_becomes_a_map(bag, tmp_path):
 def test_a_map_can_be_looked_at(bag, tmp_path):
     run("map_bag", bag, "--out", "map", "--no-calibrate", folder=tmp_path)
     assert "blocks" in run("map_tool", "info", "map/map.mlsm", folder=tmp_path)
+
+
+def test_a_bag_is_inspected_and_converted(bag, tmp_path):
+    assert "start with:" in run("map_bag", "--inspect", bag, folder=tmp_path)
+    assert "451 beams" in run("convert_bag", bag, "out.bag", folder=tmp_path)
