@@ -11,6 +11,7 @@ import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
@@ -60,8 +61,8 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth, options.ned)
     recording = read_recording(options.bags[0], names)
     options.out.mkdir(parents=True, exist_ok=True)
-    shape = echo_shape_of([placed.beam for placed in recording.beams])
-    parameters = suited(options.parameters, shape, options.fixed)
+    beams = [placed.beam for placed in recording.beams]
+    parameters = suited(options.parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
     recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)
