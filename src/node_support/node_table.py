@@ -208,6 +208,27 @@ NODES: Dict[str, NodeDescription] = {
             _serves("~get_region", "GetRegion", "returns the blocks in a box"),
         ),
     ),
+    "dead_reckoning": NodeDescription(
+        "Odometry for a vehicle without a DVL: adds up the velocity that the scans tell, or that the thrusters are "
+        "told, along the heading of a compass. See [dead_reckoning](dead_reckoning.md).",
+        (
+            _subscribes(topics.HEADING, "sensor_msgs/Imu", "orientation, x east or any fixed direction, z up"),
+            _subscribes(
+                topics.DEPTH,
+                "PoseWithCovarianceStamped, Float64 or FluidPressure",
+                "depth; `depth_type` sets the type",
+            ),
+            _subscribes(
+                topics.MATCHED_VELOCITY,
+                "geometry_msgs/TwistWithCovarianceStamped",
+                "velocity that mlsm_core estimates, if `velocity_source` is ESTIMATE",
+            ),
+            _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "velocity if `velocity_source` is COMMANDS"),
+            _subscribes("tf", "", "`base_link -> ` frame of the compass: how it is mounted"),
+            _publishes("tf", "", "`odom -> base_link` at each heading"),
+            _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "the same with the velocity"),
+        ),
+    ),
     "sonar_simulator": NodeDescription(
         "Simulates the vehicle Charl-e with a scanning sonar on a tilt servo, in a world from a file (thesis 6.4). It "
         "publishes `/clock`. The vehicle follows a script or `cmd_vel`; the odometry error is configurable. See "
@@ -218,6 +239,8 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(topics.SERVO_COMMANDS, "std_msgs/Float64", "goal of the servo, rad, positive down"),
             _publishes(topics.BEAMS, "SonarScanLine", "beams"),
             _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "dead reckoning with the configured errors; also as tf"),
+            _publishes(topics.HEADING, "sensor_msgs/Imu", "orientation, if `instruments` is COMPASS"),
+            _publishes(topics.DEPTH, "std_msgs/Float64", "depth, if `instruments` is COMPASS"),
             _publishes(topics.GROUND_TRUTH, "nav_msgs/Odometry", "the true pose and velocity"),
             _publishes(
                 topics.JOINT_STATES,

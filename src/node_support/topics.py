@@ -51,11 +51,17 @@ SERVO_COMMANDS = "sonar_servo/command"
 VELOCITY_COMMANDS = "cmd_vel"
 """Twist: where the vehicle shall go; taken for its velocity where nothing better is published."""
 
+HEADING = "imu"
+"""Imu: the orientation that a compass or an AHRS measures."""
+
+DEPTH = "depth"
+"""PoseWithCovarianceStamped, Float64 or FluidPressure: what a depth sensor measures."""
+
 VELOCITY = "velocity"
 """Twist: the velocity that the simulated vehicle measures."""
 
 ODOMETRY = "odom"
-"""Odometry: the simulated vehicle's dead reckoning."""
+"""Odometry: the vehicle's dead reckoning."""
 
 GROUND_TRUTH = "ground_truth"
 """Odometry: where the simulated vehicle truly is."""
@@ -89,6 +95,9 @@ MATCHED_POSE = "MLSM/pose"
 
 MATCHED_ODOMETRY = "MLSM/odometry"
 """Odometry: the vehicle in the map at the newest match."""
+
+MATCHED_VELOCITY = "MLSM/velocity"
+"""TwistWithCovarianceStamped: the vehicle's velocity along its own axes, as its scans tell it."""
 
 MATCHED_PATH = "MLSM/path"
 """Path: the vehicle in the map at all matches."""

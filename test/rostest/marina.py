@@ -17,10 +17,10 @@ from scipy.spatial import cKDTree
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
+from mlsm_manager.offline.bag_recording import BagNames, read_recording
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay import Replayed, replay
-from mlsm_manager.ros.bag_recording import BagNames, read_recording
 from node_support.geometry.planar import composed, wrapped
 from sonar_processing.beams.beam_correction import BeamCorrection
 

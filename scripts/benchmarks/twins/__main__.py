@@ -15,9 +15,9 @@ from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.path import live_path, solved_path
+from mlsm_manager.offline.bag_recording import BagNames, read_recording
 from mlsm_manager.offline.evaluation import position_error
 from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.ros.bag_recording import BagNames, read_recording
 from node_support.geometry.planar import inverse, transformed
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, ExtractionMode
 

@@ -5,13 +5,11 @@ import time
 from dataclasses import dataclass
 from typing import Callable, Iterator, Optional
 
-import serial
-
 from imagenex_852_driver.line.connection import ConnectionParameters
-from imagenex_852_driver.line.port import PortError, PortUnavailableError, open_port, port_losses
 from imagenex_852_driver.line.reply_wait import ReplyWait
-from imagenex_852_driver.line.stats import DeviceStats, StatsRecorder
+from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol import Reply, ReplyKind, ReplyParser, SwitchCommand
+from sonar_driver.line.device import LineDevice
 
 # A busy line counts as quiet after a pause of _QUIET; _LONGEST_DRAIN is the longest wait for that. Both in seconds.
 _QUIET = 0.005
@@ -28,11 +26,8 @@ class Ping:
     reply: Reply
 
 
-class SonarDevice:
-    """Sends one command at a time; `stop` interrupts every wait within a twentieth of a second.
-
-    One thread uses it; `stats` may be read from any.
-    """
+class SonarDevice(LineDevice[SwitchCommand, Ping]):
+    """Sends one command at a time and waits for its reply."""
 
     def __init__(
         self,
@@ -41,56 +36,9 @@ class SonarDevice:
         clock: Callable[[], float] = time.time,
     ) -> None:
         """`clock` gives the stamps of the pings, in seconds."""
-        self.connection = connection
-        self.stop = stop or threading.Event()
-        self._clock = clock
+        super().__init__(connection, DeviceStats(), stop, clock)
         self._timing = connection.timing()
         self._parser = ReplyParser()
-        self._recorder = StatsRecorder()
-        self._port: Optional[serial.SerialBase] = None
-
-    @property
-    def stats(self) -> DeviceStats:
-        """The counts up to the last ping."""
-        return self._recorder.current
-
-    def open(self) -> None:
-        """Open the port; raises a PortError and remembers its text."""
-        self.close()
-        try:
-            self._port = open_port(self.connection.port, self.connection.baud_rate)
-        except PortError as error:
-            self._recorder.note(last_error=str(error))
-            raise
-        self._recorder.count("connections")
-        self._recorder.note(connected=True)
-
-    def close(self) -> None:
-        """Close the port, if it is open."""
-        port, self._port = self._port, None
-        self._recorder.note(connected=False)
-        if port is not None:
-            try:
-                with port_losses(self.connection.port):
-                    port.close()
-            except PortUnavailableError as error:
-                self._recorder.note(last_error=str(error))
-
-    def ping(self, command: SwitchCommand) -> Optional[Ping]:
-        """Command one ping and wait for its reply.
-
-        Returns None if there was no valid reply, which is counted in `stats`. Raises PortUnavailableError if the port
-        is lost or not open, and closes it.
-        """
-        if self._port is None:
-            raise PortUnavailableError(f"port {self.connection.port} is not open")
-        try:
-            with port_losses(self.connection.port):
-                return self._ping(command)
-        except PortUnavailableError as error:
-            self._recorder.note(last_error=str(error))
-            self.close()
-            raise
 
     def _ping(self, command: SwitchCommand) -> Optional[Ping]:
         self._drain()

@@ -21,10 +21,6 @@ _BEFORE = 60.0
 _AFTER = 10.0
 
 
-class RecordingError(ValueError):
-    """A recording cannot be used; the text is one line that says which, why and what to do."""
-
-
 @dataclass(frozen=True)
 class Truth:
     """Where the vehicle was by another instrument. times: (t,) s, increasing. positions: (t, 2) x y [m]."""

@@ -37,7 +37,9 @@ class Simulator:
         folder = Path(rospkg.RosPack().get_path(PACKAGE))
         self._parameters = settings.simulator
         self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
-        self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive)
+        self._publisher = SimulatorPublisher(
+            self._setup.sonar.max_range, self._parameters.drive, self._parameters.instruments
+        )
         self._publisher.publish_world(self._setup.world)
         self._start_time = START_TIME
         self._now = 0.0

@@ -10,12 +10,13 @@ import time
 from dataclasses import dataclass
 from typing import List
 
-from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FaultRates, PtyServer
+from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.scanner import Scanner
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol.settings import HeadSettings
+from sonar_driver.emulator import EchoSource, Fault, FaultInjector, HeadServer, PtyLine
+from sonar_driver.line.scanner import Scanner
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
 WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
@@ -69,11 +70,11 @@ class Account:
     seconds: float
 
 
-def fault_rates(rate: float, reply_margin: float) -> FaultRates:
+def fault_rates(rate: float, reply_margin: float) -> FaultRates852:
     """Return `rate` for every fault; late replies come after the driver's wait, `reply_margin` s, is over."""
     names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
     lasting = {"lateness": reply_margin + LATENESS, "silence_duration": 0.2, "absence_duration": 0.05}
-    return FaultRates(**dict.fromkeys(names, rate), **lasting)
+    return FaultRates852(**dict.fromkeys(names, rate), **lasting)
 
 
 def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -> Account:
@@ -90,15 +91,15 @@ def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -
             back_off_first=0.05,
             **FAST_LINE,
         )
-        head = EmulatedHead(NumberedEchoes(), faults, connection.timing())
+        head = Emulated852(NumberedEchoes(), faults, connection.timing())
         device = SonarDevice(connection, stop)
         scanner = Scanner(
             device,
-            HeadSettings(max_range=50),
+            HeadSettings(max_range=50).command(),
             lambda ping: delivered.append(int.from_bytes(ping.reply.echoes[:4], "big")),
         )
         begin = time.monotonic()
-        with PtyServer(head, connection.port):
+        with HeadServer(head, PtyLine(connection.port)):
             scanner.connect()
             scanner.run()
         seconds = time.monotonic() - begin

@@ -4,16 +4,17 @@ import time
 import pytest
 from driver_line import served
 
-from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates, Transmission
+from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.port import PortUnavailableError
 from imagenex_852_driver.protocol import ReplyKind, SwitchCommand
+from sonar_driver.emulator import Fault, FaultInjector, Transmission
+from sonar_driver.line.port import PortUnavailableError
 
 COMMAND = SwitchCommand(max_range=50)
 
 
-class FixedStatusHead(EmulatedHead):
+class FixedStatusHead(Emulated852):
     """Answers every command with one reply, whatever was asked."""
 
     def __init__(self, reply):
@@ -26,9 +27,9 @@ class FixedStatusHead(EmulatedHead):
 
 @pytest.fixture
 def line(tmp_path):
-    faults = FaultInjector(FaultRates(lateness=0.2, silence_duration=0.3))
+    faults = FaultInjector(FaultRates852(lateness=0.2, silence_duration=0.3))
     timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
-    with served(tmp_path, EmulatedHead(faults=faults, timing=timing)) as (_, connection):
+    with served(tmp_path, Emulated852(faults=faults, timing=timing)) as (_, connection):
         device = SonarDevice(connection, clock=lambda: 1000.0)
         device.open()
         yield device, faults
@@ -171,7 +172,7 @@ def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
     device.close()
 
 
-class EchoingLine(EmulatedHead):
+class EchoingLine(Emulated852):
     """A head on two wires whose adapter hears what it sends."""
 
     def receive(self, data, time):

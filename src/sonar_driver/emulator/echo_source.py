@@ -4,21 +4,20 @@ import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 
-from imagenex_852_driver.protocol import SwitchCommand
-
 
 @dataclass(frozen=True)
 class PingRequest:
     """One ping of the emulated head.
 
     `angle` in radians, counter-clockwise, of a head mounted upright; `time` in seconds of the emulator's
-    clock; the command carries range, gain, absorption, pulse length and frequency.
+    clock; `max_range` in metres; `gain_db` above the gain at which echoes have their usual strength.
     """
 
     time: float
     angle: float
     bin_count: int
-    command: SwitchCommand
+    max_range: float
+    gain_db: float
 
 
 class EchoSource(ABC):
@@ -34,7 +33,6 @@ class FixedPattern(EchoSource):
 
     WALL_BLUR = 0.1
     RINGING_REACH = 0.3
-    FULL_STRENGTH_DB = 20.0
 
     def __init__(self, wall_distance: float = 4.0) -> None:
         """`wall_distance` is the shortest distance from the head to each wall, in metres."""
@@ -43,8 +41,8 @@ class FixedPattern(EchoSource):
     def echoes(self, ping: PingRequest) -> bytes:
         """Return the echoes of the wall in the direction of the ping, scaled by the gain."""
         wall = self._wall_distance / max(abs(math.cos(ping.angle)), abs(math.sin(ping.angle)))
-        strength = 127 * 10 ** ((ping.command.start_gain_db - self.FULL_STRENGTH_DB) / 20)
-        resolution = ping.command.max_range / ping.bin_count
+        strength = 127 * 10 ** (ping.gain_db / 20)
+        resolution = ping.max_range / ping.bin_count
         ranges = ((index + 0.5) * resolution for index in range(ping.bin_count))
         return bytes(min(255, round(strength * self._share(distance, wall))) for distance in ranges)
 

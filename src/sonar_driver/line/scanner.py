@@ -2,23 +2,22 @@
 
 import contextlib
 import time
-from typing import Callable
+from typing import Callable, Generic
 
-from imagenex_852_driver.line.device import Ping, SonarDevice
-from imagenex_852_driver.line.port import PortError, PortUnavailableError
-from imagenex_852_driver.protocol.settings import HeadSettings
+from sonar_driver.line.device import Command, LineDevice, Ping
+from sonar_driver.line.port import PortError, PortUnavailableError
 
 
-class Scanner:
-    """Pings with the current settings. `settings` may be assigned from any thread and applies to the next ping.
+class Scanner(Generic[Command, Ping]):
+    """Pings with the current command. `command` may be assigned from any thread and applies to the next ping.
 
     Every command carries all settings, so the scan continues as configured after a reconnection or a reboot of
     the head.
     """
 
-    def __init__(self, device: SonarDevice, settings: HeadSettings, on_ping: Callable[[Ping], None]) -> None:
+    def __init__(self, device: LineDevice[Command, Ping], command: Command, on_ping: Callable[[Ping], None]) -> None:
         """`on_ping` is called in the thread of `run`, once per valid reply, in order; it must not raise."""
-        self.settings = settings
+        self.command = command
         self._device = device
         self._on_ping = on_ping
         self._back_off = device.connection.back_off_first
@@ -43,7 +42,7 @@ class Scanner:
 
     def _ping(self) -> None:
         try:
-            ping = self._device.ping(self.settings.command())
+            ping = self._device.ping(self.command)
         except PortUnavailableError:
             return
         now = time.monotonic()

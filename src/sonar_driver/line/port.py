@@ -5,7 +5,7 @@ import grp
 import os
 import termios
 from contextlib import contextmanager
-from typing import Iterator
+from typing import Iterator, Protocol
 
 import serial
 
@@ -15,6 +15,23 @@ WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is
 
 _REMOTE = ("socket://", "rfc2217://", "loop://")
 _USUAL_GROUP = "dialout"
+
+
+class Port(Protocol):
+    """What a driver does with a port; pyserial's ports have it."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that were received and not yet read."""
+
+    def read(self, size: int = 1) -> bytes:
+        """Return up to `size` bytes: once there are so many, or after READ_TIMEOUT those that there are."""
+
+    def write(self, data: bytes) -> int:
+        """Send all of `data`."""
+
+    def close(self) -> None:
+        """Give the port back."""
 
 
 class PortError(Exception):
@@ -37,7 +54,7 @@ class PortNameError(PortError):
     """No port can have that name."""
 
 
-def open_port(name: str, baud_rate: int) -> serial.SerialBase:
+def open_port(name: str, baud_rate: int) -> Port:
     """Open a device or pyserial URL with 8N1; a local device is opened exclusively.
 
     Raises PortUnavailableError, PortBusyError, PortPermissionError or PortNameError.

@@ -11,13 +11,14 @@ import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.offline.bag_recording import BagNames, read_recording
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.north_east_down import suspicions
-from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
+from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -32,9 +33,9 @@ from mlsm_manager.offline.run_files import (
     write_trajectory,
 )
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
-from mlsm_manager.ros.bag_recording import BagNames, read_recording
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
+from recordings.errors import RecordingError
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 # The frame that live.yaml's nodes call their map by default.
