@@ -39,6 +39,8 @@ FAR = 150.0
 BEAMS = 120
 PER_SECOND = 1500
 BATCH = 50
+# What those get who take any type and use some.
+TAKEN_AS_ANY_TYPE = {"/sonar/raw": SonarScanLine._type, "/sonar/rays": PointCloud2._type}
 NOT_FUZZED = {"/rosout", "/rosout_agg"}
 CLOCK_PERIOD = 0.02  # s: what random messages on /clock did to the time is mended after this
 START_TIMEOUT = 120.0  # s: on two busy cores
@@ -197,9 +199,8 @@ def _subscribed(processes: Dict[str, int]) -> Dict[str, str]:
     topics: Dict[str, Any] = {
         topic: dict(kinds).get(topic, "*") for topic, nodes in subscribers if set(nodes) & set(processes)
     }
-    # Who takes any type gets one that it can use.
     return {
-        topic: "sensor_msgs/PointCloud2" if kind == "*" else kind
+        topic: TAKEN_AS_ANY_TYPE[topic] if kind == "*" else kind
         for topic, kind in topics.items()
         if topic not in NOT_FUZZED
     }
