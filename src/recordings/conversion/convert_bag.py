@@ -5,6 +5,7 @@ import sys
 from pathlib import Path
 from typing import List
 
+from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
 from recordings.conversion.converted_bag import write_converted
 from recordings.errors import RecordingError
@@ -43,7 +44,7 @@ def convert_bag(arguments: List[str]) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = argparse.ArgumentParser(
+    parser = CommandLine(
         "convert_bag", description="Write a recording of any kind as a bag of ROS 1 with /sonar/raw, /odom and tf."
     )
     parser.add_argument("recording", type=Path, help="a bag of ROS 1 or ROS 2, or the log of a sonar's maker")
