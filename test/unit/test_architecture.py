@@ -17,6 +17,7 @@ ALLOWED = {
     "node_support": set(),
     "sonar_driver": {"node_support"},
     "imagenex_852_driver": {"node_support", "sonar_driver"},
+    "ping360_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
     "mlsm_manager": {"node_support", "sonar_processing"},
     "sonar_simulator": {"node_support", "sonar_processing"},

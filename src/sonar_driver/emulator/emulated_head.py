@@ -25,7 +25,7 @@ class EmulatedHead(ABC):
     """
 
     def __init__(self, faults: Optional[FaultInjector] = None, baud_rate: float = float("inf")) -> None:
-        """`baud_rate` is infinite on a line whose speed does not matter."""
+        """`baud_rate` is infinite where bytes take no time and a message is sent as a whole, on a network."""
         self.faults = faults or FaultInjector()
         self.absent_until = float("-inf")
         self.next_event = float("inf")
@@ -69,9 +69,10 @@ class EmulatedHead(ABC):
 
     def _paced(self, data: bytes, begin: float) -> List[Transmission]:
         begin = max(begin, self._line_free)
+        size = _PIECE if self._baud_rate < float("inf") else max(1, len(data))
         pieces = []
-        for start in range(0, len(data), _PIECE):
-            piece = data[start : start + _PIECE]
+        for start in range(0, len(data), size):
+            piece = data[start : start + size]
             pieces.append(Transmission(begin + transmission_time(start + len(piece), self._baud_rate), piece))
         if pieces:
             self._line_free = pieces[-1].time
