@@ -25,6 +25,7 @@ _PING360 = 2
 _FIRMWARES = {True: (3, 3, 1), False: (3, 1, 1)}  # With and without auto-transmit
 _TURNING_TIME = 2.4 / TURN  # s per gradian: Ping Viewer's angular speed of the head
 _ANSWER_TIME = 0.002  # s: what a processor needs for an answer that takes no ping
+_STILL_UNREAD = 0.1  # s: nobody waits for the driver to read a beam before the head sends the next one
 _GAINS_DB = (-6.0, 0.0, 6.0)  # Of the emulated echoes; the manufacturer gives no figures
 
 # What the ping protocol allows in a command to ping.
@@ -130,10 +131,11 @@ class EmulatedPing360(EmulatedHead):
 
     def _ping(self, command: PingMessage, time: float, message_id: MessageId) -> List[Transmission]:
         fault = self.faults.next()
-        if self._struck_dumb(fault, time):
+        if self._struck_dumb(fault, time, _STILL_UNREAD if message_id is MessageId.AUTO_DEVICE_DATA else 0.0):
             self._rest()
             return []
         if fault is Fault.REFUSED:
+            self._rest()
             return self._at_once(packed_nack(command.message_id, "fault ordered"), time)
         frame = self._beam(command, time, message_id)
         return self._transmissions(fault, frame, time + _pulse(command).listening_time)

@@ -23,17 +23,25 @@ class AutoScan:
     """Tells the head once what to scan, then takes its beams; tells it again when it fell silent or did not listen."""
 
     def __init__(
-        self, line: MessageLine, connection: ConnectionParameters, baud_rate: float, can_interrupt: bool
+        self,
+        line: MessageLine,
+        connection: ConnectionParameters,
+        baud_rate: float,
+        can_interrupt: bool,
+        has_scanned: bool = False,
     ) -> None:
-        """`can_interrupt`: a head that sends on two wires does not listen, unless the line is interrupted."""
+        """`can_interrupt`: a head that sends on two wires does not listen, unless the line is interrupted.
+
+        `has_scanned`: this head is known to scan by itself, from before the port was lost.
+        """
         self.refused = False
+        self.has_scanned = has_scanned
         self._line = line
         self._margin = connection.reply_margin
         self._baud_rate = baud_rate
         self._can_interrupt = can_interrupt
         self._running: Optional[ScanCommand] = None
         self._started = 0.0
-        self._has_scanned = False
         self._is_alive = False
         self._last: Optional[Beam] = None
         self._last_frame = b""
@@ -47,7 +55,6 @@ class AutoScan:
         while self._nothing_came(outcome) and self._is_turning() and self._answers(outcome, command):
             self._wait(outcome, command, self._patience(command))
         if self._nothing_came(outcome):
-            outcome.timeouts, outcome.error = 1, "the head fell silent"
             self._revive(outcome, command)
         return outcome
 
@@ -69,17 +76,20 @@ class AutoScan:
 
     def _revive(self, outcome: Outcome, command: ScanCommand) -> None:
         """Start the scan again as soon as the head answers; give up where it never scanned."""
-        if not self._answers(outcome, command):
+        is_alive = self._answers(outcome, command)
+        if not self._nothing_came(outcome):
             return
-        if not self._has_scanned:
+        outcome.timeouts, outcome.error = 1, "the head fell silent"
+        if is_alive and self.has_scanned:
+            self._start(command)
+        elif is_alive:
             self.refused, outcome.error = True, "the head does not scan by itself"
-            return
-        self._start(command)
 
     def _answers(self, outcome: Outcome, command: ScanCommand) -> bool:
         """Return whether the head answers a question; a beam that comes instead is kept."""
+        self._is_alive = False
         self._line.send(information_request())
-        self._wait(outcome, command, _ANSWER_TIME)
+        self._wait(outcome, command, _ANSWER_TIME, until_alive=True)
         return self._is_alive
 
     def _patience(self, command: ScanCommand) -> float:
@@ -92,10 +102,9 @@ class AutoScan:
     def _nothing_came(self, outcome: Outcome) -> bool:
         return outcome.beam is None and not (outcome.bad_frames or outcome.refusals or outcome.timeouts)
 
-    def _wait(self, outcome: Outcome, command: ScanCommand, patience: float) -> None:
+    def _wait(self, outcome: Outcome, command: ScanCommand, patience: float, until_alive: bool = False) -> None:
         deadline = time.monotonic() + patience
-        self._is_alive = False
-        while self._nothing_came(outcome) and not self._is_alive:
+        while self._nothing_came(outcome) and not (until_alive and self._is_alive):
             arrival = self._line.receive(deadline)
             broken = self._line.take_broken()
             if broken:
@@ -113,7 +122,9 @@ class AutoScan:
             self._is_alive = True
         elif message_id == MessageId.NACK:
             outcome.refusals, outcome.error = 1, refusal(arrival.message)
-            self.refused = arrival.message.nacked_id == MessageId.AUTO_TRANSMIT
+            if arrival.message.nacked_id == MessageId.AUTO_TRANSMIT:
+                self.refused = not self.has_scanned
+                self._running = None
 
     def _judge(self, outcome: Outcome, arrival: Arrival, command: ScanCommand) -> None:
         # The protocol does not number messages; two pings never sound alike to the last bit.
@@ -131,7 +142,7 @@ class AutoScan:
             self._start(command)
         outcome.missing_beams += self._missing_before(found, command)
         outcome.beam, outcome.pinged = found, pinged(found, arrival)
-        self._has_scanned = True
+        self.has_scanned = True
         self._last, self._last_frame = found, arrival.frame
 
     def _obeyed(self, found: Beam, command: ScanCommand) -> bool:

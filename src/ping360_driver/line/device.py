@@ -52,7 +52,8 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         if self._is_serial:
             self._line.interrupt()
         self._information = self._who_is_there()
-        self._auto = AutoScan(self._line, self.connection, self._baud_rate, self._is_serial)
+        has_scanned = self._auto is not None and self._auto.has_scanned
+        self._auto = AutoScan(self._line, self.connection, self._baud_rate, self._is_serial, has_scanned)
         self._requests = RequestScan(self._line, self.connection, self._baud_rate)
         self._recorder.note(firmware=".".join(str(number) for number in self._information.firmware))
 

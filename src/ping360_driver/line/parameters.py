@@ -19,6 +19,14 @@ class ConnectionParameters(LineParameters):
         high=4.0,
         tunable=False,
     )
+    late_window: float = parameter(
+        0.25,
+        "how long to wait after a timeout for a late reply, before the next request is sent",
+        unit="s",
+        low=0.0,
+        high=4.0,
+        tunable=False,
+    )
     byte_gap: float = parameter(
         0.1, "silence that ends an incomplete message", unit="s", low=0.01, high=1.0, tunable=False
     )

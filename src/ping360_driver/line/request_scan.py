@@ -1,5 +1,6 @@
 """Scans by asking for every single ping."""
 
+import time
 from typing import Optional
 
 from ping360_driver.line.beam_time import beam_time
@@ -22,6 +23,7 @@ class RequestScan:
     def __init__(self, line: MessageLine, connection: ConnectionParameters, baud_rate: float) -> None:
         self._line = line
         self._margin = connection.reply_margin
+        self._late_window = connection.late_window
         self._baud_rate = baud_rate
         self._walk = SectorWalk()
         self._last_angle: Optional[int] = None
@@ -34,8 +36,20 @@ class RequestScan:
         deadline = sent + beam_time(self._turn_to(angle), command.pulse, self._baud_rate) + self._margin
         earliest = sent + _SURELY_TOO_EARLY * command.pulse.listening_time
         self._wait(outcome, command, angle, earliest, deadline)
+        if outcome.timeouts:
+            self._await_late_reply(outcome)
         self._last_angle = angle
         return outcome
+
+    def _await_late_reply(self, outcome: Outcome) -> None:
+        """Let the head finish, so that it is free for the next request."""
+        deadline = time.monotonic() + self._late_window
+        while not outcome.unexpected_replies and time.monotonic() < deadline:
+            arrival = self._line.receive(deadline)
+            if arrival is not None and arrival.message.message_id == MessageId.DEVICE_DATA:
+                outcome.unexpected_replies += 1
+            elif arrival is None:
+                return
 
     def _turn_to(self, angle: int) -> int:
         """Return by how many gradians the head turns at most; it may go either way, and be anywhere at first."""

@@ -1,6 +1,6 @@
 """Finds messages in a stream of bytes, however the stream is split and whatever is between the messages."""
 
-from typing import List, NamedTuple, Optional
+from typing import List, NamedTuple
 
 from brping.pingmessage import PingMessage
 
@@ -26,7 +26,6 @@ class MessageStream:
         self._buffer = bytearray()
         self._offset = 0
         self._in_rubbish = False
-        self._explained_until = 0
 
     @property
     def pending(self) -> bool:
@@ -49,10 +48,9 @@ class MessageStream:
             if len(self._buffer) >= length and is_whole(self._buffer[:length]):
                 found.append(self._take(length))
             else:
-                end = length if len(self._buffer) >= length else self._whole_message_inside()
-                if end is None:
+                if len(self._buffer) < length and not self._holds_another():
                     break
-                self._give_up(end)
+                self._give_up()
         return found
 
     def reset(self) -> None:
@@ -82,28 +80,26 @@ class MessageStream:
         self._in_rubbish = False
         return parsed
 
-    def _whole_message_inside(self) -> Optional[int]:
-        """Return where a whole message begins inside an unfinished one, whose own end was then lost."""
+    def _holds_another(self) -> bool:
+        """Return whether a whole message lies inside an unfinished one, whose own end was then lost."""
         start = self._buffer.find(START, 1)
         while 0 <= start <= len(self._buffer) - HEADER_LENGTH:
             inner = self._buffer[start:]
             if _is_header(inner) and len(inner) >= frame_length(inner) and is_whole(inner[: frame_length(inner)]):
-                return start
+                return True
             start = self._buffer.find(START, start + 1)
-        return None
+        return False
 
-    def _give_up(self, length: int) -> None:
+    def _give_up(self) -> None:
         """Count the message at the front as broken; look for the next one inside it, where its own end may be lost."""
         self.broken += 1
-        self._in_rubbish = False
-        self._explained_until = self._offset + length
+        self._in_rubbish = True
         self._skip(len(START))
 
     def _skip_rubbish(self, count: int) -> None:
-        """Drop bytes that begin no message; count each stretch once, unless a broken message explains it."""
-        if self._offset + count > self._explained_until:
-            self.broken += int(not self._in_rubbish)
-            self._in_rubbish = True
+        """Drop bytes that begin no message; count each stretch once, unless it follows a broken message."""
+        self.broken += int(not self._in_rubbish)
+        self._in_rubbish = True
         self._skip(count)
 
     def _skip(self, count: int) -> None:

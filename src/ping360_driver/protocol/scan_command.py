@@ -63,8 +63,8 @@ class ScanCommand:
 
     @property
     def can_auto_transmit(self) -> bool:
-        """Whether the head can scan this sector by itself: not one across astern, where it starts beyond its stop."""
-        return self.mode is ScanMode.AUTO_TRANSMIT and self.start <= self.stop
+        """Whether the head can scan this sector by itself: one that has a width and does not lie across astern."""
+        return self.mode is ScanMode.AUTO_TRANSMIT and self.start < self.stop
 
     def auto_transmit(self) -> bytes:
         """Return the message that makes the head scan the sector until it is told otherwise."""

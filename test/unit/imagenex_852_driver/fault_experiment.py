@@ -3,6 +3,7 @@
 Command line: python3 fault_experiment.py [replies wanted] [rate of each fault]
 """
 
+import os
 import sys
 import tempfile
 import threading
@@ -10,53 +11,23 @@ import time
 from dataclasses import dataclass
 from typing import List
 
+sys.path.append(os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "sonar_driver"))
+
+from numbered_pings import NumberedEchoes, RecordingInjector
+
 from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol.settings import HeadSettings
-from sonar_driver.emulator import EchoSource, Fault, FaultInjector, HeadServer, PtyLine
+from sonar_driver.emulator import Fault, HeadServer, PtyLine
 from sonar_driver.line.scanner import Scanner
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
-WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
 # Beyond the longest wait for a reply.
 LATENESS = 0.12
 # Ten times the speed of wire and water.
 FAST_LINE = {"baud_rate": 1152000, "speed_of_sound": 15000.0}
-
-
-class NumberedEchoes(EchoSource):
-    """Writes the number of the ping into the first echoes."""
-
-    def __init__(self):
-        self.count = 0
-
-    def echoes(self, ping):
-        self.count += 1
-        return (self.count - 1).to_bytes(4, "big") + bytes(ping.bin_count - 4)
-
-
-class RecordingInjector(FaultInjector):
-    """Remembers the fault of every ping, and stops the driver after a number of commands."""
-
-    def __init__(self, rates, seed, commands, stop):
-        super().__init__(rates, seed)
-        self.of_pings: List[Fault] = []
-        self._left = commands
-        self._stop = stop
-
-    def next(self):
-        self._left -= 1
-        if self._left < 0:
-            self._stop.set()
-            self.counts[Fault.DROPPED] += 1
-            self.of_pings.append(Fault.DROPPED)
-            return Fault.DROPPED
-        fault = super().next()
-        if fault not in WITHOUT_PING:
-            self.of_pings.append(fault)
-        return fault
 
 
 @dataclass(frozen=True)
