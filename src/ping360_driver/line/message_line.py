@@ -14,6 +14,9 @@ from sonar_driver.line.timing import transmission_time
 
 # After a break the head measures the speed of the line by this letter: as many ones as zeros, in turn (brping).
 _SPEED_SAMPLE = b"U"
+# s: a busy line counts as quiet after a pause that is longer than USB adapters make; the longest wait for that.
+_QUIET = 0.02
+_LONGEST_DRAIN = 0.2
 _WAKING_TIME = 0.2  # s: Ping Viewer waits as long after a break
 
 
@@ -63,6 +66,14 @@ class MessageLine:
         self._received = 0
         self._reads.clear()
         self._arrived.clear()
+
+    def drain(self) -> None:
+        """Let the head finish a broken message, so that what is broken afterwards is counted anew."""
+        deadline = time.monotonic() + _LONGEST_DRAIN
+        while not self._stop.wait(_QUIET) and self._port.in_waiting and time.monotonic() < deadline:
+            self._read()
+        self._stream.reset()
+        self.take_broken()
 
     def receive(self, deadline: float) -> Optional[Arrival]:
         """Return the next message; None when a broken one came, at the deadline (monotonic) or when stopped.

@@ -35,9 +35,11 @@ class RequestScan:
         outcome = Outcome()
         deadline = sent + beam_time(self._turn_to(angle), command.pulse, self._baud_rate) + self._margin
         earliest = sent + _SURELY_TOO_EARLY * command.pulse.listening_time
-        self._wait(outcome, command, angle, earliest, deadline)
+        self._wait(outcome, angle, earliest, deadline)
         if outcome.timeouts:
             self._await_late_reply(outcome)
+        if outcome.bad_frames:
+            self._line.drain()
         self._last_angle = angle
         return outcome
 
@@ -58,28 +60,20 @@ class RequestScan:
         shorter = (angle - self._last_angle) % TURN
         return min(shorter, TURN - shorter)
 
-    def _wait(self, outcome: Outcome, command: ScanCommand, angle: int, earliest: float, deadline: float) -> None:
-        while outcome.beam is None:
+    def _wait(self, outcome: Outcome, angle: int, earliest: float, deadline: float) -> None:
+        while not outcome.counts()["pings"]:
             arrival = self._line.receive(deadline)
             broken = self._line.take_broken()
-            if arrival is None:
-                self._give_up(outcome, broken)
-                return
-            if arrival.message.message_id == MessageId.NACK:
+            if arrival is not None and arrival.message.message_id == MessageId.NACK:
                 outcome.refusals, outcome.error = 1, refusal(arrival.message)
-                return
-            if arrival.message.message_id == MessageId.DEVICE_DATA:
-                self._judge(outcome, arrival, command, angle, earliest)
-                if outcome.bad_frames:
-                    return
+            elif arrival is not None and arrival.message.message_id == MessageId.DEVICE_DATA:
+                self._judge(outcome, arrival, angle, earliest)
+            elif arrival is None and not broken:
+                outcome.timeouts, outcome.error = 1, "no beam in time"
+            if broken and not outcome.counts()["pings"]:
+                outcome.bad_frames, outcome.error = 1, "a broken message"
 
-    def _give_up(self, outcome: Outcome, broken: int) -> None:
-        if broken:
-            outcome.bad_frames, outcome.error = 1, "a broken message"
-        else:
-            outcome.timeouts, outcome.error = 1, "no beam in time"
-
-    def _judge(self, outcome: Outcome, arrival: Arrival, command: ScanCommand, angle: int, earliest: float) -> None:
+    def _judge(self, outcome: Outcome, arrival: Arrival, angle: int, earliest: float) -> None:
         try:
             found = beam(arrival.message)
         except MessageError as error:
