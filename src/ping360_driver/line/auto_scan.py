@@ -1,6 +1,5 @@
 """Scans that the head does by itself, sending one beam after the other."""
 
-import time
 from typing import Optional
 
 from ping360_driver.line.beam_time import beam_time, turning_time
@@ -97,13 +96,13 @@ class AutoScan:
 
     def _is_turning(self) -> bool:
         """Return whether the head may still be on its way to the start of the sector."""
-        return self._last is None and time.monotonic() < self._started + turning_time(TURN)
+        return self._last is None and self._line.elapsed() < self._started + turning_time(TURN)
 
     def _nothing_came(self, outcome: Outcome) -> bool:
         return outcome.beam is None and not (outcome.bad_frames or outcome.refusals or outcome.timeouts)
 
     def _wait(self, outcome: Outcome, command: ScanCommand, patience: float, until_alive: bool = False) -> None:
-        deadline = time.monotonic() + patience
+        deadline = self._line.elapsed() + patience
         while self._nothing_came(outcome) and not (until_alive and self._is_alive):
             arrival = self._line.receive(deadline)
             broken = self._line.take_broken()
@@ -137,7 +136,7 @@ class AutoScan:
         except MessageError as error:
             outcome.bad_frames, outcome.error = outcome.bad_frames + 1, str(error)
             return
-        if not self._obeyed(found, command) and time.monotonic() > self._started + _OBEDIENCE_TIME:
+        if not self._obeyed(found, command) and self._line.elapsed() > self._started + _OBEDIENCE_TIME:
             outcome.error = "the head does not scan as it was told; it is told again"
             self._start(command)
         outcome.missing_beams += self._missing_before(found, command)

@@ -15,7 +15,7 @@ from ping360_driver.protocol.messages import MessageId
 from ping360_driver.protocol.replies import Beam, DeviceInformation, device_information
 from ping360_driver.protocol.scan_command import ScanCommand, ScanMode, information_request, motor_off
 from sonar_driver.line.device import LineDevice
-from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port
+from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port, open_port
 
 _GREETINGS = 3
 _ANSWER_TIME = 0.3  # s: a head at rest answers within a few milliseconds; one that scans, between two beams
@@ -37,9 +37,11 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         connection: ConnectionParameters,
         stop: Optional[threading.Event] = None,
         clock: Callable[[], float] = time.time,
+        elapsed: Callable[[], float] = time.monotonic,
+        opener: Callable[[str, int], Port] = open_port,
     ) -> None:
-        """`clock` gives the stamps of the pings, in seconds."""
-        super().__init__(connection, Ping360Stats(), stop, clock)
+        """As `LineDevice` takes them."""
+        super().__init__(connection, Ping360Stats(), stop, clock, elapsed, opener)
         self._is_serial = not is_datagram_port(connection.port)
         self._baud_rate = connection.baud_rate if self._is_serial else float("inf")
         self._line: Optional[MessageLine] = None
@@ -48,7 +50,7 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         self._requests: Optional[RequestScan] = None
 
     def _greet(self) -> None:
-        self._line = MessageLine(self._port, self._baud_rate, self.connection.byte_gap, self.stop)
+        self._line = MessageLine(self._port, self._baud_rate, self.connection.byte_gap, self.stop, self.elapsed)
         if self._is_serial:
             self._line.interrupt()
         self._information = self._who_is_there()
@@ -60,8 +62,8 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
     def _who_is_there(self) -> DeviceInformation:
         for _ in range(_GREETINGS):
             self._line.send(information_request())
-            deadline = time.monotonic() + _ANSWER_TIME
-            while time.monotonic() < deadline and not self.stop.is_set():
+            deadline = self.elapsed() + _ANSWER_TIME
+            while self.elapsed() < deadline and not self.stop.is_set():
                 arrival = self._line.receive(deadline)
                 if arrival is not None and arrival.message.message_id == MessageId.DEVICE_INFORMATION:
                     return self._checked(device_information(arrival.message))
@@ -93,7 +95,7 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         if outcome.beam is None:
             return None
         self._recorder.note(pulse=outcome.beam.pulse)
-        return Ping(self._clock() - (time.monotonic() - outcome.pinged), outcome.beam)
+        return Ping(self._clock() - (self.elapsed() - outcome.pinged), outcome.beam)
 
     def _scan(self, command: ScanCommand) -> Union[AutoScan, RequestScan]:
         by_itself = command.can_auto_transmit and self._information.can_auto_transmit and not self._auto.refused

@@ -4,7 +4,7 @@ import threading
 import time
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, List, Optional, Tuple
+from typing import Callable, Deque, List, Optional, Tuple
 
 from brping.pingmessage import PingMessage
 
@@ -22,7 +22,7 @@ _WAKING_TIME = 0.2  # s: Ping Viewer waits as long after a break
 
 @dataclass(frozen=True)
 class Arrival:
-    """A message, its bytes, and when its first byte left the head, in seconds of the monotonic clock."""
+    """A message, its bytes, and when its first byte left the head, in seconds of the line's clock."""
 
     begun: float
     frame: bytes
@@ -32,8 +32,19 @@ class Arrival:
 class MessageLine:
     """Sends and receives messages on a port. `stop` ends every wait within a twentieth of a second."""
 
-    def __init__(self, port: Port, baud_rate: float, byte_gap: float, stop: threading.Event) -> None:
-        """`baud_rate` is infinite where bytes take no time; `byte_gap` s of silence end an incomplete message."""
+    def __init__(
+        self,
+        port: Port,
+        baud_rate: float,
+        byte_gap: float,
+        stop: threading.Event,
+        elapsed: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """`baud_rate` is infinite where bytes take no time; `byte_gap` s of silence end an incomplete message.
+
+        `elapsed` is the clock of deadlines and arrivals, in seconds.
+        """
+        self.elapsed = elapsed
         self._port = port
         self._baud_rate = baud_rate
         self._byte_gap = byte_gap
@@ -42,13 +53,13 @@ class MessageLine:
         self._arrived: Deque[Arrival] = deque()
         self._reads: Deque[Tuple[int, float]] = deque()
         self._received = 0
-        self._last_byte = time.monotonic()
+        self._last_byte = self.elapsed()
         self._broken_taken = 0
 
     def send(self, data: bytes) -> float:
-        """Send a message; return when its last byte has left, in seconds of the monotonic clock."""
+        """Send a message; return when its last byte has left, in seconds of the line's clock."""
         self._port.write(data)
-        return time.monotonic() + transmission_time(len(data), self._baud_rate)
+        return self.elapsed() + transmission_time(len(data), self._baud_rate)
 
     def interrupt(self) -> None:
         """Make a head on a serial line stop what it does and listen; it can be sent anything then."""
@@ -69,19 +80,19 @@ class MessageLine:
 
     def drain(self) -> None:
         """Let the head finish a broken message, so that what is broken afterwards is counted anew."""
-        deadline = time.monotonic() + _LONGEST_DRAIN
-        while not self._stop.wait(_QUIET) and self._port.in_waiting and time.monotonic() < deadline:
+        deadline = self.elapsed() + _LONGEST_DRAIN
+        while not self._stop.wait(_QUIET) and self._port.in_waiting and self.elapsed() < deadline:
             self._read()
         self._stream.reset()
         self.take_broken()
 
     def receive(self, deadline: float) -> Optional[Arrival]:
-        """Return the next message; None when a broken one came, at the deadline (monotonic) or when stopped.
+        """Return the next message; None when a broken one came, at the deadline or when stopped.
 
         What arrived while this process stalled is read before the deadline counts.
         """
         while not self._arrived and not self._stop.is_set():
-            now = time.monotonic()
+            now = self.elapsed()
             self._read()
             if self._stream.broken > self._broken_taken or (now >= deadline and not self._arrived):
                 break
@@ -95,7 +106,7 @@ class MessageLine:
 
     def _read(self) -> None:
         data = self._port.read(max(self._stream.missing, self._port.in_waiting))
-        now = time.monotonic()
+        now = self.elapsed()
         if data:
             self._last_byte = now
             self._received += len(data)

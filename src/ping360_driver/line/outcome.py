@@ -8,7 +8,7 @@ from ping360_driver.protocol.replies import Beam
 
 @dataclass
 class Outcome:
-    """A beam and when its ping left, in seconds of the monotonic clock, or what came instead; and what else came.
+    """A beam and when its ping left, in seconds of the line's clock, or what came instead; and what else came.
 
     `timeouts`, `bad_frames` and `refusals` are pings without a beam. `unexpected_replies` and `missing_beams` are as in
     `Ping360Stats`. `error` says in words what was wrong.

@@ -1,6 +1,5 @@
 """Scans by asking for every single ping."""
 
-import time
 from typing import Optional
 
 from ping360_driver.line.beam_time import beam_time
@@ -45,8 +44,8 @@ class RequestScan:
 
     def _await_late_reply(self, outcome: Outcome) -> None:
         """Let the head finish, so that it is free for the next request."""
-        deadline = time.monotonic() + self._late_window
-        while not outcome.unexpected_replies and time.monotonic() < deadline:
+        deadline = self._line.elapsed() + self._late_window
+        while not outcome.unexpected_replies and self._line.elapsed() < deadline:
             arrival = self._line.receive(deadline)
             if arrival is not None and arrival.message.message_id == MessageId.DEVICE_DATA:
                 outcome.unexpected_replies += 1
@@ -87,5 +86,5 @@ class RequestScan:
 
 
 def pinged(found: Beam, arrival: Arrival) -> float:
-    """Return when the ping of a beam left: the head sends once it has listened. Seconds of the monotonic clock."""
+    """Return when the ping of a beam left: the head sends once it has listened. Seconds of the line's clock."""
     return arrival.begun - found.pulse.listening_time
