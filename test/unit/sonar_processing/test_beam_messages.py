@@ -1,6 +1,7 @@
 """Messages of several sonars become the same beams."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ MADE = {
     MICRON: micron_line_of,
     LASER_SCAN: laser_scan_of,
 }
+SONARS_PAGE = (Path(__file__).resolve().parents[3] / "docs/sonars.md").read_text()
 NEEDED = {
     OWN: "header angle intensities maxrange_meters range_resolution sensorAngle",
     ECHO: "header angle intensities range number_of_samples speed_of_sound",
@@ -203,7 +205,10 @@ def test_a_message_that_makes_no_beam_is_refused(kind, values):
         reading(kind, MADE[kind](**values))
 
 
-def test_every_type_says_what_is_documented_of_it():
-    for name, kind in BEAM_TYPES.items():
-        assert name in kind.names
-        assert all([kind.zero, kind.strengths, kind.bins, kind.source])
+@pytest.mark.parametrize("name", sorted(BEAM_TYPES))
+def test_the_page_of_sonars_says_of_every_type_what_the_table_does(name):
+    kind = BEAM_TYPES[name]
+    (row,) = [line for line in SONARS_PAGE.splitlines() if line.startswith("|") and f"`{name}`" in line]
+    way = "clockwise" if kind.clockwise else "counter-clockwise"
+    for words in (kind.unit.value.lower(), f"| {way} |", kind.zero, kind.strengths, kind.bins, kind.source):
+        assert words in row
