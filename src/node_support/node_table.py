@@ -228,8 +228,8 @@ NODES: Dict[str, NodeDescription] = {
                 "depth; `depth_type` sets the type",
             ),
             _subscribes(
-                topics.MATCHED_VELOCITY,
-                "geometry_msgs/TwistWithCovarianceStamped",
+                topics.MATCHED_ODOMETRY,
+                "nav_msgs/Odometry",
                 "velocity that mlsm_core estimates, if `velocity_source` is ESTIMATE",
             ),
             _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "velocity if `velocity_source` is COMMANDS"),

@@ -99,8 +99,5 @@ MATCHED_POSE = "MLSM/pose"
 MATCHED_ODOMETRY = "MLSM/odometry"
 """Odometry: the vehicle in the map at the newest match."""
 
-MATCHED_VELOCITY = "MLSM/velocity"
-"""TwistWithCovarianceStamped: the vehicle's velocity along its own axes, as its scans tell it."""
-
 MATCHED_PATH = "MLSM/path"
 """Path: the vehicle in the map at all matches."""
