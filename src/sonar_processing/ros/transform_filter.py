@@ -71,6 +71,13 @@ class TransformFilter(message_filters.SimpleFilter):
             self._queue.append(_WaitingBeam(beam, is_moving))
             self._condition.notify()
 
+    def forget(self) -> None:
+        """Forget the waiting beams and the unfinished scan, because they were read wrongly."""
+        with self._condition:
+            self._queue.clear()
+            self._jumped = True
+            self._condition.notify()
+
     def _take_older(self, beam: Beam) -> None:
         seconds = (self._newest_ns - beam.stamp_ns) * 1e-9
         if seconds <= JUMP_BACK:
