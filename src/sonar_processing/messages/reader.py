@@ -40,16 +40,15 @@ class BeamReader:
     def read(self, type_name: str, message: Any) -> Reading:
         """Return the beams of a message of the type package/Type; raises RefusedInput for one that cannot be used."""
         kind = beam_type(type_name)
-        try:
-            found = kind.read(message)
-        except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            if isinstance(error, RefusedInput):
-                raise
-            raise RefusedInput(_REFUSED, f"{type_name} not as expected: {error}") from error
-        if not found:
-            raise RefusedInput(_REFUSED, f"{type_name} without rays")
+        found = _fields(kind, type_name, message)
         before = self._units.get(type_name)
         unit = self._units[type_name] = self._unit(kind, found)
+        beams = self._beams(found, kind, unit)
+        changed = before not in (None, unit)
+        return Reading(beams, self._notes(kind, type_name, unit, changed), changed, len(found) - len(beams))
+
+    def _beams(self, found: List[BeamFields], kind: BeamType, unit: AngleUnit) -> List[Beam]:
+        """Return those that can be used; raises RefusedInput where none can."""
         beams, problem = [], None
         for one in found:
             try:
@@ -58,8 +57,7 @@ class BeamReader:
                 problem = refused
         if problem is not None and not beams:
             raise problem
-        changed = before not in (None, unit)
-        return Reading(beams, self._notes(kind, type_name, unit, changed), changed, len(found) - len(beams))
+        return beams
 
     def _unit(self, kind: BeamType, found: List[BeamFields]) -> AngleUnit:
         if self._parameters.angle_unit is not AngleUnitChoice.TYPE:
@@ -93,13 +91,26 @@ class BeamReader:
         if kind.name == OWN or (type_name in self._described and not changed):
             return []
         self._described.add(type_name)
-        told = ", told by their values" if kind.may_be_gradians and unit is not kind.unit else ""
+        is_told = self._parameters.angle_unit is AngleUnitChoice.TYPE and unit is not kind.unit
+        told = ", told by their values" if is_told else ""
         way = "clockwise" if self._is_clockwise(kind) else "counter-clockwise"
         text = (
             f"beams of {type_name}: angles in {unit.value.lower()}{told} (angle_unit sets the unit), growing {way} "
             "seen from the tip of +z of their frame (head_turns sets the direction); see docs/sonars.md"
         )
         return [text] + ([f"{type_name}: {kind.advice}"] if kind.advice else [])
+
+
+def _fields(kind: BeamType, type_name: str, message: Any) -> List[BeamFields]:
+    try:
+        found = kind.read(message)
+    except RefusedInput:
+        raise
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
+        raise RefusedInput(_REFUSED, f"{type_name} not as expected: {error}") from error
+    if not found:
+        raise RefusedInput(_REFUSED, f"{type_name} without rays")
+    return found
 
 
 def beam_type(type_name: str) -> BeamType:

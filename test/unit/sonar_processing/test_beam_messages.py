@@ -150,6 +150,10 @@ def test_the_unit_can_be_set():
     assert beam(ECHO, sonar_echo_of(400.0), angle_unit="RADIANS").angle == 400.0
 
 
+def test_a_unit_that_was_set_is_not_said_to_be_told_by_values():
+    assert "told by" not in reading(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").notes[0]
+
+
 def test_the_direction_can_be_set():
     assert beam(MICRON, micron_line_of(90.0), head_turns="CLOCKWISE").angle == pytest.approx(-math.pi / 2)
     assert beam(MICRON, micron_line_of(90.0), head_turns="COUNTER_CLOCKWISE").angle == pytest.approx(math.pi / 2)
