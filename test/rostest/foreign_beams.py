@@ -17,6 +17,7 @@ from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import String
 
 STEPS = 200
+RAYS = 400
 DAMAGED = 500
 WALL = 12.0
 ECHO, MICRON = "ping360_sonar/SonarEcho", "micron_driver_ros/ScanLine"
@@ -81,9 +82,11 @@ class ForeignBeams(unittest.TestCase):
         """The driver publishes its beams, too."""
         kind = message_classes(ECHO)[ECHO]
         other = rospy.Publisher("/ping360/data", kind, queue_size=1)
-        scan = LaserScan(angle_min=-3.14, angle_increment=0.0314, range_max=50.0, ranges=[WALL] * 200)
+        scan = LaserScan(angle_min=-3.14, angle_increment=6.28 / RAYS, range_max=50.0, ranges=[WALL] * RAYS)
         scan.header.frame_id, scan.header.stamp = "sonar", rospy.Time.now()
+        before = int(self.diagnostics.values("sonar_to_cloud")["beams placed"])
         self.publish(LaserScan, [scan])
+        self.diagnostics.wait_for("sonar_to_cloud", "beams placed", before + RAYS)
         self.wait_for_log("/ping360/data (ping360_sonar/SonarEcho)")
         other.unregister()
 

@@ -1,7 +1,7 @@
 """Turns messages of any known type into beams."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, List, Set
+from typing import Any, Dict, List, Optional, Set
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_stamp
@@ -41,9 +41,12 @@ class BeamReader:
         """Return the beams of a message of the type package/Type; raises RefusedInput for one that cannot be used."""
         kind = beam_type(type_name)
         found = _fields(kind, type_name, message)
-        before = self._units.get(type_name)
-        unit = self._units[type_name] = self._unit(kind, found)
-        beams = self._beams(found, kind, unit)
+        unit, before = self._unit(kind, found), self._units.get(type_name)
+        # Angles that do not tell the unit are 0, which is the same in all of them.
+        beams = self._beams(found, kind, unit or kind.unit)
+        if unit is None:
+            return Reading(beams, refused=len(found) - len(beams))
+        self._units[type_name] = unit
         changed = before not in (None, unit)
         return Reading(beams, self._notes(kind, type_name, unit, changed), changed, len(found) - len(beams))
 
@@ -59,13 +62,16 @@ class BeamReader:
             raise problem
         return beams
 
-    def _unit(self, kind: BeamType, found: List[BeamFields]) -> AngleUnit:
+    def _unit(self, kind: BeamType, found: List[BeamFields]) -> Optional[AngleUnit]:
+        """Return the unit of the angles, None before they have told it."""
         if self._parameters.angle_unit is not AngleUnitChoice.TYPE:
             return AngleUnit(self._parameters.angle_unit.value)
         if not kind.may_be_gradians:
             return kind.unit
         guess = self._guesses.setdefault(kind.name, RadiansOrGradians())
-        return [guess.take(one.angle) for one in found][-1]
+        for one in found:
+            guess.take(one.angle)
+        return guess.unit
 
     def _beam(self, found: BeamFields, kind: BeamType, unit: AngleUnit) -> Beam:
         check_stamp(found.stamp_ns)

@@ -131,6 +131,13 @@ def test_a_driver_of_gradians_is_understood_from_its_first_beam_on(first, step):
     np.testing.assert_allclose([one.beams[0].angle for one in echoes_at(angles)], expected)
 
 
+def test_an_angle_of_0_does_not_tell_the_unit_and_needs_none():
+    found = echoes_at([0.0, 0.0, 2.0, 4.0])
+    assert [one.beams[0].angle for one in found[:2]] == [0.0, 0.0]
+    assert [len(one.notes) for one in found] == [0, 0, 1, 0]
+    assert not any(one.unit_changed for one in found)
+
+
 def test_a_single_broken_angle_does_not_change_the_unit():
     angles = [0.1 * number for number in range(1, 9)]
     found = echoes_at([*angles, 390.0, 0.9])
