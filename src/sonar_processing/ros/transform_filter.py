@@ -28,9 +28,10 @@ class _WaitingBeam(NamedTuple):
 class TransformFilter(message_filters.SimpleFilter):
     """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
-    At most `QUEUE_SIZE` beams wait, or what `make_room` was told. A beam is dropped and counted when the queue is full, when it is older than one
-    that was delivered, or when tf can place a later beam of its frame but not this one. A stamp more than
-    `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are forgotten.
+    At most `QUEUE_SIZE` beams wait, or what `make_room` was told. A beam is dropped and counted when the queue is full,
+    when it is older than one that was delivered, or when tf can place a later beam of its frame but not this one. A
+    stamp more than `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are
+    forgotten.
     """
 
     def __init__(
