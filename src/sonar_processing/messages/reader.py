@@ -81,12 +81,17 @@ class BeamReader:
         beam = Beam(
             stamp_ns=found.stamp_ns,
             frame_id=frame_id,
-            angle=(-1.0 if self._is_clockwise(kind) else 1.0) * unit.to_radians(found.angle),
+            angle=self._angle(found.angle, kind, unit),
             intensities=found.intensities,
             range_resolution=found.range_resolution,
             sensor_angle=found.sensor_angle,
         )
         return replace(beam, stamp_ns=beam.stamp_ns - found.travel_time_ns) if kind.stamped_after_reply else beam
+
+    def _angle(self, angle: float, kind: BeamType, unit: AngleUnit) -> float:
+        """Return the angle from +x about +z of the frame, rad."""
+        turned = unit.to_radians(angle) - kind.unit.to_radians(kind.ahead)
+        return -turned if self._is_clockwise(kind) else turned
 
     def _is_clockwise(self, kind: BeamType) -> bool:
         if self._parameters.head_turns is HeadTurns.TYPE:

@@ -79,6 +79,8 @@ def test_a_ping_360_of_the_bluerobotics_sonar_package():
     found = beam(PING_360, ping_360_of(100))
     assert (found.frame_id, found.range_resolution) == ("ping360", 0.5)
     assert found.angle == pytest.approx(math.pi / 2)
+    assert beam(PING_360, ping_360_of(200)).angle == 0.0
+    assert beam(PING_360, ping_360_of(300)).angle == pytest.approx(-math.pi / 2)
 
 
 def test_a_micron_of_the_micron_driver_ros_package():
