@@ -18,6 +18,7 @@ ALLOWED = {
     "dead_reckoning": {"node_support"},
     "sonar_driver": {"node_support"},
     "imagenex_852_driver": {"node_support", "sonar_driver"},
+    "ping360_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
     "recordings": {"imagenex_852_driver", "node_support", "sonar_processing"},
     "mlsm_manager": {"node_support", "recordings", "sonar_processing"},
