@@ -40,6 +40,8 @@ from mlsm_manager.report.mission import Mission
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
+from recordings.inspection.report import report
+from recordings.inspection.survey import survey
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 # The frame that live.yaml's nodes call their map by default.
@@ -50,6 +52,9 @@ def run_map_bag() -> None:
     """Run map_bag with the command line; ends with one line and status 1 when something is wrong with the input."""
     try:
         options = map_bag_arguments(sys.argv[1:])
+        if options.inspect:
+            print("\n\n".join(report(survey(bag, options.request), options.request) for bag in options.bags))
+            return
         summary = map_bag(options)
     except (ParameterError, RecordingError) as error:
         sys.exit(f"map_bag: {error}")
