@@ -30,11 +30,11 @@ class JointSession:
     def place(self, cloud: TimedPoints) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
         points = transformed(self.T_map_odom, cloud.points)
-        return drawn(self.solver.log, self.solver.state, points, cloud.times)
+        return drawn(self.solver.log, self.solver.odometry, self.solver.state, points, cloud.times)
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
-        return corrected_path(self.solver.log, self.solver.state, times)
+        return corrected_path(self.solver.log, self.solver.odometry, self.solver.state, times)
 
     @property
     def start(self) -> float:

@@ -5,7 +5,6 @@ from typing import List, Optional
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
@@ -37,7 +36,7 @@ class LiveSolver:
         """
         self.parameters = parameters
         self.log = RunLog(sonar_in_base)
-        self.odometry = DvlFactors(parameters.odometry)
+        self.odometry = parameters.odometry
         self.estimates: List[LiveEstimate] = []
         self._nodes = GrowingArray(self.odometry.width)
         self._nodes.extend(self.odometry.first_node()[np.newaxis])
@@ -56,8 +55,8 @@ class LiveSolver:
         Raises RefusedInput for a scan that does not end later than the one before.
         """
         self.log.append(scan, self.parameters.window.lookahead)
-        before, after = self.log.node_poses(np.array([-2, -1]))
-        self._nodes.extend(self.odometry.next_node(self._nodes.values[-1], before, after)[np.newaxis])
+        motion = self.log.node_motion(np.array([-2, -1]))
+        self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
         window = LiveWindow(
             self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
             self._start, self._known,

@@ -17,6 +17,7 @@ from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.north_east_down import suspicions
+from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
@@ -62,7 +63,9 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     recording = read_recording(options.bags[0], names)
     options.out.mkdir(parents=True, exist_ok=True)
     shape = echo_shape_of([placed.beam for placed in recording.beams])
-    parameters = suited(options.parameters, shape, options.fixed)
+    odometry = _odometry(recording, options)
+    parameters = with_odometry(options.parameters, odometry.kind, options.fixed)
+    parameters = suited(parameters, shape, options.fixed)
     recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)
@@ -80,6 +83,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     seconds = time.monotonic() - start
     summary = {
         **run.counts,
+        "odometry": {"profile": odometry.kind.value.lower(), "reason": odometry.reason},
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
@@ -90,6 +94,15 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     }
     write_summary(options.out, summary)
     return summary
+
+
+def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
+    """Return which odometry the recording is mapped with; what was found out is said, and can be overruled."""
+    if options.odometry is not None:
+        return OdometryFound(options.odometry, "as it was said")
+    found = odometry_of(recording.track)
+    print(f"map_bag: odometry: {found.kind.value.lower()}, as {found.reason}", file=sys.stderr)
+    return found
 
 
 def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
