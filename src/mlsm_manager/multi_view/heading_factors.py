@@ -8,7 +8,7 @@ from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
 from mlsm_manager.multi_view.odometry_motion import Motion, as_complex
 from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
-from mlsm_manager.multi_view.odometry_terms import add_compass, add_in_the_world_s_scale, add_walk, turned
+from mlsm_manager.multi_view.odometry_terms import add_compass, add_in_the_world_s_scale, turned
 from mlsm_manager.multi_view.state import YAW, Layout
 
 AHEAD, ASIDE, TRAVEL = 3, 4, 5
@@ -93,16 +93,16 @@ class HeadingFactors:
     def _add_speeds(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, durations: np.ndarray) -> None:
         own, (kept, slipping) = self._parameters, self._kept(durations)
         starts = layout.node_start(np.arange(layout.first, layout.last))
-        add_walk(equations, starts, self.width, nodes[:, TRAVEL], TRAVEL, own.travel_walk**2 * durations)
         one, nothing = np.ones(len(starts)), np.zeros(len(starts))
         speeds = (
-            (AHEAD, TRAVEL, kept, 1.0 - kept, own.speed_deviation),
-            (ASIDE, TRAVEL, slipping, nothing, own.slip_deviation),
+            (AHEAD, TRAVEL, kept, 1.0 - kept, own.speed_deviation**2 * (1.0 - kept**2)),
+            (ASIDE, TRAVEL, slipping, nothing, own.slip_deviation**2 * (1.0 - slipping**2)),
+            (TRAVEL, ASIDE, one, nothing, own.travel_walk**2 * durations),
         )
-        for column, around, share, rest, deviation in speeds:
+        for column, around, share, rest, variance in speeds:
             columns = starts[:, np.newaxis] + np.array([self.width + column, column, around])
             residual = nodes[1:, column] - share * nodes[:-1, column] - rest * nodes[:-1, around]
-            weight = 1.0 / np.maximum(deviation**2 * (1.0 - share**2), HELD_DEVIATION**2)
+            weight = 1.0 / np.maximum(variance, HELD_DEVIATION**2)
             jacobian = np.column_stack([one, -share, -rest])
             add_in_the_world_s_scale(equations, layout, columns, jacobian, residual, weight)
 

@@ -17,10 +17,10 @@ _HALF_SECOND = 0.5  # s: the velocity of a point is averaged over one second, lo
 class PlacedPoints:
     """n points in the map.
 
-    scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, by which the nodes' yaw turns them: from base_link to them, and
-    the bow of the path between the nodes. normals: (n, 2).
-    slants: (n,) m. qualities: (n,). shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second.
-    by_run: (n, 2, 2) derivatives of the places by range scale and delay, last axis the unknown.
+    scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, by which the nodes' yaw turns them: from
+    base_link to them, and the bow of the path between the nodes. normals: (n, 2). slants: (n,) m. qualities: (n,).
+    shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second. by_run: (n, 2, 2) derivatives of the
+    places by range scale and delay, last axis the unknown.
     """
 
     scans: np.ndarray
@@ -59,7 +59,8 @@ def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) 
     velocity = path.velocities(times, legs, _HALF_SECOND)
     by_delay = velocity[:, :2] + velocity[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
     return PlacedPoints(
-        scans=scans, places=poses[:, :2] + arms, arms=arms + path.bows(times, legs), normals=rotated(points.normals, poses[:, YAW]),
+        scans=scans, places=poses[:, :2] + arms, arms=arms + path.bows(times, legs),
+        normals=rotated(points.normals, poses[:, YAW]),
         slants=points.slants, qualities=points.qualities, shares=path.shares(times, legs),
         by_run=np.stack([sight, by_delay], axis=2),
     )  # fmt: skip
