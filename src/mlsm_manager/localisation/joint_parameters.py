@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from mlsm_manager.localisation.odometry_choice import OdometryChoice
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
@@ -45,11 +47,21 @@ class JointParameters(OdometryChoice):
     )
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
-        """Return what these and `errors` mean for the solver."""
+        """Return what these and `errors` mean for the solver.
+
+        Where the odometry reports no distances, the sonar's ranges are the only measure of lengths, and nothing in the
+        run tells how far they are off: their scale is held, and its deviation told with the positions.
+        """
+        odometry = self.odometry_model(errors)
+        of_ranges, of_world = range_scale_deviation, 0.0
+        if np.isinf(odometry.distance_deviation):
+            of_ranges, of_world = of_world, of_ranges
         return MultiViewParameters(
-            odometry=self.odometry_model(errors),
+            odometry=odometry,
             sonar=SonarCalibration(
-                range_scale_deviation=range_scale_deviation, sonar_delay_deviation=self.sonar_delay_deviation
+                range_scale_deviation=of_ranges,
+                world_scale_deviation=of_world,
+                sonar_delay_deviation=self.sonar_delay_deviation,
             ),
             matching=SurfaceMatching(range_deviation=self.echo_deviation, block_scans=self.block_scans),
             window=SolverWindow(

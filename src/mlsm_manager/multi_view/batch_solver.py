@@ -7,6 +7,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.association import blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import add_comparisons
+from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
@@ -74,7 +75,9 @@ class _Batch:
         run = self._layout.run_start + np.arange(RUN_COLUMNS)
         nodes = np.arange(self._layout.last + 1)
         poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
-        return np.concatenate(poses), self._columns_of_inverse(run)[run]
+        places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
+        by_scale = scale_covariance(places, self._parameters.sonar.world_scale_deviation)
+        return np.concatenate(poses) + by_scale, self._columns_of_inverse(run)[run]
 
     def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
         columns = self._layout.pose_columns(nodes)

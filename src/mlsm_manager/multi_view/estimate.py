@@ -16,8 +16,8 @@ class LiveEstimate:
     T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. T_map_odom: (3,) the correction. node: (width,)
     the newest node's unknowns. run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
     own_covariance: the same if the frozen map had no error. reported_velocity: (3,) m/s, m/s, rad/s that the odometry
-    reported in base_link. drift: how the true motion differs from it. comparisons: number of points compared with
-    surfaces.
+    reported in base_link. drift: how the true motion differs from it.
+    world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
     mean distance of the scan's points from these surfaces.
     """
@@ -32,14 +32,17 @@ class LiveEstimate:
     own_covariance: np.ndarray
     reported_velocity: np.ndarray
     drift: Drift
+    world_scale_deviation: float
     comparisons: int
     agreement: float
     distance: float
 
     @property
     def pose_covariance(self) -> np.ndarray:
-        """(3, 3) of T_map_base: m^2, m rad, rad^2."""
-        return self.covariance[POSE, POSE]
+        """(3, 3) of T_map_base: m^2, m rad, rad^2; what the world's scale adds grows from the map's origin."""
+        return (
+            self.covariance[POSE, POSE] + scale_covariance(self.T_map_base[np.newaxis], self.world_scale_deviation)[0]
+        )
 
     @property
     def node_deviations(self) -> np.ndarray:
@@ -81,3 +84,9 @@ class LiveEstimate:
     def sonar_delay(self) -> float:
         """Seconds by which beams are later than their stamps."""
         return float(self.run[DELAY])
+
+
+def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:
+    """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map."""
+    lengths = poses * np.array([1.0, 1.0, 0.0])
+    return deviation**2 * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]

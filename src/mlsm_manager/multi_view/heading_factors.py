@@ -8,7 +8,7 @@ from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
 from mlsm_manager.multi_view.odometry_motion import Motion, as_complex
 from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
-from mlsm_manager.multi_view.odometry_terms import add_compass, add_in_the_world_s_scale, turned
+from mlsm_manager.multi_view.odometry_terms import add_compass, add_forgetting, add_walk, turned
 from mlsm_manager.multi_view.state import YAW, Layout
 
 AHEAD, ASIDE, TRAVEL = 3, 4, 5
@@ -77,9 +77,9 @@ class HeadingFactors:
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
         """See OdometryModel."""
         starts = layout.node_start(np.arange(layout.first, layout.last))
-        self._add_positions(equations, layout, nodes, motion)
+        self._add_positions(equations, starts, nodes, motion)
         self._add_yaw(equations, starts, nodes, motion.durations)
-        self._add_speeds(equations, layout, nodes, motion.durations)
+        self._add_speeds(equations, starts, nodes, motion.durations)
 
     def _kept(self, durations: np.ndarray) -> tuple:
         """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
@@ -90,24 +90,20 @@ class HeadingFactors:
     ) -> None:
         add_compass(equations, starts, nodes, durations, self._parameters)
 
-    def _add_speeds(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, durations: np.ndarray) -> None:
+    def _add_speeds(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
+    ) -> None:
         own, (kept, slipping) = self._parameters, self._kept(durations)
-        starts = layout.node_start(np.arange(layout.first, layout.last))
-        one, nothing = np.ones(len(starts)), np.zeros(len(starts))
-        speeds = (
-            (AHEAD, TRAVEL, kept, 1.0 - kept, own.speed_deviation**2 * (1.0 - kept**2)),
-            (ASIDE, TRAVEL, slipping, nothing, own.slip_deviation**2 * (1.0 - slipping**2)),
-            (TRAVEL, ASIDE, one, nothing, own.travel_walk**2 * durations),
-        )
-        for column, around, share, rest, variance in speeds:
-            columns = starts[:, np.newaxis] + np.array([self.width + column, column, around])
-            residual = nodes[1:, column] - share * nodes[:-1, column] - rest * nodes[:-1, around]
-            weight = 1.0 / np.maximum(variance, HELD_DEVIATION**2)
-            jacobian = np.column_stack([one, -share, -rest])
-            add_in_the_world_s_scale(equations, layout, columns, jacobian, residual, weight)
+        add_walk(equations, starts, self.width, nodes[:, TRAVEL], TRAVEL, own.travel_walk**2 * durations)
+        variance = own.slip_deviation**2 * (1.0 - slipping**2)
+        add_forgetting(equations, starts, self.width, nodes[:, ASIDE], ASIDE, slipping, variance)
+        columns = starts[:, np.newaxis] + np.array([self.width + AHEAD, AHEAD, TRAVEL])
+        jacobian = np.column_stack([np.ones(len(starts)), -kept, kept - 1.0])
+        residual = nodes[1:, AHEAD] - kept * nodes[:-1, AHEAD] - (1.0 - kept) * nodes[:-1, TRAVEL]
+        weight = 1.0 / np.maximum(own.speed_deviation**2 * (1.0 - kept**2), HELD_DEVIATION**2)
+        equations.add(columns, jacobian, residual, weight)
 
-    def _add_positions(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        starts = layout.node_start(np.arange(layout.first, layout.last))
+    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         speeds = self.gain(nodes)
         ahead = turned(yaw) * np.diff(self.reference(motion))
@@ -120,7 +116,7 @@ class HeadingFactors:
             by_node = [-part(ahead) / 2.0, -part(1j * ahead) / 2.0, -part(1j * step) / 2.0]
             jacobian = np.column_stack([one, -one, *by_node, *by_node])
             columns = starts[:, np.newaxis] + places
-            add_in_the_world_s_scale(equations, layout, columns, jacobian, part(residual), weight)
+            equations.add(columns, jacobian, part(residual), weight)
 
     def _step_variance(self, durations: np.ndarray) -> np.ndarray:
         """Return the variances (n,) [m^2] of steps whose speeds at both ends are known, in each direction."""

@@ -152,6 +152,7 @@ class LiveWindow:
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
             covariance=self._solution.covariance(newest, self._held_covariance),
             own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
+            world_scale_deviation=self._parameters.sonar.world_scale_deviation,
             reported_velocity=self._log.odometry.velocity_at(self._motion.times[-1]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
             agreement=share, distance=distance,

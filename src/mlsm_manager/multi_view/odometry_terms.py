@@ -4,7 +4,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_parameters import Compass
-from mlsm_manager.multi_view.state import RANGE_SCALE, YAW, Layout
+from mlsm_manager.multi_view.state import YAW
 
 _CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far below any effect
 
@@ -37,19 +37,6 @@ def add_compass(
     kept = np.exp(-durations / compass.heading_time)
     variance = compass.heading_deviation**2 * (1.0 - kept**2) + compass.heading_walk**2 * durations
     add_forgetting(equations, starts, nodes.shape[1], nodes[:, YAW], YAW, kept, variance)
-
-
-def add_in_the_world_s_scale(
-    equations: NormalEquations, layout: Layout, columns: np.ndarray, jacobian: np.ndarray, residual: np.ndarray,
-    weight: np.ndarray,
-) -> None:  # fmt: skip
-    """Add residuals (m,) of true motions, which say nothing of how large the world is.
-
-    They are taken per unit of range scale, which the derivative by it contains; else the fit would shrink the world to
-    make them smaller.
-    """
-    scale = np.full((len(residual), 1), layout.run_start + RANGE_SCALE)
-    equations.add(np.append(columns, scale, axis=1), np.column_stack([jacobian, -residual]), residual, weight)
 
 
 def turned(angle: np.ndarray) -> np.ndarray:

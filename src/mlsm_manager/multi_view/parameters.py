@@ -16,6 +16,13 @@ class SonarCalibration(ParameterSet):
     range_scale_deviation: float = parameter(
         0.02, "its standard deviation: speed of sound between cold fresh and warm salt water", low=0.0, high=0.5
     )
+    world_scale_deviation: float = parameter(
+        0.0,
+        "standard deviation of a scale of ranges and motions together that nothing in the run can tell; it is in the "
+        "told covariances only",
+        low=0.0,
+        high=0.5,
+    )
     sonar_delay: float = parameter(0.0, "seconds by which a beam is later than its stamp", unit="s", low=-5.0, high=5.0)
     sonar_delay_deviation: float = parameter(
         1.0, "its standard deviation: clocks set by hand, stamps taken on arrival", unit="s", low=0.0, high=5.0

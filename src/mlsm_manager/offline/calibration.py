@@ -32,14 +32,14 @@ class Calibration:
         """Return what the newest estimate of a run knows; the solver must have taken a scan."""
         newest, columns = solver.estimates[-1], solver.odometry.calibrated
         of_node, of_run = list(columns.values()), list(_OF_RUN.values())
-        deviations = np.append(newest.run_deviations[of_run], newest.node_deviations[of_node])
+        deviations = np.append(_of_run(newest.run_deviations, solver), newest.node_deviations[of_node])
         return cls((*_OF_RUN, *columns), np.append(newest.run[of_run], newest.node[of_node]), deviations)
 
     @classmethod
     def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
         """Return what the fit of a whole run found; scale and direction are those of the last node."""
         live, of_run = cls.of_live(solver), list(_OF_RUN.values())
-        deviations = np.sqrt(np.diag(batch.run_covariance))[of_run]
+        deviations = _of_run(np.sqrt(np.diag(batch.run_covariance)), solver)
         values = np.append(batch.state.run[of_run], batch.state.nodes[-1, list(solver.odometry.calibrated.values())])
         return cls(live.names, values, np.append(deviations, live.deviations[len(of_run) :]))
 
@@ -59,6 +59,13 @@ class Calibration:
         value["sonar_delay"] = before.sonar_delay + value["sonar_delay"]
         found = {**value, **{f"{name}_deviation": deviation[name] for name in _OF_RUN}}
         return parameters.changed(_allowed(found))
+
+
+def _of_run(deviations: np.ndarray, solver: LiveSolver) -> np.ndarray:
+    """Return deviations (2,) as _OF_RUN; a range scale that the run could not tell is as uncertain as before."""
+    result = deviations[list(_OF_RUN.values())].copy()
+    result[0] = np.hypot(result[0], solver.parameters.sonar.world_scale_deviation)
+    return result
 
 
 def _allowed(values: Dict[str, float]) -> Dict[str, float]:

@@ -97,12 +97,10 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
 
 
 def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
-    """Return which odometry the recording is mapped with; what was found out is said, and can be overruled."""
+    """Return which odometry the recording is mapped with: the one that was said, or else the one that it looks like."""
     if options.odometry is not None:
-        return OdometryFound(options.odometry, "as it was said")
-    found = odometry_of(recording.track)
-    print(f"map_bag: odometry: {found.kind.value.lower()}, as {found.reason}", file=sys.stderr)
-    return found
+        return OdometryFound(options.odometry, "it was said so")
+    return odometry_of(recording.track)
 
 
 def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
@@ -177,7 +175,8 @@ def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session]
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
     lines = [
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
-        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time"
+        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time",
+        f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
     ]
     for name in (ODOMETRY, CORRECTED, REFINED):
         if name in summary:

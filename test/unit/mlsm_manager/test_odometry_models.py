@@ -11,6 +11,7 @@ from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_motion import Motion
@@ -80,22 +81,11 @@ def test_residuals_and_derivatives_agree(kind):
         assert cost == pytest.approx(gradient[model.width + column], rel=1e-3, abs=1e-3)
 
 
-@pytest.mark.parametrize("kind", [OdometryKind.HEADING, OdometryKind.NONE])
-def test_a_larger_world_is_as_likely_where_no_distance_is_reported(kind):
-    """The fit must not shrink the world to make unexpected motions smaller."""
-    model = model_of(kind)
-    layout = Layout(0, 2, model.width)
-    nodes = some_nodes(model)
-    nodes[:, 2] = 0.0
-    nodes[:, model.width - 1 if kind is OdometryKind.NONE else 2] = 0.0
-    nodes[:, :2] -= POSES[:, :2]  # so that positions in the map scale with the nodes
-    equations = equations_of(model, nodes)
-    information, _ = equations.dense()
-    places = nodes.copy()
-    places[:, :2] += POSES[:, :2]
-    larger = np.append(places.ravel(), [1.0, 0.0])
-    np.testing.assert_allclose(information @ larger, 0.0, atol=1e-6 * np.abs(information).max())
-    assert larger.size == layout.size
+def test_what_the_world_s_scale_leaves_open_grows_from_the_map_s_origin():
+    poses = np.array([[0.0, 0.0, 1.0], [30.0, 40.0, 2.0]])
+    covariances = scale_covariance(poses, 0.02)
+    np.testing.assert_allclose(covariances[0], 0.0)
+    assert np.sqrt(np.trace(covariances[1])) == pytest.approx(0.02 * 50.0)
 
 
 def displaced(scan):
