@@ -53,7 +53,9 @@ def _serves(name: str, kind: str, text: str) -> Interface:
     return Interface(Role.SERVICE, name, kind, text)
 
 
-_BEAMS_IN = _subscribes(topics.BEAMS, "SonarScanLine", "beams")
+_BEAMS_IN = _subscribes(
+    topics.BEAMS, "SonarScanLine", "beams; also of the types of other sonars, see [sonars](sonars.md)"
+)
 _JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo")
 _DRIVER_JOINTS_IN = _subscribes(
     topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
@@ -89,7 +91,14 @@ NODES: Dict[str, NodeDescription] = {
             ),
             _publishes(topics.SCANS, "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
             _publishes(topics.LASER_POINTS, "sensor_msgs/PointCloud2", "scans of the LASER modes"),
-            _publishes(topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
+            _publishes(
+                topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping, hector or slam_toolbox"
+            ),
+            _publishes(
+                topics.TURNS,
+                "sensor_msgs/PointCloud2",
+                "every revolution, x y z intensity time in the sonar's frame",
+            ),
             _publishes(
                 topics.POLAR_SCANS,
                 "StampedIntensityCloud",
@@ -219,8 +228,8 @@ NODES: Dict[str, NodeDescription] = {
                 "depth; `depth_type` sets the type",
             ),
             _subscribes(
-                topics.MATCHED_VELOCITY,
-                "geometry_msgs/TwistWithCovarianceStamped",
+                topics.MATCHED_ODOMETRY,
+                "nav_msgs/Odometry",
                 "velocity that mlsm_core estimates, if `velocity_source` is ESTIMATE",
             ),
             _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "velocity if `velocity_source` is COMMANDS"),

@@ -8,6 +8,7 @@ from typing import Any, Callable, Dict, List
 import genpy
 import numpy as np
 from geometry_msgs.msg import TransformStamped
+from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
 from sensor_msgs.msg import JointState, LaserScan
 from tf2_msgs.msg import TFMessage
@@ -41,6 +42,8 @@ class RandomMessages:
 
     def message(self, kind: str) -> Any:
         """Return a message of a type such as sensor_msgs/PointCloud2."""
+        if kind == "rosgraph_msgs/Clock":
+            return self._clock()
         make = self._sane.get(kind)
         if make is None or self._random.random() < 0.1:
             return self._filled(get_message_class(kind)())
@@ -108,6 +111,11 @@ class RandomMessages:
         if self._random.random() < 0.05:
             stamp.nsecs = 2**32 - 1
         return stamp
+
+    def _clock(self) -> Clock:
+        """Return any time that rospy can put into a message again: with too many nanoseconds it cannot."""
+        stamp = self.stamp()
+        return Clock(genpy.Time(stamp.secs, min(stamp.nsecs, 999_999_999)))
 
     def _beam(self) -> SonarScanLine:
         beam = SonarScanLine(maxrange_meters=50.0, range_resolution=1.0, angle=self._random.uniform(-4.0, 4.0))

@@ -19,7 +19,7 @@ ALLOWED = {
     "sonar_driver": {"node_support"},
     "imagenex_852_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
-    "recordings": {"node_support", "sonar_processing"},
+    "recordings": {"imagenex_852_driver", "node_support", "sonar_processing"},
     "mlsm_manager": {"node_support", "recordings", "sonar_processing"},
     "sonar_simulator": {"node_support", "sonar_processing"},
 }

@@ -43,6 +43,11 @@ class Calibration:
         values = np.append(batch.state.run[of_run], batch.state.nodes[-1, list(solver.odometry.calibrated.values())])
         return cls(live.names, values, np.append(deviations, live.deviations[len(of_run) :]))
 
+    @property
+    def by_name(self) -> Dict[str, Tuple[float, float]]:
+        """Value and deviation of each of `names`."""
+        return {name: (float(value), float(own)) for name, value, own in zip(self.names, self.values, self.deviations)}
+
     def to_mapping(self) -> Dict[str, Any]:
         """Return values and deviations by name, rounded for people."""
         return {

@@ -8,6 +8,7 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from node_support.headers import check_stamp
 from node_support.health import Health
 from node_support.ros.node import guarded
 
@@ -32,6 +33,7 @@ class MapTransform:
         stamp = rospy.Time.now() + rospy.Duration(parameters.transform_tolerance)
         if stamp == self._last_stamp:
             return
+        check_stamp(stamp.to_nsec())
         self._last_stamp = stamp
         x, y, yaw = self._correction()
         message = TransformStamped()

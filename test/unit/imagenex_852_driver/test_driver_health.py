@@ -47,7 +47,8 @@ def test_a_device_without_a_port_is_an_error_that_says_why(line):
 @pytest.mark.parametrize(
     ("count", "name"),
     [("timeouts", "timeouts"), ("bad_frames", "bad frames"), ("overruns", "overruns"),
-     ("unexpected_replies", "unexpected replies"), ("rejected_switches", "rejected switches")],
+     ("unexpected_replies", "unexpected replies"), ("early_replies", "early replies"),
+     ("rejected_switches", "rejected switches")],
 )  # fmt: skip
 def test_every_problem_warns_and_is_counted(line, count, name):
     report = line.report(**{count: 3})
