@@ -9,10 +9,11 @@ from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
+from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
-from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.state import RUN_COLUMNS, State
 
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 
@@ -57,6 +58,7 @@ class LiveSolver:
         self.log.append(scan, self.parameters.window.lookahead)
         motion = self.log.node_motion(np.array([-2, -1]))
         self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
+        self._search()
         window = LiveWindow(
             self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
             self._start, self._known,
@@ -68,3 +70,11 @@ class LiveSolver:
         self._node_covariances.replace_from(window.oldest, window.covariances_of_oldest())
         self.estimates.append(window.estimate())
         return self.estimates[-1]
+
+    def _search(self) -> None:
+        """Put the newest node where its scan fits, if the motion is hardly known."""
+        if not self.estimates:
+            return
+        covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+        matching = self.parameters.matching
+        self._nodes.values[-1] = searched_node(self.log, self.odometry, self.state, covariance, matching)
