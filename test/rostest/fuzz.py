@@ -30,6 +30,7 @@ from roslib.message import get_message_class
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 
 from underwater_map_construction.msg import SonarScanLine
 
@@ -78,6 +79,7 @@ class Fuzz(unittest.TestCase):
         self._publish()
         self._expect_all_alive()
         self._expect_a_scan()
+        self._expect_the_correction()
         self._expect_no_internal_error()
         self._expect_all_alive()
 
@@ -127,6 +129,16 @@ class Fuzz(unittest.TestCase):
                 return
             time.sleep(1.0)
         self.fail(f"no sane scan in the map; {self.statuses}")
+
+    def _expect_the_correction(self) -> None:
+        """Wait for map -> odom, which a timer of its own sends."""
+        Inbox("/tf", TFMessage).wait_for(_is_correction)
+
+
+def _is_correction(message: TFMessage) -> bool:
+    """Return whether a message of tf holds a map -> odom of the last seconds."""
+    now = time.time()
+    return any(t.header.frame_id == "map" and abs(t.header.stamp.to_sec() - now) < 5.0 for t in message.transforms)
 
 
 def _launched(processes: str) -> Set[str]:

@@ -25,6 +25,15 @@ class OdometryTimeline:
         timeline.extend(track, np.inf)
         return timeline
 
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def shorten(self, count: int) -> None:
+        """Keep the oldest `count` poses."""
+        self._times.shorten(count)
+        self._poses.shorten(count)
+        self._ahead.shorten(count)
+
     @property
     def end(self) -> float:
         """Time of the newest pose [s]; minus infinity without any."""

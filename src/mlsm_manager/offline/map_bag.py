@@ -13,6 +13,7 @@ from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
@@ -67,10 +68,10 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     for note in recording.notes:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
-    shape = echo_shape_of([placed.beam for placed in recording.beams])
     odometry = _odometry(recording, options)
     parameters = with_odometry(options.parameters, odometry.kind, options.fixed)
-    parameters = suited(parameters, shape, options.fixed)
+    beams = [placed.beam for placed in recording.beams]
+    parameters = suited(parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
     recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)

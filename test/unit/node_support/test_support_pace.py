@@ -1,6 +1,6 @@
 import pytest
 
-from sonar_simulator.simulation.pace import Pace
+from node_support.pace import Pace
 
 
 class Clock:

@@ -1,4 +1,4 @@
-"""Keeps simulated time in step with the wall clock. Free of ROS."""
+"""Keeps simulated or recorded time in step with the wall clock. Free of ROS."""
 
 import time
 from typing import Callable
@@ -8,7 +8,7 @@ _CATCH_UP = 0.5
 
 
 class Pace:
-    """Waits until a simulated time is reached, at `factor` simulated seconds per second of wall time.
+    """Waits until a simulated or recorded time is reached, at `factor` of its seconds per second of wall time.
 
     A machine that is too slow, or was stopped, does not make time run faster afterwards: the schedule is
     shifted, and the delay is counted in `lost`.
