@@ -88,23 +88,16 @@ def test_what_the_world_s_scale_leaves_open_grows_from_the_map_s_origin():
     assert np.sqrt(np.trace(covariances[1])) == pytest.approx(0.02 * 50.0)
 
 
-def displaced(scan):
-    """Return a scan whose odometry reports other positions and the same headings."""
-    track = scan.track
-    other = np.column_stack([3.0 + np.sin(track.times / 9.0), 0.2 * track.times, track.poses[:, 2]])
-    move = composed(Track(track.times, other).at(scan.times), inverse(track.at(scan.times)))
-    return replace(scan, points=transformed(move, scan.points), track=Track(track.times, other))
-
-
-def test_a_heading_needs_no_positions():
-    """Not even wrong ones change anything: what is reported and what is not are the same."""
-    scans = tour(4).scans
-    as_reported, as_displaced = (
-        followed(some, OdometryKind.HEADING).estimates[-1].T_map_base for some in (scans, map(displaced, scans))
-    )
-    first = Track(scans[0].track.times, scans[0].track.poses).at(0.0)[:2]
-    origin = np.append(first - [3.0, 0.0], 0.0)
-    np.testing.assert_allclose(as_reported, as_displaced + origin, atol=0.05)
+@pytest.mark.parametrize("kind", [OdometryKind.HEADING, OdometryKind.NONE])
+def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
+    model = model_of(kind)
+    nodes, positions = some_nodes(model), np.array([[5.0, 1.0], [-3.0, 9.0], [0.0, 4.0]])
+    elsewhere = nodes.copy()
+    elsewhere[:, :2] += POSES[:, :2] - positions
+    other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead)
+    there = NormalEquations(Layout(0, 2, model.width).size)
+    model.add_steps(there, Layout(0, 2, model.width), elsewhere, other)
+    np.testing.assert_allclose(there.gradient, equations_of(model, nodes).gradient, rtol=1e-9, atol=1e-9)
 
 
 def test_ahead_is_where_a_vehicle_would_be_that_always_went_ahead():
