@@ -38,3 +38,13 @@ class Motion:
 def as_complex(vectors: np.ndarray) -> np.ndarray:
     """Return x + i y (...) of vectors (..., >= 2)."""
     return vectors[..., 0] + 1j * vectors[..., 1]
+
+
+def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the product of complex numbers (...) and (...).
+
+    numpy multiplies a few complex numbers with or without fused operations, depending on where in memory they lie. The
+    results differ in the last bit, so that equal runs would end differently.
+    """
+    real = first.real * second.real - first.imag * second.imag
+    return real + 1j * (first.real * second.imag + first.imag * second.real)
