@@ -3,13 +3,12 @@
 import math
 from typing import List, NamedTuple
 
-from brping.pingmessage import PingMessage
-
 from ping360_driver.protocol.messages import (
     HEADER_LENGTH,
     START,
     MessageError,
     MessageId,
+    PingMessage,
     frame_length,
     is_whole,
     unpacked,

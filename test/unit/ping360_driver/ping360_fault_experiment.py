@@ -51,7 +51,7 @@ def run(mode: ScanMode, commands: int, rate: float, seed: int = 0) -> Account:
     stop = VirtualStop(time)
     faults = RecordingInjector(fault_rates(rate), seed, commands, stop)
     line = VirtualLine(emulated("virtual", faults), BAUD_RATE, time)
-    device = Ping360Device(connection_to("virtual"), stop, time.elapsed, time.elapsed, line.open)
+    device = Ping360Device(connection_to("virtual", reply_margin=0.15), stop, time.elapsed, time.elapsed, line.open)
     delivered: List[int] = []
     command = SETTINGS.changed({"scan_mode": mode.value}).command()
     scanner = Scanner(device, command, lambda ping: delivered.append(number(ping)))
