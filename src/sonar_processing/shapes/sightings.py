@@ -9,8 +9,8 @@ import numpy as np
 class Sightings:
     """Echoes in the order of their beams.
 
-    points: (n, 2) x y [m]. origins: (n, 2) where the sonar was. beams: (n,) number of the beam, growing.
-    weights: (n,) number of cloud points in each echo.
+    points: (n, 2) x y [m]. origins: (n, 2) where the sonar was. beams: (n,) number of the beam, growing; a beam without
+    echoes has a number too. weights: (n,) number of cloud points in each echo.
     step: usual angle from beam to beam, rad, in the cloud's frame: a vehicle that turns with its head widens it.
     """
 
@@ -38,8 +38,18 @@ class Sightings:
 
 def sightings(points: np.ndarray, origins: np.ndarray, times: np.ndarray, weights: np.ndarray) -> Sightings:
     """Return the echoes (n, 2) [m] seen from origins (n, 2) [m] by beams that were taken at times (n,) [s]."""
-    _, first, beams = np.unique(times, return_index=True, return_inverse=True)
+    taken, first, inverse = np.unique(times, return_index=True, return_inverse=True)
+    numbers = _beam_numbers(taken)
     axes = (points - origins)[first]
-    steps = np.abs(np.diff(np.unwrap(np.arctan2(axes[:, 1], axes[:, 0]))))
+    steps = np.abs(np.diff(np.unwrap(np.arctan2(axes[:, 1], axes[:, 0])))) / np.diff(numbers)
     steps = steps[steps > 0.0]
-    return Sightings(points, origins, beams, weights, float(np.median(steps)) if len(steps) else 0.0)
+    return Sightings(points, origins, numbers[inverse], weights, float(np.median(steps)) if len(steps) else 0.0)
+
+
+def _beam_numbers(taken: np.ndarray) -> np.ndarray:
+    """Return (b,) numbers of beams taken at growing times (b,) [s]; between two that are far apart, some were silent."""
+    intervals = np.diff(taken)
+    if not len(intervals):
+        return np.zeros(len(taken), dtype=int)
+    counts = np.maximum(np.rint(intervals / np.median(intervals)).astype(int), 1)
+    return np.append(0, np.cumsum(counts))
