@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, Type
 
+from dead_reckoning.parameters import DeadReckoningParameters
 from imagenex_852_driver.emulator.parameters import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
@@ -55,6 +56,7 @@ class LiveNode:
 
 LIVE_NODES: Dict[str, LiveNode] = {
     "circle_detector": LiveNode(CircleDetectorParameters, "CircleDetector"),
+    "dead_reckoning": LiveNode(DeadReckoningParameters, "DeadReckoning"),
     "echo_extractor": LiveNode(EchoExtractorParameters, "EchoExtractor"),
     "imagenex_852_driver": LiveNode(DriverParameters, "Imagenex852"),
     "imagenex_852_emulator": LiveNode(EmulatorParameters, "Imagenex852Emulator"),

@@ -53,7 +53,9 @@ def _serves(name: str, kind: str, text: str) -> Interface:
     return Interface(Role.SERVICE, name, kind, text)
 
 
-_BEAMS_IN = _subscribes(topics.BEAMS, "SonarScanLine", "beams")
+_BEAMS_IN = _subscribes(
+    topics.BEAMS, "SonarScanLine", "beams; also of the types of other sonars, see [sonars](sonars.md)"
+)
 _JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo")
 _DRIVER_JOINTS_IN = _subscribes(
     topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
@@ -89,7 +91,14 @@ NODES: Dict[str, NodeDescription] = {
             ),
             _publishes(topics.SCANS, "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
             _publishes(topics.LASER_POINTS, "sensor_msgs/PointCloud2", "scans of the LASER modes"),
-            _publishes(topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
+            _publishes(
+                topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping, hector or slam_toolbox"
+            ),
+            _publishes(
+                topics.TURNS,
+                "sensor_msgs/PointCloud2",
+                "every revolution, x y z intensity time in the sonar's frame",
+            ),
             _publishes(
                 topics.POLAR_SCANS,
                 "StampedIntensityCloud",
@@ -208,6 +217,27 @@ NODES: Dict[str, NodeDescription] = {
             _serves("~get_region", "GetRegion", "returns the blocks in a box"),
         ),
     ),
+    "dead_reckoning": NodeDescription(
+        "Odometry for a vehicle without a DVL: adds up the velocity that the scans tell, or that the thrusters are "
+        "told, along the heading of a compass. See [dead_reckoning](dead_reckoning.md).",
+        (
+            _subscribes(topics.HEADING, "sensor_msgs/Imu", "orientation, x east or any fixed direction, z up"),
+            _subscribes(
+                topics.DEPTH,
+                "PoseWithCovarianceStamped, Float64 or FluidPressure",
+                "depth; `depth_type` sets the type",
+            ),
+            _subscribes(
+                topics.MATCHED_ODOMETRY,
+                "nav_msgs/Odometry",
+                "velocity that mlsm_core estimates, if `velocity_source` is ESTIMATE",
+            ),
+            _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "velocity if `velocity_source` is COMMANDS"),
+            _subscribes("tf", "", "`base_link -> ` frame of the compass: how it is mounted"),
+            _publishes("tf", "", "`odom -> base_link` at each heading"),
+            _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "the same with the velocity"),
+        ),
+    ),
     "sonar_simulator": NodeDescription(
         "Simulates the vehicle Charl-e with a scanning sonar on a tilt servo, in a world from a file (thesis 6.4). It "
         "publishes `/clock`. The vehicle follows a script or `cmd_vel`; the odometry error is configurable. See "
@@ -218,6 +248,8 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(topics.SERVO_COMMANDS, "std_msgs/Float64", "goal of the servo, rad, positive down"),
             _publishes(topics.BEAMS, "SonarScanLine", "beams"),
             _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "dead reckoning with the configured errors; also as tf"),
+            _publishes(topics.HEADING, "sensor_msgs/Imu", "orientation, if `instruments` is COMPASS"),
+            _publishes(topics.DEPTH, "std_msgs/Float64", "depth, if `instruments` is COMPASS"),
             _publishes(topics.GROUND_TRUTH, "nav_msgs/Odometry", "the true pose and velocity"),
             _publishes(
                 topics.JOINT_STATES,

@@ -15,6 +15,9 @@ LASER_POINTS = "sonar/scan/laserCloud"
 LASER_SCANS = "sonar/scan/laserScan"
 """LaserScan: whole revolutions of the head as a planar laser would measure them."""
 
+TURNS = "sonar/scan/turn"
+"""PointCloud2 with a time per point: whole revolutions of the head, seen from the pose of the newest beam."""
+
 POLAR_SCANS = "sonar/scan/polar"
 """StampedIntensityCloud, organised: whole revolutions of the head, one row for each beam."""
 
@@ -51,11 +54,17 @@ SERVO_COMMANDS = "sonar_servo/command"
 VELOCITY_COMMANDS = "cmd_vel"
 """Twist: where the vehicle shall go; taken for its velocity where nothing better is published."""
 
+HEADING = "imu"
+"""Imu: the orientation that a compass or an AHRS measures."""
+
+DEPTH = "depth"
+"""PoseWithCovarianceStamped, Float64 or FluidPressure: what a depth sensor measures."""
+
 VELOCITY = "velocity"
 """Twist: the velocity that the simulated vehicle measures."""
 
 ODOMETRY = "odom"
-"""Odometry: the simulated vehicle's dead reckoning."""
+"""Odometry: the vehicle's dead reckoning."""
 
 GROUND_TRUTH = "ground_truth"
 """Odometry: where the simulated vehicle truly is."""

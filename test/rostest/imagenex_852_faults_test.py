@@ -13,8 +13,9 @@ sys.path.insert(0, os.path.join(_HERE, os.pardir, "unit", "imagenex_852_driver")
 from driver_listener import PATIENCE, beams, diagnostics, values  # noqa: E402
 from fault_experiment import GOOD, NumberedEchoes, RecordingInjector, fault_rates  # noqa: E402
 
-from imagenex_852_driver.emulator import EmulatedHead, Fault, PtyServer  # noqa: E402
+from imagenex_852_driver.emulator import Emulated852  # noqa: E402
 from imagenex_852_driver.line.timing import LineTiming  # noqa: E402
+from sonar_driver.emulator import Fault, HeadServer, PtyLine  # noqa: E402
 
 _TIMING = LineTiming(baud_rate=1152000, speed_of_sound=15000.0)
 _DRIVERS_MARGIN = 0.25
@@ -28,8 +29,8 @@ class TestFaults(unittest.TestCase):
         out_of_commands = threading.Event()
         rates = fault_rates(rospy.get_param("~rate"), _DRIVERS_MARGIN)
         cls.faults = RecordingInjector(rates, 0, rospy.get_param("~commands"), out_of_commands)
-        head = EmulatedHead(NumberedEchoes(), cls.faults, _TIMING)
-        with PtyServer(head, rospy.get_param("~port")):
+        head = Emulated852(NumberedEchoes(), cls.faults, _TIMING)
+        with HeadServer(head, PtyLine(rospy.get_param("~port"))):
             assert out_of_commands.wait(rospy.get_param("~time_limit"))
             cls.expected = [number for number, fault in enumerate(cls.faults.of_pings) if fault in GOOD]
             cls.beams.wait(lambda received: len(received) >= len(cls.expected), PATIENCE)

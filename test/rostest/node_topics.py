@@ -25,7 +25,11 @@ COMMON_ENDINGS = (
     "/set_logger_level",
 )
 # What a node has with other parameters than it has here, and where messages are installed that are missing here.
-OPTIONAL = {"sonar_simulator": {"/cmd_vel"}, "mlsm_core": set() if has_octomap_messages() else {"/MLSM/octomap"}}
+OPTIONAL = {
+    "sonar_simulator": {"/cmd_vel", "/imu", "/depth"},
+    "dead_reckoning": {"/cmd_vel", "/depth"},
+    "mlsm_core": set() if has_octomap_messages() else {"/MLSM/octomap"},
+}
 
 
 class NodeTopics(unittest.TestCase):

@@ -15,9 +15,12 @@ import pytest
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 ALLOWED = {
     "node_support": set(),
-    "imagenex_852_driver": {"node_support"},
+    "dead_reckoning": {"node_support"},
+    "sonar_driver": {"node_support"},
+    "imagenex_852_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
-    "mlsm_manager": {"node_support", "sonar_processing"},
+    "recordings": {"imagenex_852_driver", "node_support", "sonar_processing"},
+    "mlsm_manager": {"node_support", "recordings", "sonar_processing"},
     "sonar_simulator": {"node_support", "sonar_processing"},
 }
 ROS_NAMES = {

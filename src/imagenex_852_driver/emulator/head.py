@@ -1,33 +1,33 @@
 """The emulated head: a state machine from commands to replies with the delays of sound and line."""
 
-from typing import List, NamedTuple, Optional
+from typing import List, Optional
 
-from imagenex_852_driver.emulator.echo_source import EchoSource, FixedPattern, PingRequest
-from imagenex_852_driver.emulator.faults import Fault, FaultInjector
 from imagenex_852_driver.emulator.head_rotation import HeadRotation
+from imagenex_852_driver.emulator.parameters import FaultRates852
 from imagenex_852_driver.line.timing import LineTiming
 from imagenex_852_driver.protocol import CommandReader, Reply, SwitchCommand
 from imagenex_852_driver.protocol.angles import head_angle
 from imagenex_852_driver.protocol.errors import SONAR_HEAD_ID
-from imagenex_852_driver.protocol.reply import OVERRUN, SWITCHES_ACCEPTED
+from imagenex_852_driver.protocol.reply import HEADER_LENGTH, OVERRUN, SWITCHES_ACCEPTED
+from sonar_driver.emulator import (
+    EchoSource,
+    EmulatedHead,
+    Fault,
+    FaultInjector,
+    FixedPattern,
+    PingRequest,
+    Transmission,
+)
 
 _SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (manufacturer's specification)
-# A serial adapter passes on the bytes of a reply in pieces of about this size.
-_PIECE = 64
+_FULL_STRENGTH_DB = 20  # Start gain at which an echo has its usual strength
 
 
-class Transmission(NamedTuple):
-    """Bytes that leave the head at `time` (seconds of the caller's clock)."""
-
-    time: float
-    data: bytes
-
-
-class EmulatedHead:
-    """An Imagenex 852 in software: bytes and times in, bytes and times out, without its own clock or port.
+class Emulated852(EmulatedHead):
+    """An Imagenex 852 in software.
 
     It answers only commands that carry its identification, with the commanded range, number of points, gain and
-    delay, and turns as commanded. Until the time `absent_until`, whoever serves it removes the port.
+    delay, and turns as commanded.
     """
 
     def __init__(
@@ -37,13 +37,10 @@ class EmulatedHead:
         timing: Optional[LineTiming] = None,
         head_id: int = SONAR_HEAD_ID,
     ) -> None:
-        self.faults = faults or FaultInjector()
-        self.absent_until = float("-inf")
-        self._echo_source = echo_source or FixedPattern()
         self._timing = timing or LineTiming()
+        super().__init__(faults or FaultInjector(FaultRates852()), self._timing.baud_rate)
+        self._echo_source = echo_source or FixedPattern()
         self._head_id = head_id
-        self._silent_until = float("-inf")
-        self._line_free = float("-inf")
         self.reboot()
 
     def reboot(self) -> None:
@@ -63,27 +60,17 @@ class EmulatedHead:
         if time < self._silent_until:
             return []
         fault = self.faults.next()
-        rates = self.faults.rates
-        if fault is Fault.SILENCE:
-            self._silent_until = time + rates.silence_duration
-            return []
-        if fault is Fault.DISAPPEARANCE:
-            self.absent_until = time + rates.absence_duration
+        if self._struck_dumb(fault, time):
             return []
         frame = self._ping(command, time, overrun=fault is Fault.OVERRUN).encode()
-        lateness = rates.lateness if fault is Fault.LATE else 0.0
         # A command is complete when its last byte has arrived.
-        begin = time + self._timing.reply_begins(command) - self._timing.ping_leaves() + lateness
-        return self._paced(self._spoilt(fault, frame), begin)
+        begin = time + self._timing.reply_begins(command) - self._timing.ping_leaves()
+        return self._transmissions(fault, frame, begin)
 
-    def _spoilt(self, fault: Fault, frame: bytes) -> bytes:
-        if fault is Fault.DROPPED:
-            return b""
-        if fault is Fault.GARBLED:
-            return self.faults.garble(frame)
-        if fault is Fault.TRUNCATED:
-            return self.faults.truncate(frame)
-        return frame * 2 if fault is Fault.DOUBLED else frame
+    def _garbled(self, frame: bytes) -> bytes:
+        # The protocol has no checksum, so no driver can tell a garbled echo from a true one: the letters, the data
+        # count or the terminator is always changed.
+        return self.faults.garble(frame, range(HEADER_LENGTH, len(frame)), (0, 1, 2, 10, 11, len(frame) - 1))
 
     def _ping(self, command: SwitchCommand, time: float, overrun: bool) -> Reply:
         self._motion.obey(command)
@@ -91,7 +78,8 @@ class EmulatedHead:
         kind = command.reply_kind
         echoes = b""
         if kind.echo_count:
-            ping = PingRequest(time, head_angle(position), kind.echo_count, command)
+            gain_db = command.start_gain_db - _FULL_STRENGTH_DB
+            ping = PingRequest(time, head_angle(position), kind.echo_count, command.max_range, gain_db)
             echoes = self._echo_source.echoes(ping)
         self._motion.step(command)
         return Reply(
@@ -103,13 +91,3 @@ class EmulatedHead:
             max_range=command.max_range,
             echoes=echoes,
         )
-
-    def _paced(self, data: bytes, begin: float) -> List[Transmission]:
-        begin = max(begin, self._line_free)
-        pieces = []
-        for start in range(0, len(data), _PIECE):
-            piece = data[start : start + _PIECE]
-            pieces.append(Transmission(begin + self._timing.transmission(start + len(piece)), piece))
-        if pieces:
-            self._line_free = pieces[-1].time
-        return pieces

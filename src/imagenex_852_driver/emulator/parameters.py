@@ -1,43 +1,29 @@
-"""Parameters of the emulated head: where it is served, what it hears and what goes wrong."""
+"""Parameters of the emulated head: those of every head, and what only the 852 has."""
 
 from dataclasses import dataclass
-from enum import Enum
 
-from imagenex_852_driver.emulator import FaultRates
 from imagenex_852_driver.line.timing import LineTiming
 from imagenex_852_driver.protocol.errors import HEAD_IDS, SONAR_HEAD_ID
-from node_support.parameters import parameter
-
-
-class EchoSourceKind(Enum):
-    """Where the echoes come from."""
-
-    PATTERN = "pattern"
-    WORLD = "world"
+from node_support.parameters import parameter, with_defaults
+from sonar_driver.emulator.faults import FaultRates
+from sonar_driver.emulator.parameters import EmulatedHeadParameters
 
 
 @dataclass(frozen=True)
-class EmulatorParameters(FaultRates):
+class FaultRates852(FaultRates):
+    """The faults of this head."""
+
+    overrun: float = parameter(0.0, "share of replies that report a character overrun", low=0.0, high=1.0)
+
+
+@dataclass(frozen=True)
+@with_defaults(link="/tmp/imagenex_852")
+class EmulatorParameters(EmulatedHeadParameters, FaultRates852):
     """Parameters of imagenex_852_emulator."""
 
-    link: str = parameter("/tmp/imagenex_852", "path at which the port appears", tunable=False)
-    baud_rate: int = parameter(115200, "speed of the line", unit="bit/s", low=1200, tunable=False)
-    speed_of_sound: float = parameter(1500.0, "speed of sound in the water", unit="m/s", low=1000.0, tunable=False)
     head_id: int = parameter(
         SONAR_HEAD_ID, "identification of the head", low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False
     )
-    seed: int = parameter(0, "seed of the faults and of the noise", low=0, tunable=False)
-    echo_source: EchoSourceKind = parameter(
-        EchoSourceKind.PATTERN, "four walls of a square basin, or the simulator's ray caster", tunable=False
-    )
-    wall_distance: float = parameter(
-        4.0, "pattern: distance to each wall", unit="m", low=0.1, high=100.0, tunable=False
-    )
-    world_file: str = parameter("worlds/basin.sdf", "world: SDF file; relative to the package's folder", tunable=False)
-    x: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
-    y: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
-    z: float = parameter(-2.0, "world: position of the head", unit="m", tunable=False)
-    yaw_deg: float = parameter(0.0, "world: heading of the head, counter-clockwise", unit="deg", tunable=False)
 
     def timing(self) -> LineTiming:
         """Return the timing of pings on this line."""

@@ -4,8 +4,7 @@ from dataclasses import dataclass
 
 from imagenex_852_driver.protocol import SwitchCommand
 from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
-
-_BITS_PER_BYTE = 10  # 8N1: one start bit, eight data bits, one stop bit
+from sonar_driver.line.timing import transmission_time
 
 
 @dataclass(frozen=True)
@@ -17,7 +16,7 @@ class LineTiming:
 
     def transmission(self, byte_count: int) -> float:
         """Return the time that `byte_count` bytes take on the line."""
-        return byte_count * _BITS_PER_BYTE / self.baud_rate
+        return transmission_time(byte_count, self.baud_rate)
 
     def ping_leaves(self) -> float:
         """Return when the head transmits: it acts on the last byte of the command."""

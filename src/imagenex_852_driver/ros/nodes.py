@@ -5,20 +5,21 @@ import sys
 import rospy
 
 from imagenex_852_driver.logs.arguments import convert_arguments, play_arguments, record_arguments
-from imagenex_852_driver.ros.driver_node import DriverNode
-from imagenex_852_driver.ros.emulator_node import EmulatorNode, WorldEchoes
 from imagenex_852_driver.ros.log_tools import LogPlayer, LogRecorder, convert, summary
+from imagenex_852_driver.ros.model import EmulatedImagenex852, Imagenex852
 from node_support.ros.node import StartError, run
+from sonar_driver.ros.driver_node import DriverNode
+from sonar_driver.ros.emulator_node import EmulatorNode, WorldEchoes
 
 
 def run_driver() -> None:
     """Run the driver."""
-    run("imagenex_852_driver", DriverNode)
+    run(Imagenex852.name, lambda: DriverNode(Imagenex852()))
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
     """Run the emulated head; `world_echoes` builds the echoes of the simulator."""
-    run("imagenex_852_emulator", lambda: EmulatorNode(world_echoes))
+    run(EmulatedImagenex852.name, lambda: EmulatorNode(EmulatedImagenex852(), world_echoes))
 
 
 def run_player() -> None:

@@ -6,8 +6,9 @@ from typing import Deque, List, Mapping, Optional, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.keyframe_map import Drawn, KeyframeMap
 from mlsm_manager.localisation.mapper import (
     MOST_WAITING,
     NOTHING_INSERTED,
@@ -32,7 +33,6 @@ from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 # Points of the path within a scan: about one per second of a slow head's revolution.
@@ -65,14 +65,14 @@ class JointMapper:
         self.clear()
 
     def _new_map(self, resolution: float, expected_blocks: int) -> KeyframeMap:
-        return KeyframeMap(resolution, self.settings.limit, expected_blocks, self.settings.kernel)
+        settings = self.settings
+        return KeyframeMap(resolution, settings.limit, expected_blocks, settings.kernel, settings.carver)
 
     def clear(self) -> None:
         """Forget the map and the place in it."""
         self._session: Optional[JointSession] = None
         self._shown = self._new_map(self.settings.resolution, self.settings.expected_blocks)
         self._matched = self._new_map(self.settings.match_resolution, 0)
-        self._free = MultiLevelSurfaceMap(self.settings.resolution, self.settings.limit)
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -81,6 +81,7 @@ class JointMapper:
         self.belief: Optional[Belief] = None
         self.correction = _ORIGIN
         self._start: Optional[np.ndarray] = None
+        self._history = CorrectionHistory()
         self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
 
     @property
@@ -124,8 +125,9 @@ class JointMapper:
 
     @property
     def layers(self) -> Mapping[Layer, Blocks]:
-        """Copies of both maps, to be stored, each made when it is asked for; no free space is known."""
-        return LayerCopies({Layer.SHOWN: self._shown.map, Layer.MATCHED: self._matched.map, Layer.FREE: self._free})
+        """Copies of all maps, to be stored, each made when it is asked for."""
+        maps = {Layer.SHOWN: self._shown.map, Layer.MATCHED: self._matched.map, Layer.FREE: self._shown.free}
+        return LayerCopies(maps)
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
@@ -148,6 +150,8 @@ class JointMapper:
         blocks = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
         shown.map.insert_blocks(blocks)
         matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
+        if Layer.FREE in layers:
+            shown.free.restore(layers[Layer.FREE])
         self.forget_place()
         self._shown, self._matched = shown, matched
 
@@ -174,18 +178,22 @@ class JointMapper:
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
         """Put a cloud into the map that is shown, or let it wait for the scan of its time."""
         if not self.matching:
-            return self.take_placed(transformed(self.correction, cloud.points))
+            return self._show(cloud, self.correction, self._history.positions(cloud.times))
         if self._session is not None and cloud.end <= self._session.start:
-            return self.take_placed(transformed(self._session.T_map_odom, cloud.points))
+            return self._show(cloud, self._session.T_map_odom, None)
         if self._session is None or cloud.end > self._session.solver.log.node_times[-1]:
             self._waiting.append(cloud)
             return CloudUpdate(NOTHING_INSERTED, True, 0)
         self._shown.add(cloud)
-        return CloudUpdate(self._shown.draw(self._session.place, self._session.settled_until), False, 0)
+        return _cloud_update(self._shown.draw(self._session, self._session.settled_until))
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""
         return CloudUpdate(self._shown.insert(points), False, 0)
+
+    def _show(self, cloud: TimedPoints, T_map_odom: np.ndarray, origins: Optional[np.ndarray]) -> CloudUpdate:
+        points = transformed(T_map_odom, cloud.points)
+        return _cloud_update(self._shown.insert_cloud(points, cloud.times, origins))
 
     def take_waiting(self) -> Optional[CloudUpdate]:
         """Insert the next cloud that waited, if its time is known now; None when there is none."""
@@ -210,7 +218,7 @@ class JointMapper:
         estimate = session.add(scan)
         self._session = session
         self._matched.add(TimedPoints.of_scan(scan))
-        self._matched.draw(session.place, session.settled_until)
+        self._matched.draw(session, session.settled_until)
         self.correction = _correction(estimate.T_map_base, scan)
         self.belief = self._belief(estimate)
         if not estimate.comparisons:
@@ -222,7 +230,10 @@ class JointMapper:
         pose = composed(self.correction, scan.reference_pose)
         theta = np.concatenate([pose, np.zeros(STATES - POSE_COLUMNS)])
         self.belief = Belief(scan.reference_time, theta, self.errors.covariance())
-        self._matched.insert(transformed(self.correction, scan.points))
+        times = np.linspace(scan.start, scan.reference_time, _PATH_POINTS)
+        self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
+        points = transformed(self.correction, scan.points)
+        self._matched.insert_cloud(points, scan.times, self._history.positions(scan.times))
         return ScanUpdate(scan, None, True, self.belief)
 
     def _new_session(self) -> JointSession:
@@ -232,8 +243,8 @@ class JointMapper:
 
     def _end_session(self) -> None:
         if self._session is not None:
-            self._shown.settle(self._session.place)
-            self._matched.settle(self._session.place)
+            self._shown.settle(self._session)
+            self._matched.settle(self._session)
         self._session = None
         self._start = None
 
@@ -261,3 +272,7 @@ def _correction(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
     correction = composed(T_map_base, inverse(scan.reference_pose))
     correction[2] = wrapped(correction[2])
     return correction
+
+
+def _cloud_update(drawn: Drawn) -> CloudUpdate:
+    return CloudUpdate(drawn.report, False, 0, drawn.carved)

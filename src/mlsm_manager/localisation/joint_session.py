@@ -9,6 +9,7 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.drawing import corrected_path, drawn
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.state import DELAY
 from node_support.geometry.planar import composed, transformed
 
 
@@ -27,10 +28,15 @@ class JointSession:
         """Learn the odometry up to `time` [s], which `track` holds."""
         self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
 
-    def place(self, cloud: TimedPoints) -> np.ndarray:
+    def points(self, cloud: TimedPoints) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
         points = transformed(self.T_map_odom, cloud.points)
         return drawn(self.solver.log, self.solver.state, points, cloud.times)
+
+    def origins(self, cloud: TimedPoints) -> np.ndarray:
+        """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
+        path = self.path(cloud.times + self.solver.state.run[DELAY])
+        return transformed(path, np.broadcast_to(self.solver.log.sonar_in_base, (len(path), 2)))
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Dict, Iterator, List, Mapping, Optional, Tuple
+from typing import Deque, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
 
 import numpy as np
 
@@ -73,10 +73,18 @@ class CloudUpdate:
     carved: Optional[CarveReport] = None
 
 
+class HasBlocks(Protocol):
+    """What has blocks: a map, or the free space of keyframes."""
+
+    @property
+    def blocks(self) -> Blocks:
+        """A copy of all of them."""
+
+
 class LayerCopies(Mapping[Layer, Blocks]):
     """The blocks of maps, copied when they are asked for."""
 
-    def __init__(self, maps: Dict[Layer, MultiLevelSurfaceMap]) -> None:
+    def __init__(self, maps: Dict[Layer, HasBlocks]) -> None:
         self._maps = maps
 
     def __getitem__(self, layer: Layer) -> Blocks:
@@ -231,9 +239,7 @@ class Mapper:
         positions = None if carver is None else self._history.positions(times)
         if positions is None:
             return CloudUpdate(report, False, unplaced)
-        # A level beam: the sonar is as deep as what it hears.
-        origins = np.column_stack([positions, points[:, 2]])
-        carved = carver.carve(self.shown, self.free, FirstEchoes.of_points(points, times, origins), points)
+        carved = carver.carve(self.shown, self.free, FirstEchoes.of_level(points, times, positions), points)
         return CloudUpdate(report, False, unplaced, carved)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:

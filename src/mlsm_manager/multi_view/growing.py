@@ -25,6 +25,10 @@ class GrowingArray:
         self._count = start
         self.extend(rows)
 
+    def shorten(self, count: int) -> None:
+        """Keep the first `count` rows."""
+        self._count = min(count, self._count)
+
     def extend(self, rows: np.ndarray) -> None:
         """Append rows (m, ...)."""
         count = self._count + len(rows)

@@ -9,7 +9,7 @@ from mlsm_manager.multi_view.association import Pairs, faded
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.state import BEFORE_THE_RUN
-from mlsm_manager.multi_view.surface_points import surface_normals
+from mlsm_manager.multi_view.surface_points import LEAST_REACH, surface_normals
 
 
 class KnownSurfaces:
@@ -17,7 +17,7 @@ class KnownSurfaces:
 
     def __init__(self, places: np.ndarray) -> None:
         """places: (n, 2) m, x y of the blocks' means in map."""
-        normals, qualities = surface_normals(places, np.zeros(len(places)))
+        normals, qualities = surface_normals(places, np.full(len(places), LEAST_REACH))
         known = qualities > 0.0
         self._tree = cKDTree(places[known]) if known.any() else None
         self._points = _placed(places[known], normals[known], qualities[known])

@@ -14,6 +14,7 @@ from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import State
+from node_support.errors import RefusedInput
 
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 
@@ -53,9 +54,32 @@ class LiveSolver:
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
 
-        Raises RefusedInput for a scan that does not end later than the one before.
+        Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
+        the fit has no finite solution.
         """
-        self.log.append(scan, self.parameters.window.lookahead)
+        scans, first = self.log.scan_count, self._first_free(self.log.scan_count + 1)
+        nodes, run = self._nodes.values[first:].copy(), self._run.copy()
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                self.log.append(scan, self.parameters.window.lookahead)
+                self.estimates.append(self._solved())
+        except RefusedInput:
+            raise
+        except (np.linalg.LinAlgError, ValueError) as error:
+            # numpy and scipy raise a ValueError where they meet what is not finite.
+            self._nodes.replace_from(first, nodes)
+            self._run[:] = run
+            if self.log.scan_count > scans:
+                self.log.remove_newest()
+            text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
+            raise RefusedInput("scans without a solution", text) from error
+        return self.estimates[-1]
+
+    def _first_free(self, scans: int) -> int:
+        return max(0, scans - self.parameters.window.free_nodes)
+
+    def _solved(self) -> LiveEstimate:
+        """Return what is known when the log has one scan more than there are estimates."""
         before, after = self.log.node_poses(np.array([-2, -1]))
         self._nodes.extend(self.odometry.next_node(self._nodes.values[-1], before, after)[np.newaxis])
         window = LiveWindow(
@@ -66,6 +90,6 @@ class LiveSolver:
         for _ in range(self.parameters.window.live_iterations):
             window.step(cut)
             cut = max(self.parameters.matching.cut, _CUT_FACTOR * cut)
-        self._node_covariances.replace_from(window.oldest, window.covariances_of_oldest())
-        self.estimates.append(window.estimate())
-        return self.estimates[-1]
+        estimate, covariances = window.estimate(), window.covariances_of_oldest()
+        self._node_covariances.replace_from(window.oldest, covariances)
+        return estimate

@@ -13,6 +13,14 @@ class OdometryTimeline:
         self._times = GrowingArray()
         self._poses = GrowingArray(3)
 
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def shorten(self, count: int) -> None:
+        """Keep the oldest `count` poses."""
+        self._times.shorten(count)
+        self._poses.shorten(count)
+
     @property
     def end(self) -> float:
         """Time of the newest pose [s]; minus infinity without any."""

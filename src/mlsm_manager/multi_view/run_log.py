@@ -25,6 +25,7 @@ class RunLog:
         self.odometry = OdometryTimeline()
         self._node_times = GrowingArray()
         self._starts: List[int] = [0]
+        self._odometry_lengths: List[int] = []
         self._scans = GrowingArray()
         self._points = {field.name: GrowingArray() for field in fields(SurfacePoints)}
         self._points["normals"] = GrowingArray(2)
@@ -44,19 +45,29 @@ class RunLog:
 
         Raises RefusedInput for a scan that does not end later than the one before.
         """
+        points = SurfacePoints.of(scan, self.sonar_in_base)
         if not len(self._node_times):
             self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
         newest = self.node_times[-1]
         if scan.reference_time <= newest:
             text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
             raise RefusedInput("scans out of order", text)
+        self._odometry_lengths.append(len(self.odometry))
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
-        points = SurfacePoints.of(scan, self.sonar_in_base)
         for name, array in self._points.items():
             array.extend(getattr(points, name))
         self._scans.extend(np.full(len(points), self.scan_count))
         self._starts.append(self._starts[-1] + len(points))
+
+    def remove_newest(self) -> None:
+        """Take back the last `append`, as if that scan had not been."""
+        self._starts.pop()
+        for array in (*self._points.values(), self._scans):
+            array.shorten(self._starts[-1])
+        self.odometry.shorten(self._odometry_lengths.pop())
+        # Without scans no node is known: the next scan begins the run.
+        self._node_times.shorten(len(self._starts) if self.scan_count else 0)
 
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""

@@ -61,7 +61,7 @@ class Layout:
         """Return the columns (..., 3) of poses of nodes (...); -1 for a frozen one without group or before the run."""
         starts = self.node_start(nodes)
         if self.first:
-            groups = self.group_of_node[np.minimum(nodes, self.first - 1)]
+            groups = self.group_of_node[np.clip(nodes, 0, self.first - 1)]
             frozen = np.where(groups >= 0, self.size + POSE_COLUMNS * groups, -POSE_COLUMNS)
             starts = np.where(nodes >= self.first, starts, frozen)
         starts = np.where(np.asarray(nodes) >= 0, starts, -POSE_COLUMNS)

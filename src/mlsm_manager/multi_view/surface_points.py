@@ -7,11 +7,13 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.problem.scan import Scan
-from node_support.geometry.planar import inverse, rotated, transformed
+from node_support.geometry.planar import inverse, rotated, transformed, wrapped
 
 _NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
-_REACH = 2.3  # m: neighbours at short range
-_REACH_PER_RANGE = 0.14  # rad: beams fan out; about four steps of a head with 1.8 deg
+LEAST_REACH = 2.3  # m: neighbours at short range, and of points that no beam is known of
+_REACH_STEPS = 4.45  # steps of the head, because beams fan out: eight neighbours on a wall that each beam hears
+_REACH_ANGLES = (0.14, 0.35)  # rad: least and most of what the steps come to, of heads with 1.8 and 4.5 deg
+_STEP_QUANTILE = 0.25  # of the angles between beams with echoes: some of these are several steps apart
 _NEAR = 0.75  # share of the reach within which a neighbour counts fully; from there to the reach it fades out
 _FEWEST = (4.0, 5.0)  # neighbours, the point included: from no line at all to a line
 _FLATNESS = (0.35, 0.25)  # variance across over variance along: from a heap to a line
@@ -51,27 +53,38 @@ class SurfacePoints:
         poses = scan.track.at(scan.times)
         sight = transformed(inverse(poses), scan.points[:, :2]) - sonar_in_base
         ranges = np.hypot(sight[:, 0], sight[:, 1])
-        normals, qualities = surface_normals(scan.points[:, :2], ranges)
+        bearings = np.arctan2(sight[:, 1], sight[:, 0])
+        normals, qualities = surface_normals(scan.points[:, :2], reaches(scan.times, bearings, ranges))
         normals = rotated(normals, -poses[:, 2])
         outward = np.einsum("na,na->n", normals, sight)
         normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
         slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
         qualities = qualities * ramp(np.abs(outward) / np.maximum(ranges, _NOTHING), *_GRAZING)
         known = qualities > 0.0
-        bearings = np.arctan2(sight[:, 1], sight[:, 0])
         return cls(*(array[known] for array in (scan.times, ranges, bearings, normals, slants, qualities)))
 
 
-def surface_normals(points: np.ndarray, ranges: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+def reaches(times: np.ndarray, bearings: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Return how far from each point of a scan (n,) [m] its neighbours on a surface may be.
+
+    times: (n,) s, one per beam. bearings: (n,) rad. ranges: (n,) m. The head's step follows from times and bearings.
+    """
+    _, first = np.unique(times, return_index=True)
+    steps = np.abs(wrapped(np.diff(bearings[first])))
+    angle = _REACH_STEPS * np.quantile(steps, _STEP_QUANTILE) if len(steps) else 0.0
+    return np.maximum(LEAST_REACH, np.clip(angle, *_REACH_ANGLES) * ranges)
+
+
+def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and how certain these are (n,), 0 to 1.
 
-    ranges: (n,) m from the sonar.
+    reach: (n,) m, within which neighbours count.
     """
     count = min(_NEIGHBOURS + 1, len(points))
     if count < _FEWEST[0]:
         return np.zeros((len(points), 2)), np.zeros(len(points))
     distance, index = cKDTree(points).query(points, k=count)
-    reach = np.minimum(np.maximum(_REACH, _REACH_PER_RANGE * ranges), distance[:, -1])
+    reach = np.minimum(reach, distance[:, -1])
     reach = np.maximum(reach, _NOTHING)[:, np.newaxis]
     weight = ramp(distance, reach, _NEAR * reach)
     total = weight.sum(axis=1)

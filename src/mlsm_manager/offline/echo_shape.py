@@ -1,7 +1,7 @@
 """What the strengths of a recording tell of its echoes, and so how they are best extracted and matched."""
 
 from enum import Enum
-from typing import Collection, Sequence
+from typing import Collection, Optional, Sequence
 
 import numpy as np
 
@@ -25,7 +25,13 @@ class EchoShape(Enum):
 
 
 _SUITED = {
-    EchoShape.PEAK: {"mode": ExtractionMode.MATCHED_FILTER, "match_resolution": 0.5},
+    # Weak echoes count: what they are compared with tells them from speckle.
+    EchoShape.PEAK: {
+        "mode": ExtractionMode.MATCHED_FILTER,
+        "match_resolution": 0.5,
+        "threshold_share": 0.5,
+        "min_height": 2.0,
+    },
     # Plateaus lengthen with range, and the middle of their points moves outwards with them: by some percent of range.
     EchoShape.PLATEAU: {
         "mode": ExtractionMode.DENSE,
@@ -45,6 +51,14 @@ def echo_shape_of(beams: Sequence[Beam]) -> EchoShape:
     return EchoShape.PLATEAU if strongest >= _BINARY * counts.sum() else EchoShape.PEAK
 
 
-def suited(parameters: ReplayParameters, shape: EchoShape, fixed: Collection[str]) -> ReplayParameters:
-    """Return `parameters` with those that suit the shape of the echoes, but for those that are `fixed`."""
-    return parameters.changed({name: value for name, value in _SUITED[shape].items() if name not in fixed})
+def suited(
+    parameters: ReplayParameters, shape: EchoShape, fixed: Collection[str], sigma: Optional[float] = None
+) -> ReplayParameters:
+    """Return `parameters` with those that suit the shape of the echoes, but for those that are `fixed`.
+
+    sigma: m, standard deviation of an echo along range, of peaks.
+    """
+    values = dict(_SUITED[shape])
+    if shape is EchoShape.PEAK and sigma is not None:
+        values["pulse_sigma"] = round(sigma, 3)
+    return parameters.changed({name: value for name, value in values.items() if name not in fixed})

@@ -5,7 +5,8 @@ from typing import Dict
 
 import numpy as np
 
-from mlsm_manager.offline.recording import RecordingError, Truth
+from mlsm_manager.offline.recording import Truth
+from recordings.errors import RecordingError
 
 
 @dataclass(frozen=True)

@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.offline.recording import Recording, RecordingError, scans_of
+from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.files.map_file import StoredMap
+from recordings.errors import RecordingError
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 Prepared = Tuple[Recording, List[Scan]]

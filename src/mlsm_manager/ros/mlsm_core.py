@@ -116,7 +116,7 @@ class MlsmCore:
         self.health.count("scans in")
         self._check_header(cloud)
         self._notice_time(cloud.stamp_ns * 1e-9)
-        scan = self._scan(cloud)
+        scan = self._scan(self._without_far_points(cloud))
         if scan is None:
             return
         self._mount(cloud.stamp_ns)
@@ -142,6 +142,16 @@ class MlsmCore:
         if cloud.frame_id not in allowed:
             must = f"frame {cloud.frame_id!r}, must be {allowed[0]!r} or {allowed[1]!r}"
             raise RefusedInput("clouds refused", f"{must}; set sonar_to_cloud's target_frame")
+
+    def _without_far_points(self, cloud: IntensityCloud) -> IntensityCloud:
+        limit = self._live.current.map_limit
+        far = cloud.beyond(limit)
+        count = int(np.count_nonzero(far))
+        if not count:
+            return cloud
+        detail = f"{count} of {len(cloud)} in a scan are beyond map_limit of {limit:g} m; check tf and the publisher"
+        self.health.problem("echoes outside the map", detail, count)
+        return cloud.select(~far)
 
     def _scan(self, cloud: IntensityCloud) -> Optional[Scan]:
         time, times = cloud.stamp_ns * 1e-9, np.unique(np.abs(cloud.time_stamps[cloud.valid]))

@@ -58,6 +58,10 @@ class EchoExtractorParameters(ParameterSet):
     min_height: float = parameter(
         10.0, "least height of an echo above the ring", unit="echo strength", low=0.0, high=255.0
     )
+    threshold_share: float = parameter(
+        1.0, "share of Otsu's threshold that an echo must reach; 0.5 keeps weak echoes, and more speckle",
+        low=0.0, high=1.0,
+    )  # fmt: skip
     min_range: float = parameter(
         0.5, "nearer echoes are removed: there the head itself rings", unit="m", low=0.0, high=100.0
     )
@@ -101,7 +105,7 @@ def extract_echoes(
     peaks = find_peaks(response, apart=math.ceil(2.0 * sigma))
     least = np.maximum(parameters.min_contrast * spread, parameters.min_height)
     peaks = peaks.select(peaks.heights >= least[np.rint(peaks.bins).astype(np.int64)])
-    threshold = max(height_threshold(peaks.heights), parameters.min_height)
+    threshold = max(parameters.threshold_share * height_threshold(peaks.heights), parameters.min_height)
     peaks = peaks.select(peaks.heights >= threshold)
     if parameters.mode is ExtractionMode.LEADING_EDGE:
         peaks = leading_edges(response, peaks)

@@ -1,7 +1,7 @@
 """Holds beams back until tf can place them at their own stamps; rospy's tf2 has no MessageFilter."""
 
 import threading
-from collections import deque
+from collections import Counter, deque
 from typing import Callable, Deque, List, NamedTuple, Optional
 
 import message_filters
@@ -14,6 +14,7 @@ from node_support.ros.node import guarded
 from node_support.ros.tf_buffer import JUMP_BACK, TfBuffer
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.ros.sonar_mount import SonarMount
 
 QUEUE_SIZE = 120  # One revolution of the usual head: tf may be late by a scan, not by more
 _WAIT = 0.5  # s: beams and transforms wake the thread; this is for shutdown alone
@@ -33,10 +34,16 @@ class TransformFilter(message_filters.SimpleFilter):
     """
 
     def __init__(
-        self, target_frame: str, health: Health, on_time_jump: Callable[[], None], stamp_tolerance: float = DAY
+        self,
+        target_frame: str,
+        health: Health,
+        on_time_jump: Callable[[], None],
+        stamp_tolerance: float = DAY,
+        mount: Optional[SonarMount] = None,
     ) -> None:
-        """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
+        """`stamp_tolerance`: how far stamps may be from odometry and clock, s. `mount`: places frames that tf lacks."""
         super().__init__()
+        self._mount = mount
         self._target_frame = target_frame
         self._health = health
         self._on_time_jump = guarded(health, on_time_jump)
@@ -85,6 +92,8 @@ class TransformFilter(message_filters.SimpleFilter):
     def _deliver_ready(self) -> None:
         with self._condition:
             jumped, self._jumped = self._jumped, False
+            if self._mount is not None:
+                self._mount.look_at(Counter(entry.beam.frame_id for entry in self._queue), self._transforms)
             ready = self._pop_ready()
         if jumped:
             self._on_time_jump()

@@ -13,10 +13,10 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64
 
 from node_support import topics
+from node_support.pace import Pace
 from node_support.parameters import ParameterError
 from node_support.ros.node import guarded, make_health
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
-from sonar_simulator.simulation.pace import Pace
 from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.simulation.simulation_setup import PACKAGE, Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
@@ -37,7 +37,9 @@ class Simulator:
         folder = Path(rospkg.RosPack().get_path(PACKAGE))
         self._parameters = settings.simulator
         self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
-        self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive)
+        self._publisher = SimulatorPublisher(
+            self._setup.sonar.max_range, self._parameters.drive, self._parameters.instruments
+        )
         self._publisher.publish_world(self._setup.world)
         self._start_time = START_TIME
         self._now = 0.0

@@ -8,7 +8,7 @@ from visualization_msgs.msg import Marker
 from node_support import topics
 from sonar_simulator.ros.simulator_messages import TOPICS, WORLD_FRAME, moment_messages, placing_messages
 from sonar_simulator.ros.world_marker import world_marker
-from sonar_simulator.simulation.simulation import Drive, Moment
+from sonar_simulator.simulation.simulation import Drive, Instruments, Moment
 from sonar_simulator.world.world import World
 
 _QUEUE_SIZE = 100  # A second of every topic at the usual rates
@@ -21,15 +21,18 @@ class SimulatorPublisher:
     nodes expect it.
     """
 
-    def __init__(self, max_range: float, drive: Drive) -> None:
+    def __init__(self, max_range: float, drive: Drive, instruments: Instruments) -> None:
         """`max_range`: of the sonar, m."""
         self._max_range = max_range
+        self._instruments = instruments
         self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
         self._world = rospy.Publisher("~world", Marker, queue_size=1, latch=True)
-        self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS.items()}
+        self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS[instruments].items()}
         self._commands = (
-            _publisher(topics.VELOCITY_COMMANDS, TOPICS[topics.VELOCITY]) if drive is Drive.SCRIPT else None
+            _publisher(topics.VELOCITY_COMMANDS, TOPICS[instruments][topics.VELOCITY])
+            if drive is Drive.SCRIPT
+            else None
         )
 
     @property
@@ -44,7 +47,7 @@ class SimulatorPublisher:
     def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
         """Publish what places a waiting sonar: the time, and the vehicle and its servo at a moment."""
         self.publish_clock(stamp)
-        for topic, message in placing_messages(moment, stamp):
+        for topic, message in placing_messages(moment, stamp, self._instruments):
             self._publishers[topic].publish(message)
 
     def publish_world(self, world: World) -> None:
@@ -58,7 +61,7 @@ class SimulatorPublisher:
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
         """Publish everything that belongs to a moment."""
         self.publish_clock(stamp)
-        for topic, message in moment_messages(moment, stamp, self._max_range):
+        for topic, message in moment_messages(moment, stamp, self._max_range, self._instruments):
             self._publishers[topic].publish(message)
             if topic == topics.VELOCITY and self._commands is not None:
                 self._commands.publish(message)

@@ -21,6 +21,13 @@ class Drive(Enum):
     COMMANDS = "CMD_VEL"
 
 
+class Instruments(Enum):
+    """What the vehicle navigates with."""
+
+    DVL = "DVL"
+    COMPASS = "COMPASS"
+
+
 @dataclass(frozen=True)
 class SimulatorParameters(ParameterSet):
     """What is simulated, how fast and from which seed."""
@@ -35,6 +42,11 @@ class SimulatorParameters(ParameterSet):
     drive: Drive = parameter(
         Drive.SCRIPT,
         "what moves the vehicle: the script, or commands (then the script only gives the start)",
+        tunable=False,
+    )
+    instruments: Instruments = parameter(
+        Instruments.DVL,
+        "DVL: publishes odometry and its tf; COMPASS: publishes imu and depth instead; simulate_bag always has a DVL",
         tunable=False,
     )
     seed: int = parameter(

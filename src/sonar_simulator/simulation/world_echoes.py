@@ -15,22 +15,14 @@ from sonar_simulator.world.errors import WorldError
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 
-_FULL_STRENGTH_DB = 20.0  # Start gain at which an echo has the strength that the model gives it
-
-
-class PingCommand(Protocol):
-    """The settings in a head's command that change its echoes: range in m, gain in dB."""
-
-    max_range: int
-    start_gain_db: int
-
 
 class PingRequest(Protocol):
-    """One ping of an emulated head: angle in rad, counter-clockwise, number of bins, and the command."""
+    """One ping of an emulated head: angle in rad, counter-clockwise, range in m, gain above the usual in dB."""
 
     angle: float
     bin_count: int
-    command: PingCommand
+    max_range: float
+    gain_db: float
 
 
 class HeadInWorld(Protocol):
@@ -56,9 +48,9 @@ class WorldEchoes:
 
     def echoes(self, ping: PingRequest) -> bytes:
         """Return `ping.bin_count` echo strengths (0 to 255), nearest bin first."""
-        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.command.max_range))
+        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.max_range))
         sonar = Sonar(self._caster, self._pattern, model, self._rng)
-        factor = 10 ** ((ping.command.start_gain_db - _FULL_STRENGTH_DB) / 20)
+        factor = 10 ** (ping.gain_db / 20)
         strengths = sonar.ping(self._pose, ping.angle) * factor
         return np.minimum(np.rint(strengths), 255).astype(np.uint8).tobytes()
 

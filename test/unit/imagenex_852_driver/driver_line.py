@@ -4,11 +4,12 @@ import threading
 from contextlib import contextmanager
 from typing import List
 
-from imagenex_852_driver.emulator import EmulatedHead, PtyServer
+from imagenex_852_driver.emulator import Emulated852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import Ping, SonarDevice
-from imagenex_852_driver.line.scanner import Scanner
 from imagenex_852_driver.protocol.settings import HeadSettings
+from sonar_driver.emulator import HeadServer, PtyLine
+from sonar_driver.line.scanner import Scanner
 
 FAST = {
     "baud_rate": 1152000,
@@ -25,8 +26,8 @@ PATIENCE = 5.0
 def served(tmp_path, head=None, **changes):
     """Yield the server of an emulated head and the parameters to connect to it."""
     connection = ConnectionParameters(port=str(tmp_path / "sonar"), **{**FAST, **changes})
-    head = head or EmulatedHead(timing=connection.timing())
-    with PtyServer(head, connection.port) as server:
+    head = head or Emulated852(timing=connection.timing())
+    with HeadServer(head, PtyLine(connection.port)) as server:
         yield server, connection
 
 
@@ -36,7 +37,7 @@ class Run:
     def __init__(self, connection, settings=None):
         self.pings: List[Ping] = []
         self.device = SonarDevice(connection, threading.Event())
-        self.scanner = Scanner(self.device, settings or HeadSettings(max_range=50), self._note)
+        self.scanner = Scanner(self.device, (settings or HeadSettings(max_range=50)).command(), self._note)
         self._news = threading.Condition()
         self._thread = threading.Thread(target=self.scanner.run, daemon=True)
 

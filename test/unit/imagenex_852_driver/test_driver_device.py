@@ -3,17 +3,19 @@ import time
 
 import pytest
 from driver_line import served
+from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
-from imagenex_852_driver.emulator import EmulatedHead, Fault, FaultInjector, FaultRates, Transmission
+from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.port import PortUnavailableError
 from imagenex_852_driver.protocol import ReplyKind, SwitchCommand
+from sonar_driver.emulator import Fault, FaultInjector, Transmission
+from sonar_driver.line.port import PortUnavailableError
 
 COMMAND = SwitchCommand(max_range=50)
 
 
-class FixedStatusHead(EmulatedHead):
+class FixedStatusHead(Emulated852):
     """Answers every command with one reply, whatever was asked."""
 
     def __init__(self, reply):
@@ -26,9 +28,9 @@ class FixedStatusHead(EmulatedHead):
 
 @pytest.fixture
 def line(tmp_path):
-    faults = FaultInjector(FaultRates(lateness=0.2, silence_duration=0.3))
+    faults = FaultInjector(FaultRates852(lateness=0.2, silence_duration=0.3))
     timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
-    with served(tmp_path, EmulatedHead(faults=faults, timing=timing)) as (_, connection):
+    with served(tmp_path, Emulated852(faults=faults, timing=timing)) as (_, connection):
         device = SonarDevice(connection, clock=lambda: 1000.0)
         device.open()
         yield device, faults
@@ -171,7 +173,19 @@ def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
     device.close()
 
 
-class EchoingLine(EmulatedHead):
+def test_replies_before_sound_can_have_returned_are_dropped_and_counted_on_their_own():
+    time = VirtualTime()
+    connection = ConnectionParameters(speed_of_sound=1400.0)
+    head = Emulated852(timing=ConnectionParameters(speed_of_sound=2000.0).timing())
+    line = VirtualLine(head, connection.timing(), time)
+    device = SonarDevice(connection, VirtualStop(time), time.elapsed, time.elapsed, line.open)
+    device.open()
+    assert [device.ping(SwitchCommand(max_range=50)) for _ in range(5)] == [None] * 5
+    stats = device.stats
+    assert (stats.early_replies, stats.unexpected_replies, stats.timeouts) == (5, 0, 5)
+
+
+class EchoingLine(Emulated852):
     """A head on two wires whose adapter hears what it sends."""
 
     def receive(self, data, time):

@@ -1,8 +1,9 @@
 import pytest
 
-from imagenex_852_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FaultRates
+from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.protocol import ReplyKind, ReplyParser, SwitchCommand
 from node_support.parameters import ParameterError
+from sonar_driver.emulator import EchoSource, Fault, FaultInjector
 
 COMMAND = SwitchCommand(max_range=30, data_points=500)
 
@@ -13,9 +14,9 @@ def answers(head, command=COMMAND, time=0.0):
 
 
 def head_with(fault):
-    faults = FaultInjector(FaultRates(lateness=0.5, silence_duration=3.0, absence_duration=4.0))
+    faults = FaultInjector(FaultRates852(lateness=0.5, silence_duration=3.0, absence_duration=4.0))
     faults.order(fault)
-    return EmulatedHead(faults=faults)
+    return Emulated852(faults=faults)
 
 
 class Recorder(EchoSource):
@@ -29,37 +30,37 @@ class Recorder(EchoSource):
 
 @pytest.mark.parametrize(("points", "kind"), [(250, ReplyKind.IMX), (500, ReplyKind.IGX)])
 def test_the_reply_has_the_commanded_range_and_points(points, kind):
-    reply = answers(EmulatedHead(), SwitchCommand(max_range=40, data_points=points))[0]
+    reply = answers(Emulated852(), SwitchCommand(max_range=40, data_points=points))[0]
     assert (reply.max_range, reply.kind) == (40, kind)
 
 
 def test_an_echo_sounder_in_profile_mode_answers_without_echoes():
-    assert answers(EmulatedHead(), SwitchCommand(max_range=40, profile=True))[0].kind is ReplyKind.IPX
+    assert answers(Emulated852(), SwitchCommand(max_range=40, profile=True))[0].kind is ReplyKind.IPX
 
 
 def test_the_reply_says_that_the_switches_were_accepted():
-    reply = answers(EmulatedHead())[0]
+    reply = answers(Emulated852())[0]
     assert (reply.switches_accepted, reply.overrun) == (True, False)
 
 
 def test_the_head_steps_between_pings():
-    head = EmulatedHead()
+    head = Emulated852()
     assert [answers(head)[0].head_position for _ in range(3)] == [1400, 1420, 1440]
 
 
 def test_a_rebooted_head_starts_straight_ahead():
-    head = EmulatedHead()
+    head = Emulated852()
     answers(head)
     head.reboot()
     assert answers(head)[0].head_position == 1400
 
 
 def test_a_command_for_another_head_is_ignored():
-    assert answers(EmulatedHead(head_id=0x11)) == []
+    assert answers(Emulated852(head_id=0x11)) == []
 
 
 def test_a_command_in_pieces_is_answered_when_it_is_whole():
-    head = EmulatedHead()
+    head = Emulated852()
     frame = COMMAND.encode()
     assert head.receive(frame[:10], 0.0) == []
     assert head.receive(frame[10:], 1.0)[0].time > 1.0
@@ -68,34 +69,34 @@ def test_a_command_in_pieces_is_answered_when_it_is_whole():
 @pytest.mark.parametrize(("max_range", "delay"), [(5, 0), (50, 0), (50, 100)])
 def test_the_reply_begins_after_the_farthest_echo_and_the_switch_delay(max_range, delay):
     command = SwitchCommand(max_range=max_range, switch_delay_ms=delay)
-    first = EmulatedHead().receive(command.encode(), 10.0)[0]
+    first = Emulated852().receive(command.encode(), 10.0)[0]
     line = len(first.data) * 10 / 115200
     assert first.time - line - 10.0 == pytest.approx(2 * max_range / 1500 + delay / 1000)
 
 
 def test_the_reply_takes_the_time_of_its_bytes_on_the_line():
-    pieces = EmulatedHead().receive(COMMAND.encode(), 0.0)
+    pieces = Emulated852().receive(COMMAND.encode(), 0.0)
     assert pieces[-1].time == pytest.approx(2 * 30 / 1500 + 513 * 10 / 115200)
 
 
 def test_the_gain_scales_the_echoes():
-    quiet = answers(EmulatedHead(), SwitchCommand(max_range=10, start_gain_db=10))[0]
-    loud = answers(EmulatedHead(), SwitchCommand(max_range=10, start_gain_db=20))[0]
+    quiet = answers(Emulated852(), SwitchCommand(max_range=10, start_gain_db=10))[0]
+    loud = answers(Emulated852(), SwitchCommand(max_range=10, start_gain_db=20))[0]
     assert max(quiet.echoes[50:]) < max(loud.echoes[50:])
 
 
 def test_the_fixed_pattern_has_its_wall_where_it_says():
-    echoes = answers(EmulatedHead(), SwitchCommand(max_range=10))[0].echoes
+    echoes = answers(Emulated852(), SwitchCommand(max_range=10))[0].echoes
     assert (echoes[50:].index(max(echoes[50:])) + 50.5) * 10 / 500 == pytest.approx(4.0, abs=0.02)
 
 
 def test_the_echo_source_gets_the_angle_counter_clockwise():
     source = Recorder()
-    head = EmulatedHead(source)
+    head = Emulated852(source)
     answers(head)
     answers(head, time=5.0)
     assert source.pings[1].angle == pytest.approx(-0.05235988)
-    assert (source.pings[1].time, source.pings[1].command, source.pings[1].bin_count) == (5.0, COMMAND, 500)
+    assert (source.pings[1].time, source.pings[1].max_range, source.pings[1].bin_count) == (5.0, 30, 500)
 
 
 @pytest.mark.parametrize("fault", [Fault.DROPPED, Fault.GARBLED, Fault.TRUNCATED, Fault.SILENCE])
@@ -111,7 +112,7 @@ def test_a_doubled_reply_comes_twice():
 
 
 def test_a_late_reply_comes_later_by_what_was_ordered():
-    late, good = head_with(Fault.LATE), EmulatedHead()
+    late, good = head_with(Fault.LATE), Emulated852()
     difference = late.receive(COMMAND.encode(), 0.0)[0].time - good.receive(COMMAND.encode(), 0.0)[0].time
     assert difference == pytest.approx(0.5)
 
@@ -133,17 +134,17 @@ def test_a_disappearance_names_the_time_of_return():
 
 def test_fault_rates_above_one_in_all_are_refused():
     with pytest.raises(ParameterError, match=r"dropped = 0\.6"):
-        FaultRates(dropped=0.6, late=0.6)
+        FaultRates852(dropped=0.6, late=0.6)
 
 
 def test_the_same_seed_gives_the_same_faults():
-    rates = FaultRates(dropped=0.2, garbled=0.2)
+    rates = FaultRates852(dropped=0.2, garbled=0.2)
     first, second = FaultInjector(rates, seed=3), FaultInjector(rates, seed=3)
     assert [first.next() for _ in range(50)] == [second.next() for _ in range(50)]
 
 
 def test_every_fault_happens_about_as_often_as_its_rate():
-    faults = FaultInjector(FaultRates(dropped=0.05, doubled=0.1))
+    faults = FaultInjector(FaultRates852(dropped=0.05, doubled=0.1))
     for _ in range(5000):
         faults.next()
     assert faults.counts[Fault.DROPPED] == pytest.approx(250, abs=60)

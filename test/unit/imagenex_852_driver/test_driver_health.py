@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import pytest
 
-from imagenex_852_driver.line.driver_health import DriverHealth
-from imagenex_852_driver.line.stats import DeviceStats
+from imagenex_852_driver.line.stats import PROBLEMS, DeviceStats
 from node_support.health import Level
+from sonar_driver.line.driver_health import DriverHealth
 
 
 class Line:
@@ -14,7 +14,7 @@ class Line:
         self.stats = DeviceStats(connected=True, connections=1)
         self.warnings = []
         self.now = 100.0
-        self.health = DriverHealth(self.warnings.append, lambda: self.stats, clock=lambda: self.now)
+        self.health = DriverHealth("driver", PROBLEMS, self.warnings.append, lambda: self.stats, clock=lambda: self.now)
 
     def report(self, **changes):
         """Return the report one second later, with the stats changed."""
@@ -47,7 +47,8 @@ def test_a_device_without_a_port_is_an_error_that_says_why(line):
 @pytest.mark.parametrize(
     ("count", "name"),
     [("timeouts", "timeouts"), ("bad_frames", "bad frames"), ("overruns", "overruns"),
-     ("unexpected_replies", "unexpected replies"), ("rejected_switches", "rejected switches")],
+     ("unexpected_replies", "unexpected replies"), ("early_replies", "early replies"),
+     ("rejected_switches", "rejected switches")],
 )  # fmt: skip
 def test_every_problem_warns_and_is_counted(line, count, name):
     report = line.report(**{count: 3})

@@ -6,18 +6,18 @@ import pytest
 import serial
 from driver_line import served
 
-from imagenex_852_driver.emulator import EmulatedHead
+from imagenex_852_driver.emulator import Emulated852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.port import (
+from imagenex_852_driver.protocol import SwitchCommand
+from node_support.parameters import ParameterError
+from sonar_driver.line.port import (
     PortBusyError,
     PortNameError,
     PortPermissionError,
     PortUnavailableError,
     open_port,
 )
-from imagenex_852_driver.protocol import SwitchCommand
-from node_support.parameters import ParameterError
 
 
 def test_a_second_driver_on_a_port_is_told_so(tmp_path):
@@ -65,7 +65,7 @@ def test_a_head_behind_a_socket_answers():
 
 def _serve_one(server):
     client, _ = server.accept()
-    head = EmulatedHead()
+    head = Emulated852()
     with client:
         pieces = []
         while not pieces:

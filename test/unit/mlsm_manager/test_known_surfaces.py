@@ -1,5 +1,7 @@
 """A run finds itself in a map that was there before it."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_harbour import tour
@@ -7,7 +9,7 @@ from made_harbour import tour
 from mlsm_manager.multi_view.association import Pairs
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.multi_view.placement import place
 from node_support.geometry.planar import transformed
 
@@ -47,3 +49,10 @@ def test_a_run_that_starts_beside_its_map_is_drawn_onto_it():
     for scan in HARBOUR.scans:
         estimate = solver.add(scan)
     np.testing.assert_allclose(estimate.T_map_base - estimate.T_odom_base, shift, atol=0.1)
+
+
+def test_a_run_in_a_known_map_goes_on_when_its_first_scans_are_frozen():
+    parameters = replace(PARAMETERS, window=SolverWindow(free_nodes=2))
+    solver = LiveSolver(parameters, SONAR, start=np.array([1.0, 1.0, 0.05]), known=KnownSurfaces(known_places()))
+    estimates = [solver.add(scan) for scan in HARBOUR.scans]
+    np.testing.assert_allclose(estimates[-1].T_map_base, estimates[-1].T_odom_base, atol=0.2)

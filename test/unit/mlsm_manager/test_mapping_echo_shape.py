@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from sonar_processing.beams.beam import Beam
@@ -36,3 +37,34 @@ def test_plateaus_are_taken_as_dense_points_with_a_less_certain_range():
 def test_what_the_user_set_is_held():
     parameters = suited(ReplayParameters(match_resolution=0.7), EchoShape.PLATEAU, fixed=("match_resolution",))
     assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.DENSE, 0.7)
+
+
+def echoing(sigma, resolution=0.1, noise=0.0, seed=0):
+    rng, bins = np.random.RandomState(seed), np.arange(400)
+    rows = [
+        90.0 * np.exp(-0.5 * ((bins - place) * resolution / sigma) ** 2) + np.abs(rng.normal(0.0, noise, 400))
+        for place in rng.uniform(60.0, 340.0, 120)
+    ]
+    return [Beam(10**9, "sonar", 0.0, row.astype(np.uint8), resolution) for row in rows]
+
+
+@pytest.mark.parametrize("sigma", [0.2, 0.5, 1.0])
+@pytest.mark.parametrize("noise", [0.0, 6.0])
+def test_the_length_of_echoes_is_found(sigma, noise):
+    assert echo_sigma(echoing(sigma, noise=noise)) == pytest.approx(sigma, rel=0.15)
+
+
+@pytest.mark.parametrize("strengths", [[0, 0, 0, 0, 0], [7], [9, 9, 9, 9, 9, 9]])
+def test_without_echoes_the_shortest_pulse_is_taken(strengths):
+    assert echo_sigma(beams(strengths)) == 0.15
+
+
+def test_beams_of_another_range_do_not_matter():
+    other = [Beam(10**9, "sonar", 0.0, np.zeros(50, dtype=np.uint8), 0.5)] * 3
+    assert echo_sigma(other + echoing(0.5)) == echo_sigma(echoing(0.5))
+
+
+def test_peaks_are_filtered_by_their_own_length_unless_it_was_set():
+    assert suited(ReplayParameters(), EchoShape.PEAK, (), 0.7).pulse_sigma == 0.7
+    assert suited(ReplayParameters(), EchoShape.PEAK, ("pulse_sigma",), 0.7).pulse_sigma == 0.15
+    assert suited(ReplayParameters(), EchoShape.PLATEAU, (), 0.7).pulse_sigma == 0.15

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from mlsm_manager.offline.evaluation import position_error
-from mlsm_manager.offline.recording import RecordingError, Truth
+from mlsm_manager.offline.recording import Truth
+from recordings.errors import RecordingError
 
 TIMES = np.arange(0.0, 11.0)
 AHEAD = np.column_stack([TIMES, np.zeros(11)])

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.association import Pairs
+from mlsm_manager.multi_view.association import BlockIndex, Pairs, blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import linearised, weights
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.frozen_map import fading, joint_covariance, nearest_blocks
@@ -20,7 +20,7 @@ from mlsm_manager.multi_view.parameters import DvlOdometry, MultiViewParameters,
 from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import RANGE_SCALE, Layout, State
-from mlsm_manager.multi_view.surface_points import SurfacePoints, surface_normals
+from mlsm_manager.multi_view.surface_points import SurfacePoints, reaches, surface_normals
 
 STEP = 1e-6
 
@@ -36,6 +36,26 @@ def log():
 def some_state(log):
     nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, 5))
     return State(nodes, np.array([0.01, 0.3]))
+
+
+def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
+    placed = place(log, some_state(log), log.rows(0, 3))
+    pairs = pairs_between(placed, placed, blocks_of(placed, 5), 2.0, SurfaceMatching())
+    assert len(pairs.rows) > 100
+    assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
+
+
+def test_a_point_meets_the_nearest_point_of_all_other_scans_of_its_block():
+    places, scans = np.random.RandomState(3).uniform(0.0, 9.0, (60, 2)), np.repeat(np.arange(3), 20)
+    sources, neighbours, distance = BlockIndex(places, np.arange(60), scans).nearest(places, scans, 2.0)
+    apart = np.hypot(*(places[:, np.newaxis] - places).transpose(2, 0, 1))
+    apart[scans[:, np.newaxis] == scans] = np.inf
+    nearest = apart.argmin(axis=1)
+    near = np.flatnonzero(apart.min(axis=1) < 2.0)
+    order = np.argsort(sources)
+    np.testing.assert_array_equal(sources[order], near)
+    np.testing.assert_array_equal(neighbours[order], nearest[near])
+    np.testing.assert_allclose(distance[order], apart.min(axis=1)[near])
 
 
 @pytest.mark.parametrize("unknown", range(2))
@@ -171,20 +191,35 @@ def wall(count=30):
 
 
 def test_the_normal_of_a_wall_is_square_to_it():
-    normals, qualities = surface_normals(wall(), np.full(30, 10.0))
+    normals, qualities = surface_normals(wall(), np.full(30, 2.3))
     np.testing.assert_allclose(np.abs(normals[:, 0]), 1.0, atol=1e-9)
     assert qualities.min() > 0.9
 
 
+def test_a_coarse_head_s_points_on_a_far_wall_are_still_a_surface():
+    step = np.radians(3.0)
+    bearings = np.arange(-8, 9) * step
+    wall_points = 40.0 * np.column_stack([np.ones(17), np.tan(bearings)])
+    reach = reaches(np.arange(17.0), bearings, np.hypot(*wall_points.T))
+    assert surface_normals(wall_points, reach)[1][4:13].min() == 1.0
+
+
+def test_a_beam_that_heard_nothing_does_not_change_the_reach():
+    bearings = np.radians(3.0) * np.arange(40)
+    heard = np.delete(np.arange(40), [5, 6, 21])
+    whole = reaches(np.arange(40.0), bearings, np.full(40, 30.0))
+    np.testing.assert_allclose(reaches(heard * 1.0, bearings[heard], np.full(37, 30.0)), whole[heard])
+
+
 def test_a_heap_of_points_is_no_surface():
     heap = np.random.RandomState(0).normal(0.0, 0.3, (10, 2))
-    assert surface_normals(heap, np.full(10, 8.0))[1].max() < 0.6
+    assert surface_normals(heap, np.full(10, 2.3))[1].max() < 0.6
 
 
 def test_qualities_do_not_jump_when_points_move_a_little():
     points = wall() + np.random.RandomState(4).normal(0.0, 0.5, (30, 2))
     nudged = points + np.random.RandomState(6).choice([-1e-9, 1e-9], points.shape)
-    before, after = (surface_normals(some, np.full(30, 10.0))[1] for some in (points, nudged))
+    before, after = (surface_normals(some, np.full(30, 2.3))[1] for some in (points, nudged))
     np.testing.assert_allclose(before, after, atol=1e-6)
 
 

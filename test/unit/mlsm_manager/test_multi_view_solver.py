@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import DvlOdometry, MultiViewParameters, SolverWindow
@@ -104,6 +104,36 @@ def test_a_scan_that_is_not_newer_is_refused_and_changes_nothing(made):
     with pytest.raises(RefusedInput, match="the one before"):
         solver.add(made.scans[1])
     np.testing.assert_array_equal(solver.state.nodes, before)
+
+
+def with_wild_odometry(scan):
+    poses = scan.track.poses.copy()
+    poses[::2] = 1e200
+    return replace(scan, track=Track(scan.track.times, poses))
+
+
+def test_a_scan_without_a_solution_is_refused_and_changes_nothing(made):
+    solver, undisturbed = followed(made.scans[:6]), followed(made.scans[:6])
+    with pytest.raises(RefusedInput, match="ends at"):
+        solver.add(with_wild_odometry(made.scans[6]))
+    for scan in made.scans[6:8]:
+        solver.add(scan)
+        undisturbed.add(scan)
+    assert solver.state.nodes.tobytes() == undisturbed.state.nodes.tobytes()
+    assert solver.estimates[-1].covariance.tobytes() == undisturbed.estimates[-1].covariance.tobytes()
+
+
+def test_a_first_scan_without_a_solution_is_forgotten(made):
+    solver = LiveSolver(DEFAULTS, SONAR_IN_BASE)
+    with pytest.raises(RefusedInput, match="ends at"):
+        solver.add(with_wild_odometry(made.scans[0]))
+    for scan in made.scans[:2]:
+        solver.add(scan)
+    assert solver.state.nodes.tobytes() == followed(made.scans[:2]).state.nodes.tobytes()
+
+
+def test_the_second_scan_is_compared_with_the_first(live):
+    assert [estimate.comparisons > 0 for estimate in live.estimates[:3]] == [False, True, True]
 
 
 def test_scans_without_echoes_are_bridged_by_the_odometry(made):

@@ -91,6 +91,13 @@ def test_a_scan_of_nothing_has_no_echo():
     assert (len(echoes), echoes.threshold) == (0, 10.0)
 
 
+def test_a_smaller_share_of_the_threshold_keeps_a_weak_wall_beside_a_strong_one():
+    heights = np.where(np.arange(BEAMS) % 2, 200.0, 60.0)[:, np.newaxis]
+    image = wall_image(WALL, height=1.0) * heights
+    assert len(_echoes(image)) == BEAMS // 2
+    assert len(_echoes(image, threshold_share=0.5)) == BEAMS
+
+
 def test_echoes_lower_than_min_height_are_none():
     assert len(_echoes(wall_image(WALL, height=20.0), min_height=30.0)) == 0
 

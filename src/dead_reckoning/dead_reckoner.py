@@ -1,0 +1,98 @@
+"""Adds up velocities along the heading (REP-105: the frame odom is continuous and drifts)."""
+
+import math
+from dataclasses import dataclass
+from typing import Optional
+
+import numpy as np
+
+from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
+from node_support.errors import RefusedInput
+from node_support.geometry.matrices import yaw_of
+from node_support.geometry.planar import rotated, wrapped
+
+JUMP_BACK = 1.0
+"""Headings whose stamps go back by more than this [s] mean that time jumped; then the vehicle starts anew."""
+
+GAPS = "gaps in the heading"
+_REFUSED_VELOCITIES = "velocities refused"
+_DEEPEST = 11_000.0  # m: of the oceans
+_FASTEST = 20.0  # m/s: beyond any underwater vehicle
+
+
+@dataclass(frozen=True)
+class Reckoning:
+    """Where the vehicle is. T_odom_base: (4, 4). velocity: (3,) m/s in base_link. turn_rate: rad/s about odom's z.
+
+    gap: seconds without a heading before this one, where they are more than `longest_gap`; else 0.
+    """
+
+    stamp_ns: int
+    T_odom_base: np.ndarray
+    velocity: np.ndarray
+    turn_rate: float
+    gap: float
+
+
+class DeadReckoner:
+    """Takes headings, depths and velocities in the order in which they come.
+
+    The vehicle keeps its newest velocity, which is one along its own axes, until a newer one comes or it times out.
+    """
+
+    def __init__(self, parameters: DeadReckoningParameters) -> None:
+        self.parameters = parameters
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, because time jumped."""
+        self._position = np.zeros(3)
+        self._stamp_ns: Optional[int] = None
+        self._yaw = 0.0
+        self._velocity = np.zeros(3)
+        self._velocity_stamp_ns: Optional[int] = None
+
+    def take_velocity(self, stamp_ns: int, velocity: np.ndarray) -> None:
+        """Take a velocity (3,) [m/s] in base_link. Raises RefusedInput for one that no vehicle has."""
+        if not np.abs(velocity).max() <= _FASTEST:
+            raise RefusedInput(_REFUSED_VELOCITIES, f"{velocity} m/s, must be finite and at most {_FASTEST:g} m/s")
+        self._velocity = np.array(velocity, dtype=np.float64)
+        self._velocity_stamp_ns = stamp_ns
+
+    def take_depth(self, depth: float) -> None:
+        """Take a depth [m] below the surface. Raises RefusedInput for one that no sea has."""
+        if not abs(depth) <= _DEEPEST:
+            raise RefusedInput("depths refused", f"{depth} m, must be finite and at most {_DEEPEST:g} m")
+        self._position[2] = -depth
+
+    def take_orientation(self, stamp_ns: int, rotation: np.ndarray) -> Reckoning:
+        """Take the vehicle's orientation R_odom_base (3, 3) and return where the vehicle is then.
+
+        Raises RefusedInput for one that is not newer than the last.
+        """
+        if self._stamp_ns is not None and stamp_ns < self._stamp_ns - JUMP_BACK * 1e9:
+            self.clear()
+        if self._stamp_ns is not None and stamp_ns <= self._stamp_ns:
+            raise RefusedInput("old headings", f"{stamp_ns * 1e-9:.3f} s is not newer than the last")
+        yaw = yaw_of(rotation)
+        elapsed = 0.0 if self._stamp_ns is None else (stamp_ns - self._stamp_ns) * 1e-9
+        turn = wrapped(yaw - self._yaw) if elapsed else 0.0
+        velocity = self._velocity_at(stamp_ns)
+        self._position[:2] += elapsed * rotated(velocity[:2], yaw - turn / 2.0)
+        self._stamp_ns, self._yaw = stamp_ns, yaw
+        gap = elapsed if elapsed > self.parameters.longest_gap else 0.0
+        return Reckoning(stamp_ns, self._pose(rotation), velocity, turn / elapsed if elapsed else 0.0, gap)
+
+    def _velocity_at(self, stamp_ns: int) -> np.ndarray:
+        if self._velocity_stamp_ns is None:
+            return np.zeros(3)
+        commanded = self.parameters.velocity_source is VelocitySource.COMMANDS
+        timeout = self.parameters.command_timeout if commanded else self.parameters.velocity_timeout
+        age = (stamp_ns - self._velocity_stamp_ns) * 1e-9
+        return self._velocity if math.fabs(age) <= timeout else np.zeros(3)
+
+    def _pose(self, rotation: np.ndarray) -> np.ndarray:
+        pose = np.eye(4)
+        pose[:3, :3] = rotation[:3, :3]
+        pose[:3, 3] = self._position
+        return pose

@@ -1,0 +1,1 @@
+"""The dead_reckoning node."""

@@ -1,0 +1,143 @@
+"""The ROS side of dead_reckoning: heading, depth and velocity in; odom -> base_link and odometry out."""
+
+import threading
+from typing import Any, Callable, Dict, Tuple
+
+import numpy as np
+import rospy
+import tf2_ros
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import FluidPressure, Imu
+from std_msgs.msg import Float64
+
+from dead_reckoning.dead_reckoner import GAPS, DeadReckoner, Reckoning
+from dead_reckoning.depth import depth_of_pressure
+from dead_reckoning.parameters import DeadReckoningParameters, DepthType, VelocitySource
+from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.headers import check_frame
+from node_support.ros.conversions import matrix_of_quaternion, pose_from_matrix
+from node_support.ros.node import guarded, make_health
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from node_support.ros.tf_buffer import TfBuffer
+
+QUEUE_SIZE = 100  # a second of a fast AHRS
+_REFUSED_HEADINGS = "headings refused"
+_MISALIGNED = "headings without a mount"
+_NO_ORIENTATION = -1.0  # sensor_msgs/Imu: in the first covariance of a device that measures no orientation
+
+
+class DeadReckoning:
+    """Publishes at the rate of the headings."""
+
+    def __init__(self, namespace: str = "~") -> None:
+        """Raises ParameterError for a bad parameter in `namespace`."""
+        self.health = make_health("dead_reckoning")
+        self.healths = [self.health]
+        self._lock = threading.Lock()
+        self._live = ReconfigurableParameters(
+            DeadReckoningParameters, namespace, "DeadReckoning", self.health, self._use_parameters
+        )
+        self._transforms = TfBuffer(self.health, tolerance=self._live.current.stamp_tolerance)
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._odometry = rospy.Publisher(topics.ODOMETRY, Odometry, queue_size=QUEUE_SIZE)
+        self._subscribe()
+
+    def _use_parameters(self, parameters: DeadReckoningParameters) -> None:
+        if hasattr(self, "_reckoner"):
+            self._reckoner.parameters = parameters
+        else:
+            self._reckoner = DeadReckoner(parameters)
+
+    def _subscribe(self) -> None:
+        parameters = self._live.current
+        velocities: Dict[VelocitySource, Tuple[str, type, Callable[[Any], None]]] = {
+            VelocitySource.ESTIMATE: (topics.MATCHED_ODOMETRY, Odometry, self._take_estimate),
+            VelocitySource.COMMANDS: (topics.VELOCITY_COMMANDS, Twist, self._take_command),
+        }
+        depths: Dict[DepthType, Tuple[type, Callable[[Any], float]]] = {
+            DepthType.POSE: (PoseWithCovarianceStamped, lambda message: -message.pose.pose.position.z),
+            DepthType.DEPTH: (Float64, lambda message: message.data),
+            DepthType.PRESSURE: (FluidPressure, self._depth_of_pressure),
+        }
+        inputs = [velocities[parameters.velocity_source], (topics.HEADING, Imu, self._take_heading)]
+        if parameters.depth_type in depths:
+            kind, depth_of = depths[parameters.depth_type]
+            inputs.append((topics.DEPTH, kind, lambda message: self._take_depth(depth_of(message))))
+        for topic, kind, take in inputs:
+            rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=QUEUE_SIZE, tcp_nodelay=True)
+
+    def _depth_of_pressure(self, message: FluidPressure) -> float:
+        parameters = self._live.current
+        return depth_of_pressure(message.fluid_pressure, parameters.surface_pressure, parameters.water_density)
+
+    def _take_depth(self, depth: float) -> None:
+        self.health.count("depths in")
+        with self._lock:
+            self._reckoner.take_depth(depth)
+
+    def _take_estimate(self, message: Odometry) -> None:
+        stamp_ns = message.header.stamp.to_nsec()
+        self._transforms.check_stamp(stamp_ns)
+        self._take_velocity(stamp_ns, message.twist.twist)
+
+    def _take_command(self, message: Twist) -> None:
+        self._take_velocity(rospy.get_rostime().to_nsec(), message)
+
+    def _take_velocity(self, stamp_ns: int, twist: Twist) -> None:
+        self.health.count("velocities in")
+        with self._lock:
+            self._reckoner.take_velocity(stamp_ns, np.array([twist.linear.x, twist.linear.y, twist.linear.z]))
+
+    def _take_heading(self, message: Imu) -> None:
+        self.health.count("headings in")
+        stamp_ns = message.header.stamp.to_nsec()
+        self._transforms.check_stamp(stamp_ns)
+        rotation = self._orientation_of_vehicle(message)
+        with self._lock:
+            reckoning = self._reckoner.take_orientation(stamp_ns, rotation)
+        if reckoning.gap:
+            detail = f"{reckoning.gap:.1f} s before {stamp_ns * 1e-9:.3f} s; check the compass"
+            self.health.problem(GAPS, detail)
+        self._publish(reckoning)
+
+    def _orientation_of_vehicle(self, message: Imu) -> np.ndarray:
+        """Return R_odom_base (3, 3); raises RefusedInput for a message without an orientation."""
+        if message.orientation_covariance[0] == _NO_ORIENTATION:
+            raise RefusedInput(_REFUSED_HEADINGS, "the Imu says that it measures no orientation; choose another topic")
+        R_odom_imu = matrix_of_quaternion(_components(message.orientation), _REFUSED_HEADINGS)
+        return R_odom_imu @ self._mount(message.header.frame_id, message.header.stamp.to_nsec()).T
+
+    def _mount(self, imu_frame: str, stamp_ns: int) -> np.ndarray:
+        """Return R_base_imu (3, 3); where tf does not know it, the compass is taken as aligned with the vehicle."""
+        base_frame = self._live.current.base_frame
+        if imu_frame == base_frame:
+            return np.eye(3)
+        try:
+            check_frame(imu_frame, _MISALIGNED)
+            return self._transforms.matrix(base_frame, imu_frame, stamp_ns)[:3, :3]
+        except RefusedInput:
+            detail = f"tf does not know {imu_frame!r} in {base_frame}: taken as aligned with it"
+            self.health.problem(_MISALIGNED, detail)
+            return np.eye(3)
+
+    def _publish(self, reckoning: Reckoning) -> None:
+        parameters = self._live.current
+        transform = TransformStamped(child_frame_id=parameters.base_frame)
+        transform.header.stamp = rospy.Time(*divmod(reckoning.stamp_ns, 10**9))
+        transform.header.frame_id = parameters.odom_frame
+        pose = pose_from_matrix(reckoning.T_odom_base)
+        transform.transform.translation, transform.transform.rotation = pose.position, pose.orientation
+        self._broadcaster.sendTransform(transform)
+        odometry = Odometry(header=transform.header, child_frame_id=parameters.base_frame)
+        odometry.pose.pose = pose
+        linear, angular = odometry.twist.twist.linear, odometry.twist.twist.angular
+        linear.x, linear.y, linear.z = reckoning.velocity
+        angular.z = reckoning.turn_rate
+        self._odometry.publish(odometry)
+        self.health.count("transforms sent")
+
+
+def _components(quaternion: Quaternion) -> np.ndarray:
+    return np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])

@@ -1,0 +1,63 @@
+"""A recording of any kind as map_bag needs it."""
+
+from pathlib import Path
+from typing import Dict, List, Tuple
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.recording import Recording, Truth
+from recordings.beams.found_beams import FoundBeams
+from recordings.errors import RecordingError
+from recordings.reading.reader import Request, read
+from recordings.transforms.frame_tree import FrameTree
+from recordings.transforms.pose_track import PoseTrack
+from sonar_processing.beams.placed_beam import PlacedBeam
+
+
+def read_recording(path: Path, request: Request) -> Recording:
+    """Return a recording; raises RecordingError for one that cannot be used."""
+    held = read(path, request)
+    tree, found = held.motion.tree, held.found
+    stamps = tree.moving_stamps
+    if not stamps.size:
+        # A vehicle that never moves may have fixed transforms only.
+        stamps = np.unique(found.stamps_ns)
+    track = _track(tree, stamps, path, request)
+    placed, unplaced = _placed(found, tree, path, request)
+    truth = None if held.truth is None else _truth(held.truth)
+    return Recording(placed, found.refused + unplaced, track, truth, held.notes)
+
+
+def _track(tree: FrameTree, stamps: np.ndarray, path: Path, request: Request) -> Track:
+    frames = request.motion.odom_frame, request.motion.base_frame
+    poses, known = tree.poses(*frames, stamps)
+    if np.count_nonzero(known) < 2:
+        reason = tree.why_not(*frames, stamps) or "a single stamp"
+        raise RecordingError(f"{path}: no odometry, tf from {frames[1]} to {frames[0]}: {reason}")
+    poses = poses[known]
+    yaws = np.arctan2(poses[:, 1, 0], poses[:, 0, 0])
+    return Track(stamps[known] * 1e-9, np.column_stack([poses[:, :2, 3], yaws]))
+
+
+def _placed(found: FoundBeams, tree: FrameTree, path: Path, request: Request) -> Tuple[List[PlacedBeam], int]:
+    """Return the beams with their places, in the order of their stamps, and how many have none."""
+    odom, stamps = request.motion.odom_frame, found.stamps_ns
+    of_frame: Dict[str, List[int]] = {}
+    for index, beam in enumerate(found.beams):
+        of_frame.setdefault(beam.frame_id, []).append(index)
+    placed = {}
+    for frame, indices in of_frame.items():
+        poses, known = tree.poses(odom, frame, stamps[indices])
+        for index, pose, is_known in zip(indices, poses, known):
+            if is_known:
+                placed[index] = PlacedBeam(found.beams[index], pose, found.moving[index])
+    if not placed:
+        reason = tree.why_not(odom, found.beams[0].frame_id, stamps)
+        raise RecordingError(f"{path}: none of {len(stamps)} beams could be placed in {odom}: {reason}")
+    order = sorted(placed, key=lambda index: (stamps[index], index))
+    return [placed[index] for index in order], len(stamps) - len(placed)
+
+
+def _truth(track: PoseTrack) -> Truth:
+    return Truth(track.stamps_ns * 1e-9, track.translations[:, :2])

@@ -1,0 +1,1 @@
+"""Recordings of any kind as the cores take them: beams, poses and times, without ROS."""

@@ -1,0 +1,1 @@
+"""Where frames are in each other at any time, without tf2."""

@@ -1,0 +1,97 @@
+"""How frames are linked, and the pose of any of them in any other."""
+
+from collections import deque
+from typing import Dict, List, Optional, Tuple
+
+import numpy as np
+
+from recordings.transforms.pose_track import PoseTrack
+
+Link = Tuple[str, str]
+"""Parent and child."""
+
+
+class FrameTree:
+    """Poses of frames in their parents, by (parent, child). Links may form any graph; the way of fewest links counts.
+
+    tf2 knows one parent per frame; bags of several publishers often hold more.
+    """
+
+    def __init__(self, tracks: Optional[Dict[Link, PoseTrack]] = None) -> None:
+        self.tracks: Dict[Link, PoseTrack] = {link: track for link, track in (tracks or {}).items() if len(track)}
+
+    @property
+    def frames(self) -> List[str]:
+        """All frames, sorted."""
+        return sorted({frame for link in self.tracks for frame in link})
+
+    @property
+    def moving_stamps(self) -> np.ndarray:
+        """(n,) ns, increasing: all stamps of poses that change."""
+        moving = [track.stamps_ns for track in self.tracks.values() if not track.is_fixed]
+        return np.unique(np.concatenate(moving)) if moving else np.zeros(0, dtype=np.int64)
+
+    def with_track(self, parent: str, child: str, track: PoseTrack) -> "FrameTree":
+        """Return a tree that has one more link, or another track for it."""
+        return FrameTree({**self.tracks, (parent, child): track})
+
+    def way(self, target: str, source: str) -> Optional[List[Link]]:
+        """Return the links from `target` to `source`, each as it is passed; None where the two are not linked."""
+        if target == source:
+            return []
+        came_from: Dict[str, str] = {target: target}
+        waiting = deque([target])
+        while waiting:
+            frame = waiting.popleft()
+            for neighbour in self._neighbours(frame):
+                if neighbour not in came_from:
+                    came_from[neighbour] = frame
+                    waiting.append(neighbour)
+        if source not in came_from:
+            return None
+        way, frame = [], source
+        while frame != target:
+            way.append((came_from[frame], frame))
+            frame = came_from[frame]
+        return way[::-1]
+
+    def poses(self, target: str, source: str, stamps_ns: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return T_target_source (k, 4, 4) at stamps (k,), and (k,) whether every link is known then.
+
+        Where one is not known, its nearest pose stands. Raises KeyError when the frames are not linked.
+        """
+        way = self.way(target, source)
+        if way is None:
+            raise KeyError(self.why_not(target, source, stamps_ns))
+        result = np.tile(np.eye(4), (len(stamps_ns), 1, 1))
+        known = np.ones(len(stamps_ns), dtype=bool)
+        for step in way:
+            link, is_down = self._link(step)
+            poses = self.tracks[link].at(stamps_ns)
+            result = result @ (poses if is_down else np.linalg.inv(poses))
+            known &= self.tracks[link].covers(stamps_ns)
+        return result, known
+
+    def why_not(self, target: str, source: str, stamps_ns: np.ndarray) -> str:
+        """Return in words why a pose of `source` in `target` is not known at all stamps (k,); empty where it is."""
+        missing = [frame for frame in (source, target) if frame not in self.frames]
+        if missing and source != target:
+            return f"no transform names {' or '.join(missing)}; there are {', '.join(self.frames) or 'none'}"
+        way = self.way(target, source)
+        if way is None:
+            return f"{source} and {target} are not linked"
+        for step in way:
+            (parent, child), _ = self._link(step)
+            track = self.tracks[parent, child]
+            outside = stamps_ns[~track.covers(stamps_ns)]
+            if outside.size:
+                first, last, asked = np.array([*track.stamps_ns[[0, -1]], outside[0]]) * 1e-9
+                return f"{child} in {parent} is known from {first:.2f} to {last:.2f} s, not at {asked:.2f} s"
+        return ""
+
+    def _neighbours(self, frame: str) -> List[str]:
+        return [other for link in self.tracks if frame in link for other in link if other != frame]
+
+    def _link(self, step: Link) -> Tuple[Link, bool]:
+        """Return the link that a step passes, and whether it goes from parent to child."""
+        return (step, True) if step in self.tracks else (step[::-1], False)

@@ -1,0 +1,84 @@
+"""The poses of one frame in another over time."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from node_support.geometry.planar import FULL_TURN
+from recordings.transforms.rotations import between, normalized, rotation_matrices
+
+
+@dataclass(frozen=True)
+class PoseTrack:
+    """stamps_ns: (n,) int64, increasing, n > 0. translations: (n, 3) m. rotations: (n, 4) unit quaternions, x y z w.
+
+    is_fixed: the first pose holds at all times.
+    """
+
+    stamps_ns: np.ndarray
+    translations: np.ndarray
+    rotations: np.ndarray
+    is_fixed: bool = False
+
+    @classmethod
+    def sorted_from(cls, stamps_ns: np.ndarray, translations: np.ndarray, rotations: np.ndarray) -> "PoseTrack":
+        """Return the track of poses in any order; of several with one stamp the first counts, as in tf2.
+
+        Those that are not finite or no rotation are left out; the track may then be empty.
+        """
+        rotations = normalized(np.asarray(rotations, dtype=np.float64).reshape(-1, 4))
+        translations = np.asarray(translations, dtype=np.float64).reshape(-1, 3)
+        valid = np.isfinite(rotations).all(axis=1) & np.isfinite(translations).all(axis=1)
+        kept, first = np.unique(np.asarray(stamps_ns, dtype=np.int64)[valid], return_index=True)
+        return cls(kept, translations[valid][first], rotations[valid][first])
+
+    @classmethod
+    def fixed(cls, translation: np.ndarray, rotation: np.ndarray) -> "PoseTrack":
+        """Return a pose that never changes: translation (3,), rotation (4,). Raises ValueError if it is no pose."""
+        track = cls.sorted_from(np.zeros(1, dtype=np.int64), translation, rotation)
+        if not len(track):
+            raise ValueError(f"translation {translation}, quaternion {rotation}: no pose")
+        return cls(track.stamps_ns, track.translations, track.rotations, is_fixed=True)
+
+    def __len__(self) -> int:
+        return len(self.stamps_ns)
+
+    def covers(self, stamps_ns: np.ndarray) -> np.ndarray:
+        """Return for each stamp (k,) whether a pose is known then: between the first and the last one."""
+        if self.is_fixed:
+            return np.ones(len(stamps_ns), dtype=bool)
+        return (stamps_ns >= self.stamps_ns[0]) & (stamps_ns <= self.stamps_ns[-1])
+
+    def at(self, stamps_ns: np.ndarray) -> np.ndarray:
+        """Return poses (k, 4, 4) at stamps (k,), between known ones on the shortest way, beyond them the nearest."""
+        if self.is_fixed or len(self) == 1:
+            index = np.zeros(len(stamps_ns), dtype=np.int64)
+            return _matrices(self.translations[index], self.rotations[index])
+        after = np.clip(np.searchsorted(self.stamps_ns, stamps_ns), 1, len(self) - 1)
+        before = after - 1
+        # Differences first: float64 does not hold nanoseconds since 1970.
+        step = (self.stamps_ns[after] - self.stamps_ns[before]).astype(np.float64)
+        share = np.clip((stamps_ns - self.stamps_ns[before]) / step, 0.0, 1.0)
+        translations = (1.0 - share)[:, np.newaxis] * self.translations[before]
+        translations += share[:, np.newaxis] * self.translations[after]
+        return _matrices(translations, between(self.rotations[before], self.rotations[after], share))
+
+    def turned_up(self) -> "PoseTrack":
+        """Return the track from north, east, down to x, y left, z up: both frames by half a turn about x."""
+        translations = self.translations * [1.0, -1.0, -1.0]
+        rotations = self.rotations * [1.0, -1.0, -1.0, 1.0]
+        return PoseTrack(self.stamps_ns, translations, rotations, self.is_fixed)
+
+    @property
+    def yaws(self) -> np.ndarray:
+        """(n,) heading, rad, without jumps by whole turns."""
+        matrices = rotation_matrices(self.rotations)
+        return np.unwrap(np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]), discont=FULL_TURN / 2)
+
+
+def _matrices(translations: np.ndarray, rotations: np.ndarray) -> np.ndarray:
+    matrices = np.zeros((len(translations), 4, 4))
+    matrices[:, :3, :3] = rotation_matrices(normalized(rotations))
+    matrices[:, :3, 3] = translations
+    matrices[:, 3, 3] = 1.0
+    return matrices

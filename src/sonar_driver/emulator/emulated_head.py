@@ -1,0 +1,78 @@
+"""The frame of every emulated head: how faults strike its replies, and how these are paced on the line."""
+
+from abc import ABC, abstractmethod
+from typing import List, NamedTuple, Optional
+
+from sonar_driver.emulator.faults import Fault, FaultInjector
+from sonar_driver.line.timing import transmission_time
+
+# A serial adapter passes on the bytes of a reply in pieces of about this size.
+_PIECE = 64
+
+
+class Transmission(NamedTuple):
+    """Bytes that leave the head at `time` (seconds of the caller's clock)."""
+
+    time: float
+    data: bytes
+
+
+class EmulatedHead(ABC):
+    """A head in software: bytes and times in, bytes and times out, without its own clock or port.
+
+    Until the time `absent_until`, whoever serves it removes the port. At the time `next_event` it does something by
+    itself, and `advance` is to be called.
+    """
+
+    def __init__(self, faults: Optional[FaultInjector] = None, baud_rate: float = float("inf")) -> None:
+        """`baud_rate` is infinite on a line whose speed does not matter."""
+        self.faults = faults or FaultInjector()
+        self.absent_until = float("-inf")
+        self.next_event = float("inf")
+        self._baud_rate = baud_rate
+        self._silent_until = float("-inf")
+        self._line_free = float("-inf")
+
+    @abstractmethod
+    def receive(self, data: bytes, time: float) -> List[Transmission]:
+        """Take bytes that arrived at `time`; return what the head sends in reply, in order of time."""
+
+    def advance(self, time: float) -> List[Transmission]:
+        """Return what the head sends without being asked, up to `time`, in order of time."""
+        return []
+
+    @abstractmethod
+    def _garbled(self, frame: bytes) -> bytes:
+        """Return the frame with bytes changed, so that a driver can detect it."""
+
+    def _struck_dumb(self, fault: Fault, time: float) -> bool:
+        """Return whether the head says nothing from `time` on, because of `fault` or of an earlier one."""
+        if fault is Fault.SILENCE:
+            self._silent_until = time + self.faults.rates.silence_duration
+        if fault is Fault.DISAPPEARANCE:
+            self.absent_until = time + self.faults.rates.absence_duration
+        return time < self._silent_until or fault is Fault.DISAPPEARANCE
+
+    def _transmissions(self, fault: Fault, frame: bytes, begin: float) -> List[Transmission]:
+        """Return the pieces of a reply that begins at `begin` if nothing goes wrong."""
+        lateness = self.faults.rates.lateness if fault is Fault.LATE else 0.0
+        return self._paced(self._spoilt(fault, frame), begin + lateness)
+
+    def _spoilt(self, fault: Fault, frame: bytes) -> bytes:
+        if fault is Fault.DROPPED:
+            return b""
+        if fault is Fault.GARBLED:
+            return self._garbled(frame)
+        if fault is Fault.TRUNCATED:
+            return self.faults.truncate(frame)
+        return frame * 2 if fault is Fault.DOUBLED else frame
+
+    def _paced(self, data: bytes, begin: float) -> List[Transmission]:
+        begin = max(begin, self._line_free)
+        pieces = []
+        for start in range(0, len(data), _PIECE):
+            piece = data[start : start + _PIECE]
+            pieces.append(Transmission(begin + transmission_time(start + len(piece), self._baud_rate), piece))
+        if pieces:
+            self._line_free = pieces[-1].time
+        return pieces

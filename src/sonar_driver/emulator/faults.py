@@ -1,0 +1,101 @@
+"""Faults of the emulated head and its cable, at random or on request."""
+
+import random
+from collections import Counter, deque
+from dataclasses import dataclass, fields
+from enum import Enum
+from typing import Deque, Optional, Sequence, Tuple
+
+from node_support.parameters import ParameterError, ParameterSet, parameter
+
+
+class Fault(Enum):
+    """What can happen to one reply; a head knows those of which its `FaultRates` has a rate."""
+
+    NONE = "none"
+    DROPPED = "dropped"
+    GARBLED = "garbled"
+    TRUNCATED = "truncated"
+    LATE = "late"
+    DOUBLED = "doubled"
+    OVERRUN = "overrun"
+    SILENCE = "silence"
+    DISAPPEARANCE = "disappearance"
+
+
+@dataclass(frozen=True)
+class FaultRates(ParameterSet):
+    """How often each fault happens, as a share of the replies, and how long silence and absence last."""
+
+    dropped: float = parameter(0.0, "share of replies lost", low=0.0, high=1.0)
+    garbled: float = parameter(0.0, "share of replies with broken bytes", low=0.0, high=1.0)
+    truncated: float = parameter(0.0, "share of replies cut short", low=0.0, high=1.0)
+    late: float = parameter(0.0, "share of replies that come late", low=0.0, high=1.0)
+    doubled: float = parameter(0.0, "share of replies sent twice", low=0.0, high=1.0)
+    silence: float = parameter(0.0, "share of replies instead of which the head falls silent", low=0.0, high=1.0)
+    disappearance: float = parameter(0.0, "share of replies instead of which the port disappears", low=0.0, high=1.0)
+    lateness: float = parameter(0.4, "delay of a late reply", unit="s", low=0.0, high=60.0)
+    silence_duration: float = parameter(2.0, "length of a silence", unit="s", low=0.0, high=600.0)
+    absence_duration: float = parameter(2.0, "time until the port is back", unit="s", low=0.0, high=600.0)
+
+    def check(self) -> None:
+        """Raise ParameterError when the shares add up to more than 1."""
+        total = sum(self.rate(fault) for fault in Fault)
+        if total > 1.0 + 1e-9:
+            shares = ", ".join(f"{fault.value} = {self.rate(fault)}" for fault in self.known())
+            raise ParameterError(f"{shares}: more than 1 in all")
+
+    def rate(self, fault: Fault) -> float:
+        """Return the share of one fault; 0 for NONE, which gets the remaining share, and for one that is not known."""
+        return getattr(self, fault.value, 0.0)
+
+    @classmethod
+    def known(cls) -> Tuple[Fault, ...]:
+        """Return the faults that these heads can have."""
+        names = {field.name for field in fields(cls)}
+        return tuple(fault for fault in Fault if fault.value in names)
+
+
+class FaultInjector:
+    """Chooses a fault for every command and counts what it chose in `counts`."""
+
+    def __init__(self, rates: Optional[FaultRates] = None, seed: int = 0) -> None:
+        self.rates = rates or FaultRates()
+        self.counts: Counter[Fault] = Counter()
+        self._ordered: Deque[Fault] = deque()
+        self._random = random.Random(seed)
+
+    def order(self, fault: Fault, count: int = 1) -> None:
+        """Apply `fault` to the next `count` commands for which no other fault has been ordered."""
+        self._ordered.extend([fault] * count)
+
+    def next(self) -> Fault:
+        """Return the fault of the next command."""
+        fault = self._ordered.popleft() if self._ordered else self._drawn()
+        self.counts[fault] += 1
+        return fault
+
+    def garble(self, frame: bytes, echoes: range, telling: Sequence[int]) -> bytes:
+        """Return the frame with a tenth of its bytes changed.
+
+        echoes: indices of the bytes that may hold anything. telling: indices of which one is changed for certain, where
+        a driver can detect it.
+        """
+        result = bytearray(frame)
+        for index in self._random.sample(echoes, len(frame) // 10):
+            result[index] ^= self._random.randint(1, 255)
+        index = self._random.choice(telling)
+        result[index] = frame[index] ^ 0x55
+        return bytes(result)
+
+    def truncate(self, frame: bytes) -> bytes:
+        """Return the beginning of the frame: at least one byte, but not the whole frame."""
+        return frame[: self._random.randint(1, len(frame) - 1)]
+
+    def _drawn(self) -> Fault:
+        value = self._random.random()
+        for fault in Fault:
+            value -= self.rates.rate(fault)
+            if value < 0:
+                return fault
+        return Fault.NONE

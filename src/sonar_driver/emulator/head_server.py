@@ -1,0 +1,147 @@
+"""Serves an emulated head on a line, which it can take away and bring back."""
+
+import os
+import select
+import threading
+import time
+from collections import deque
+from typing import Callable, Deque, Optional, Protocol
+
+from sonar_driver.emulator.emulated_head import EmulatedHead, Transmission
+
+_PATIENCE = 1.0  # s: a thread that has not changed its state by now has failed
+_WAKE_SIZE = 4096  # Bytes: more than are ever written to wake the server
+
+
+class ServedLine(Protocol):
+    """The head's end of a line. It is used from one thread at a time."""
+
+    def open(self) -> None:
+        """Make the line appear; raises OSError."""
+
+    def close(self) -> None:
+        """Make the line disappear, if it is there."""
+
+    def fileno(self) -> int:
+        """Return the descriptor that becomes readable when bytes arrive."""
+
+    def read(self) -> bytes:
+        """Return the bytes that have arrived, possibly none; never waits."""
+
+    def write(self, data: bytes) -> None:
+        """Send bytes; those that the line cannot take are lost, like on a line that nobody reads. Never waits."""
+
+
+class HeadServer:
+    """Makes a head answer on a line.
+
+    Use it as a context manager, which serves from a new thread, or call `serve` from your own thread. While the line
+    has disappeared, whoever has it open sees it hang up.
+    """
+
+    def __init__(self, head: EmulatedHead, line: ServedLine) -> None:
+        self.head = head
+        self._line = line
+        self._present = False
+        self._changed = threading.Condition()
+        self._outgoing: Deque[Transmission] = deque()
+        self._hidden_until = float("-inf")
+        self._stop = threading.Event()
+        self._wake_reader, self._wake_writer = os.pipe()
+        self._thread: Optional[threading.Thread] = None
+
+    def __enter__(self) -> "HeadServer":
+        self._appear()
+        self._thread = threading.Thread(target=self.serve, daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        self.stop()
+        if self._thread:
+            self._thread.join()
+        os.close(self._wake_reader)
+        os.close(self._wake_writer)
+
+    def serve(self) -> None:
+        """Serve until `stop` is called; raises OSError when the line cannot be made."""
+        try:
+            while not self._stop.is_set():
+                self._turn()
+        finally:
+            self._vanish()
+
+    def stop(self) -> None:
+        """Make `serve` return; safe from any thread and from signal handlers."""
+        self._stop.set()
+        self._wake()
+
+    def disappear(self, duration: float = float("inf")) -> None:
+        """Remove the line for `duration` seconds, or until `reappear`; it is gone when this returns."""
+        self._hide_until(time.monotonic() + duration)
+        self._await(lambda: not self._present)
+
+    def reappear(self) -> None:
+        """Bring the line back; it is there when this returns."""
+        self.head.absent_until = float("-inf")
+        self._hide_until(float("-inf"))
+        self._await(lambda: self._present)
+
+    def _hide_until(self, moment: float) -> None:
+        self._hidden_until = moment
+        self._wake()
+
+    def _await(self, condition: Callable[[], bool]) -> None:
+        # Only the serving thread opens and closes the line, because it may be waiting on it at this moment.
+        with self._changed:
+            self._changed.wait_for(condition, timeout=_PATIENCE)
+
+    def _turn(self) -> None:
+        self._show_or_hide()
+        now = time.monotonic()
+        if self._present:
+            if now >= self.head.next_event:
+                self._outgoing.extend(self.head.advance(now))
+            self._send_due(now)
+        sources = [self._wake_reader, self._line.fileno()] if self._present else [self._wake_reader]
+        readable = select.select(sources, [], [], self._until_next_event(now))[0]
+        if self._wake_reader in readable:
+            os.read(self._wake_reader, _WAKE_SIZE)
+        if len(readable) > int(self._wake_reader in readable):
+            self._outgoing.extend(self.head.receive(self._line.read(), time.monotonic()))
+
+    def _show_or_hide(self) -> None:
+        hidden = time.monotonic() < self._back_at()
+        if hidden == self._present:
+            with self._changed:
+                if hidden:
+                    self._vanish()
+                else:
+                    self._appear()
+                self._changed.notify_all()
+
+    def _back_at(self) -> float:
+        return max(self._hidden_until, self.head.absent_until)
+
+    def _send_due(self, now: float) -> None:
+        while self._outgoing and self._outgoing[0].time <= now:
+            self._line.write(self._outgoing.popleft().data)
+
+    def _until_next_event(self, now: float) -> Optional[float]:
+        if not self._present:
+            moment = self._back_at()
+        else:
+            moment = min(self.head.next_event, self._outgoing[0].time if self._outgoing else float("inf"))
+        return max(0.0, moment - now) if moment < float("inf") else None
+
+    def _appear(self) -> None:
+        self._line.open()
+        self._present = True
+
+    def _vanish(self) -> None:
+        self._line.close()
+        self._present = False
+        self._outgoing.clear()
+
+    def _wake(self) -> None:
+        os.write(self._wake_writer, b"w")

@@ -1,0 +1,100 @@
+"""Opens a serial port, and says in one line why one cannot be opened."""
+
+import errno
+import grp
+import os
+import termios
+from contextlib import contextmanager
+from typing import Iterator, Protocol
+
+import serial
+
+# Seconds. A read returns after this time at the latest, so that a request to stop is noticed.
+READ_TIMEOUT = 0.05
+WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is lost
+
+_REMOTE = ("socket://", "rfc2217://", "loop://")
+_USUAL_GROUP = "dialout"
+
+
+class Port(Protocol):
+    """What a driver does with a port; pyserial's ports have it."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that were received and not yet read."""
+
+    def read(self, size: int = 1) -> bytes:
+        """Return up to `size` bytes: once there are so many, or after READ_TIMEOUT those that there are."""
+
+    def write(self, data: bytes) -> int:
+        """Send all of `data`."""
+
+    def close(self) -> None:
+        """Give the port back."""
+
+
+class PortError(Exception):
+    """The port cannot be used; the text is one line for the user."""
+
+
+class PortUnavailableError(PortError):
+    """The port does not exist or was lost; it may come back."""
+
+
+class PortBusyError(PortError):
+    """Another program holds the port."""
+
+
+class PortPermissionError(PortError):
+    """The user may not open the port."""
+
+
+class PortNameError(PortError):
+    """No port can have that name."""
+
+
+def open_port(name: str, baud_rate: int) -> Port:
+    """Open a device or pyserial URL with 8N1; a local device is opened exclusively.
+
+    Raises PortUnavailableError, PortBusyError, PortPermissionError or PortNameError.
+    """
+    local = not name.startswith(_REMOTE)
+    # pyserial's remote ports refuse a write timeout.
+    options = {"exclusive": True, "write_timeout": WRITE_TIMEOUT} if local else {}
+    try:
+        return serial.serial_for_url(name, baudrate=baud_rate, timeout=READ_TIMEOUT, **options)
+    except (OSError, termios.error) as error:
+        raise _explained(name, error) from error
+    except ValueError as error:
+        raise PortNameError(f"port {name}: {error}") from error
+
+
+@contextmanager
+def port_losses(name: str) -> Iterator[None]:
+    """Turn every way in which pyserial reports a lost port into PortUnavailableError."""
+    try:
+        yield
+    except (OSError, termios.error) as error:
+        raise PortUnavailableError(f"port {name} is lost: {error}") from error
+
+
+def _explained(name: str, error: Exception) -> PortError:
+    number = getattr(error, "errno", None)
+    if number in (errno.EWOULDBLOCK, errno.EBUSY):
+        return PortBusyError(f"port {name} is in use by another program: is a second driver running?")
+    if number in (errno.EACCES, errno.EPERM):
+        group = _group_of(name)
+        return PortPermissionError(
+            f"no permission to open port {name}: join the group {group} (sudo adduser $USER {group}) and log in again"
+        )
+    # pyserial's own text names the port and the reason twice.
+    return PortUnavailableError(f"port {name} cannot be opened: {os.strerror(number) if number else error}")
+
+
+def _group_of(name: str) -> str:
+    try:
+        group = grp.getgrgid(os.stat(name).st_gid).gr_name
+    except (OSError, KeyError):
+        return _USUAL_GROUP
+    return group if group != "root" else _USUAL_GROUP

@@ -1,0 +1,1 @@
+"""Nodes of drivers and of emulated heads."""

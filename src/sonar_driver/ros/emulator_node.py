@@ -1,0 +1,89 @@
+"""The ROS side of every emulated head: parameters and requests for faults in; a line to a sonar out."""
+
+import os
+from abc import ABC, abstractmethod
+from contextlib import ExitStack
+from typing import Any, Callable, Optional, Type
+
+import rospkg
+import rospy
+
+from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError, every, make_health
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from sonar_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FixedPattern, HeadServer, ServedLine
+from sonar_driver.emulator.parameters import EchoSourceKind, EmulatedHeadParameters
+from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
+
+PACKAGE = "underwater_map_construction"
+_MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
+
+# Builds the simulator's echoes; passed in, because no driver may depend on the simulator.
+WorldEchoes = Callable[[EmulatedHeadParameters], EchoSource]
+
+
+class HeadModel(ABC):
+    """What the node needs to know of one kind of emulated head."""
+
+    name: str
+    """The node's name."""
+    config_name: str
+    """The name of the .cfg file."""
+    parameters: Type[EmulatedHeadParameters]
+
+    @abstractmethod
+    def head(self, parameters: Any, source: EchoSource, faults: FaultInjector) -> EmulatedHead:
+        """Return the head."""
+
+    @abstractmethod
+    def line(self, parameters: Any) -> ServedLine:
+        """Return the line that it is served on, not yet open."""
+
+
+class EmulatorNode:
+    """Serves an emulated head until shutdown."""
+
+    def __init__(self, model: HeadModel, world_echoes: WorldEchoes) -> None:
+        """Raises ParameterError for a bad parameter, and StartError when the world or the line cannot be made."""
+        self.health = make_health(model.name)
+        self.healths = [self.health]
+        self._faults: Optional[FaultInjector] = None
+        self._live = ReconfigurableParameters(
+            model.parameters, "~", model.config_name, self.health, self._use_parameters
+        )
+        parameters = self._live.current.changed({"link": os.path.expanduser(self._live.current.link)})
+        head = model.head(parameters, _echo_source(parameters, world_echoes), self._faults)
+        self._served = ExitStack()
+        try:
+            self._served.enter_context(HeadServer(head, model.line(parameters)))
+        except OSError as error:
+            raise StartError(f"link = {parameters.link!r}: the port cannot be made: {error}") from error
+        rospy.on_shutdown(self._served.close)
+        rospy.Service("~order_fault", OrderFault, self._order)
+        every(DIAGNOSTICS_PERIOD, self._show_counts, self.health)
+        rospy.loginfo("%s: the head is at %s", self.health.name, parameters.link)
+
+    def _use_parameters(self, parameters: EmulatedHeadParameters) -> None:
+        if self._faults is None:
+            self._faults = FaultInjector(parameters, parameters.seed)
+        self._faults.rates = parameters
+
+    def _show_counts(self) -> None:
+        for fault, count in dict(self._faults.counts).items():
+            self.health.total("good replies" if fault is Fault.NONE else fault.value, count)
+
+    def _order(self, request: OrderFaultRequest) -> OrderFaultResponse:
+        known = (Fault.NONE, *self._faults.rates.known())
+        fault = next((fault for fault in known if fault.value == request.fault), None)
+        if fault is None:
+            return OrderFaultResponse(False, f"{request.fault!r}: must be one of {', '.join(f.value for f in known)}")
+        if not 1 <= request.count <= _MOST_ORDERED:
+            return OrderFaultResponse(False, f"count = {request.count}: must be from 1 to {_MOST_ORDERED}")
+        self._faults.order(fault, request.count)
+        return OrderFaultResponse(True, f"{fault.value} {request.count} times")
+
+
+def _echo_source(parameters: EmulatedHeadParameters, world_echoes: WorldEchoes) -> EchoSource:
+    if parameters.echo_source is EchoSourceKind.PATTERN:
+        return FixedPattern(parameters.wall_distance)
+    world_file = os.path.join(rospkg.RosPack().get_path(PACKAGE), os.path.expanduser(parameters.world_file))
+    return world_echoes(parameters.changed({"world_file": world_file}))

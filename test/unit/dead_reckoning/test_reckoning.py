@@ -1,0 +1,116 @@
+"""Headings and velocities become a path."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from dead_reckoning.dead_reckoner import DeadReckoner
+from dead_reckoning.depth import depth_of_pressure
+from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
+from node_support.errors import RefusedInput
+from node_support.geometry.matrices import pose_matrix, yaw_of
+
+SECOND = 10**9
+START = 1000 * SECOND
+
+
+def heading(yaw, roll=0.0, pitch=0.0):
+    return pose_matrix((0, 0, 0), (roll, pitch, yaw))[:3, :3]
+
+
+def reckoned(reckoner, seconds, yaw_at, rate=10.0, start=START):
+    """Take headings `yaw_at(t)` for `seconds`, `rate` times a second, and return the last reckoning."""
+    result = None
+    for step in range(int(seconds * rate) + 1):
+        result = reckoner.take_orientation(start + int(step / rate * SECOND), heading(yaw_at(step / rate)))
+    return result
+
+
+@pytest.fixture
+def reckoner():
+    return DeadReckoner(DeadReckoningParameters())
+
+
+@given(yaw=st.floats(-3.0, 3.0), surge=st.floats(-2.0, 2.0), sway=st.floats(-2.0, 2.0))
+def test_a_straight_way_is_velocity_times_time_along_the_heading(yaw, surge, sway):
+    reckoner = DeadReckoner(DeadReckoningParameters())
+    reckoner.take_velocity(START, np.array([surge, sway, 0.0]))
+    done = reckoned(reckoner, 10.0, lambda _: yaw)
+    expected = 10.0 * np.array([surge * np.cos(yaw) - sway * np.sin(yaw), surge * np.sin(yaw) + sway * np.cos(yaw)])
+    np.testing.assert_allclose(done.T_odom_base[:2, 3], expected, atol=1e-9)
+
+
+def test_a_steady_turn_is_a_circle_even_where_headings_are_few(reckoner):
+    speed, rate = 0.5, 0.1
+    reckoner.take_velocity(START, np.array([speed, 0.0, 0.0]))
+    done = reckoned(reckoner, 2.0 * np.pi / rate, lambda t: rate * t, rate=2.0)
+    at_half = 2.0 * speed / rate
+    assert np.hypot(*done.T_odom_base[:2, 3]) < 0.02 * at_half
+    assert done.turn_rate == pytest.approx(rate)
+
+
+def test_the_orientation_is_the_one_that_was_measured(reckoner):
+    rotation = heading(2.0, roll=0.2, pitch=-0.3)
+    done = reckoner.take_orientation(START, rotation)
+    np.testing.assert_allclose(done.T_odom_base[:3, :3], rotation)
+
+
+def test_depth_is_downward(reckoner):
+    reckoner.take_depth(7.5)
+    assert reckoner.take_orientation(START, np.eye(3)).T_odom_base[2, 3] == -7.5
+
+
+def test_a_new_velocity_does_not_move_the_vehicle_at_once(reckoner):
+    reckoner.take_velocity(START, np.array([0.5, 0.0, 0.0]))
+    before = reckoned(reckoner, 5.0, lambda _: 0.0)
+    reckoner.take_velocity(START + 5 * SECOND, np.array([-2.0, 1.0, 0.0]))
+    after = reckoner.take_orientation(START + 5 * SECOND + 1, np.eye(3))
+    np.testing.assert_allclose(after.T_odom_base, before.T_odom_base, atol=1e-6)
+
+
+@pytest.mark.parametrize(("source", "timeout"), [(VelocitySource.ESTIMATE, 120.0), (VelocitySource.COMMANDS, 1.0)])
+def test_the_vehicle_stops_when_its_velocity_is_too_old(source, timeout):
+    reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=source))
+    reckoner.take_velocity(START, np.array([1.0, 0.0, 0.0]))
+    done = reckoned(reckoner, timeout + 50.0, lambda _: 0.0)
+    assert done.T_odom_base[0, 3] == pytest.approx(timeout, abs=0.11)
+
+
+def test_a_gap_longer_than_the_parameter_is_told(reckoner):
+    assert reckoner.take_orientation(START, np.eye(3)).gap == 0.0
+    assert reckoner.take_orientation(START + SECOND, np.eye(3)).gap == 0.0
+    assert reckoner.take_orientation(START + 4 * SECOND, np.eye(3)).gap == 3.0
+
+
+def test_a_heading_that_is_not_newer_is_refused_and_changes_nothing(reckoner):
+    reckoner.take_velocity(START, np.array([1.0, 0.0, 0.0]))
+    reckoner.take_orientation(START, np.eye(3))
+    with pytest.raises(RefusedInput, match="not newer than the last"):
+        reckoner.take_orientation(START, heading(1.0))
+    assert reckoner.take_orientation(START + SECOND, np.eye(3)).T_odom_base[0, 3] == pytest.approx(1.0)
+
+
+def test_the_vehicle_starts_anew_when_time_jumps_back(reckoner):
+    reckoner.take_velocity(START, np.array([1.0, 0.0, 0.0]))
+    reckoned(reckoner, 10.0, lambda _: 0.0)
+    done = reckoner.take_orientation(START, heading(1.0))
+    assert not done.T_odom_base[:3, 3].any()
+    assert not done.velocity.any()
+    assert yaw_of(done.T_odom_base) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("velocity", [(np.nan, 0, 0), (np.inf, 0, 0), (0, 1e9, 0)])
+def test_a_velocity_that_no_vehicle_has_is_refused(reckoner, velocity):
+    with pytest.raises(RefusedInput, match="must be finite and at most 20 m/s"):
+        reckoner.take_velocity(START, np.array(velocity))
+
+
+@pytest.mark.parametrize("depth", [np.nan, -np.inf, 1e5])
+def test_a_depth_that_no_sea_has_is_refused(reckoner, depth):
+    with pytest.raises(RefusedInput, match="must be finite and at most 11000 m"):
+        reckoner.take_depth(depth)
+
+
+def test_ten_metres_of_fresh_water_weigh_about_one_atmosphere():
+    assert depth_of_pressure(2 * 101325.0, 101325.0, 1000.0) == pytest.approx(10.33, abs=0.01)

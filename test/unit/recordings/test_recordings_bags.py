@@ -1,0 +1,133 @@
+"""Bags of every kind give the same messages, and damaged ones one line."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_bags import write_mcap, write_sqlite_bag
+
+from mlsm_manager.offline.bag_recording import read_recording
+from recordings.bags.bag import Bag
+from recordings.errors import RecordingError
+from recordings.reading.reader import Request
+
+BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
+NAMES = Request(truth="/ground_truth")
+
+
+@pytest.fixture(scope="module")
+def expected():
+    return read_recording(BASIN, NAMES)
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    return write_sqlite_bag(BASIN, tmp_path_factory.mktemp("ros2") / "basin")
+
+
+@pytest.fixture(scope="module")
+def mcap(tmp_path_factory):
+    return write_mcap(BASIN, tmp_path_factory.mktemp("mcap") / "basin.mcap")
+
+
+def assert_same(recording, expected):
+    assert [one.beam.stamp_ns for one in recording.beams] == [one.beam.stamp_ns for one in expected.beams]
+    for one, other in zip(recording.beams, expected.beams):
+        assert np.array_equal(one.T_target_sonar, other.T_target_sonar)
+        assert np.array_equal(one.beam.intensities, other.beam.intensities)
+        assert (one.beam.angle, one.is_moving) == (other.beam.angle, other.is_moving)
+    assert np.array_equal(recording.track.poses, expected.track.poses)
+    assert np.array_equal(recording.truth.positions, expected.truth.positions)
+
+
+def test_a_ros2_folder_gives_what_the_ros1_bag_gives(folder, expected):
+    assert_same(read_recording(folder, NAMES), expected)
+
+
+def test_a_lone_sqlite_file_gives_it_too(folder, tmp_path, expected):
+    (database,) = folder.glob("*.db3")
+    lone = tmp_path / "lone.db3"
+    lone.write_bytes(database.read_bytes())
+    assert_same(read_recording(lone, NAMES), expected)
+
+
+def test_a_lone_mcap_file_gives_it_too(mcap, expected):
+    assert_same(read_recording(mcap, NAMES), expected)
+
+
+@pytest.mark.parametrize("kind", ["folder", "mcap"])
+def test_topics_tell_types_and_counts_as_in_ros1(kind, request):
+    with Bag(BASIN) as ros1, Bag(request.getfixturevalue(kind)) as ros2:
+        assert ros2.topics == ros1.topics
+        assert (ros1.is_ros2, ros2.is_ros2) == (False, True)
+
+
+def test_a_bag_without_definitions_is_read_with_those_of_its_distribution(folder, tmp_path, expected):
+    """ROS 2 before Iron writes none."""
+    sqlite3 = pytest.importorskip("sqlite3")
+    (database,) = folder.glob("*.db3")
+    old = tmp_path / "humble.db3"
+    old.write_bytes(database.read_bytes())
+    with sqlite3.connect(str(old)) as connection:
+        connection.execute("DROP TABLE message_definitions")
+        connection.execute("UPDATE schema SET schema_version = 3")
+    assert_same(read_recording(old, NAMES), expected)
+
+
+def test_an_absent_file_is_told_by_its_path():
+    with pytest.raises(RecordingError, match=r"^/no/such\.bag: No such file or directory$"):
+        Bag(Path("/no/such.bag"))
+
+
+def test_a_recording_that_was_cut_off_names_the_remedy(tmp_path):
+    cut = tmp_path / "cut.bag"
+    data = bytearray(BASIN.read_bytes())
+    start = data.index(b"index_pos=") + len(b"index_pos=")
+    data[start : start + 8] = bytes(8)
+    cut.write_bytes(data)
+    with pytest.raises(RecordingError, match="rosbag reindex"):
+        Bag(cut)
+
+
+@pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])
+def test_an_empty_file_is_refused(name, tmp_path):
+    (tmp_path / name).write_bytes(b"")
+    with pytest.raises(RecordingError, match="no bag, or a broken one"):
+        Bag(tmp_path / name)
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory):
+    """Return bags of each kind with transforms only, and room for damaged ones."""
+    home = tmp_path_factory.mktemp("damaged")
+    topics = {"/tf_static", "/sonar_simulator/settings"}
+    (database,) = write_sqlite_bag(BASIN, home / "folder", topics).glob("*.db3")
+    return {".bag": BASIN, ".db3": database, ".mcap": write_mcap(BASIN, home / "whole.mcap", topics)}, home
+
+
+def refusal(path):
+    """Return why a bag is refused, empty if all of it can be read."""
+    try:
+        with Bag(path) as bag:
+            for topic in bag.topics:
+                list(bag.messages(topic))
+    except RecordingError as error:
+        return str(error)
+    return ""
+
+
+@pytest.mark.parametrize("suffix", [".bag", ".db3", ".mcap"])
+@given(
+    cut=st.floats(min_value=0.0, max_value=1.0),
+    changes=st.lists(st.tuples(st.floats(min_value=0.0, max_value=1.0, exclude_max=True), st.integers(0, 255))),
+)
+def test_a_damaged_file_is_read_or_refused_in_one_line(small, suffix, cut, changes):
+    bags, home = small
+    data = bytearray(bags[suffix].read_bytes())
+    for place, value in changes:
+        data[int(place * len(data))] = value
+    damaged = home / f"damaged{suffix}"
+    damaged.write_bytes(data[: int(cut * len(data))] if cut < 0.5 else data)
+    assert "\n" not in refusal(damaged)
