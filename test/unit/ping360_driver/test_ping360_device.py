@@ -34,12 +34,6 @@ def test_older_firmware_is_asked_for_every_ping(port):
     assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
 
 
-def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
-    with running(port, SECTOR.changed({"train_angle_deg": 180.0})) as (scan, _):
-        assert scan.wait_for_more(15)
-    assert scan.angles[:15] == [*range(390, 400), *range(5)]
-
-
 class CannotScan(EmulatedPing360):
     """A head that says that its firmware is new, and does not scan by itself all the same."""
 

@@ -34,6 +34,13 @@ def test_a_sector_is_scanned_to_and_fro(port, settings):
     assert scan.angles == [*range(190, 211), *range(209, 200, -1)]
 
 
+def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
+    scan = VirtualScan(port, SETTINGS.changed({"sector_width_deg": 18.0, "train_angle_deg": 180.0}))
+    scan.beams(15)
+    assert scan.angles == [*range(390, 400), *range(5)]
+    assert scan.stats.mode == "request"
+
+
 @MODES
 @pytest.mark.parametrize("max_range", [1.0, 20.0])
 def test_stamps_are_when_the_pings_left(port, settings, max_range):
