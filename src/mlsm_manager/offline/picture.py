@@ -1,10 +1,9 @@
 """A map as a picture: top view, to scale."""
 
-from dataclasses import dataclass
 from io import BytesIO
 from itertools import cycle
 from pathlib import Path
-from typing import List, Optional, Sequence
+from typing import Optional, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +12,7 @@ from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, Rectangle
 
+from mlsm_manager.offline.picture_contents import Doubts, Path2d
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from node_support.files import write_whole
 
@@ -20,26 +20,6 @@ _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
 _DOUBT_COLOR = "#cc3377"
 _ELLIPSE_DEVIATIONS = 2.0
 _LINE_STYLES = ("-", "--", ":", "-.")
-
-
-@dataclass(frozen=True)
-class Path2d:
-    """A line in the top view: (n, 2) x y [m], its label and color."""
-
-    points: np.ndarray
-    label: str
-    color: str
-
-
-@dataclass(frozen=True)
-class Doubts:
-    """How certain the last path is. centers: (k, 2) m. covariances: (k, 2, 2) m^2 there. stretches: each (n, 2) m,
-    parts of the path that a check found doubtful.
-    """
-
-    centers: np.ndarray
-    covariances: np.ndarray
-    stretches: List[np.ndarray]
 
 
 def draw_map(

@@ -8,7 +8,7 @@ from typing import Any, Dict, List, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.offline.evaluation import aligned_truth, position_error
-from mlsm_manager.offline.picture import Doubts, Path2d, draw_map
+from mlsm_manager.offline.picture_contents import Doubts, Path2d
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.trust import Trust
 from mlsm_manager.offline.tum_files import tum_files
@@ -50,6 +50,9 @@ class Run:
 
 def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
     """Write map.mlsm, map.ply, map.png, trajectory.csv and the .tum files, each whole or not at all; raises OSError."""
+    # matplotlib takes half a second: who asks for help or is refused shall not wait for it.
+    from mlsm_manager.offline.picture import draw_map
+
     write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
     write_trajectory(folder / "trajectory.csv", run.times, run.poses)

@@ -1,50 +1,25 @@
 """map_bag as it is run: bags in, files, figures and one-line errors out."""
 
-import json
 import os
 import pty
 import signal
 import subprocess
-import sys
 import time
 from importlib.util import find_spec
-from pathlib import Path
 
 import numpy as np
 import pytest
-import rosbag
 import yaml
-
-from mlsm_manager.surface_map.files.map_file import read_map
+from map_bag_runs import BASIN, COMMAND, run, summary_of
 
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 
-ROOT = Path(__file__).resolve().parents[3]
-BASIN = ROOT / "test/data/basin.bag"
 FILES = {
     "map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json",
     "dead_reckoning.tum", "corrected.tum", "refined.tum", "truth.tum",
     *(["report.html"] if find_spec("plotly") else []),
 }  # fmt: skip
-TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
-COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
-
-
-def run(*arguments):
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False)
-
-
-def refused(*arguments):
-    """Return the one line with which map_bag refuses."""
-    done = run(*arguments)
-    lines = done.stderr.strip().splitlines()
-    assert (done.returncode, len(lines)) == (1, 1), done.stderr
-    return lines[0]
-
-
-def summary_of(folder):
-    return json.loads((folder / "summary.json").read_text())
 
 
 @pytest.fixture(scope="module")
@@ -121,38 +96,6 @@ def test_an_odometry_that_was_said_overrules_what_the_recording_looks_like(tmp_p
     assert yaml.safe_load((tmp_path / "live.yaml").read_text())["mlsm_core"]["odometry"] == "THRUSTERS"
 
 
-def test_a_missing_bag_is_named(tmp_path):
-    assert refused("/no/such.bag", "--out", tmp_path) == "map_bag: /no/such.bag: No such file or directory"
-
-
-def test_a_missing_topic_is_answered_with_those_there_are(tmp_path):
-    line = refused(BASIN, "--out", tmp_path, "--truth", "/gps")
-    assert "no topic /gps" in line
-    assert "/ground_truth" in line
-
-
-def test_an_empty_bag_is_refused(tmp_path):
-    rosbag.Bag(str(tmp_path / "empty.bag"), "w").close()
-    assert "there are none at all" in refused(tmp_path / "empty.bag", "--out", tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-def test_a_bag_without_tf_is_refused(tmp_path):
-    with rosbag.Bag(str(BASIN)) as whole, rosbag.Bag(str(tmp_path / "beams.bag"), "w") as beams:
-        for topic, message, stamp in whole.read_messages(topics=["/sonar/raw"]):
-            beams.write(topic, message, stamp)
-    assert "no /tf" in refused(tmp_path / "beams.bag", "--out", tmp_path / "out")
-
-
-def test_a_parameter_out_of_range_is_answered_with_the_range(tmp_path):
-    line = refused(BASIN, "--out", tmp_path, "--set", "echo_deviation=30")
-    assert line == "map_bag: echo_deviation = 30: must be a number from 0.01 to 10 m"
-
-
-def test_an_unknown_parameter_is_named(tmp_path):
-    assert "no_such = 1: no such parameter" in refused(BASIN, "--out", tmp_path, "--set", "no_such=1")
-
-
 def test_parameters_of_a_file_are_taken_and_held(tmp_path):
     (tmp_path / "mine.yaml").write_text("sonar_delay: 0.25\nmin_points: 20\n")
     changes = ["--set", "range_scale=0.99", "--no-calibrate"]
@@ -173,39 +116,3 @@ def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
     assert process.wait(timeout=10) == 1
     assert time.monotonic() - start < 2.0
     assert list(tmp_path.iterdir()) == []
-
-
-def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(tmp_path):
-    done = run(BASIN, BASIN, "--out", tmp_path)
-    assert done.returncode == 0, done.stderr
-    summary = summary_of(tmp_path)
-    (second,) = summary["sessions"]
-    assert (second["found_after_scans"], second["matched"]) == (0, second["scans"])
-    first, second = (np.loadtxt(str(tmp_path / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
-    assert np.hypot(*(first - second)[-20:, 4:6].T).max() < 0.5
-    assert read_map(tmp_path / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
-
-
-def test_several_recordings_are_not_refined(tmp_path):
-    done = run(BASIN, BASIN, "--out", tmp_path, "--refine")
-    assert (done.returncode, "--refine smooths one recording" in done.stderr) == (2, True)
-
-
-def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
-    assert refused(BASIN, tmp_path / "no.bag", "--out", tmp_path).startswith(f"map_bag: {tmp_path / 'no.bag'}")
-
-
-def test_a_dask_cluster_prepares_further_recordings(tmp_path):
-    distributed = pytest.importorskip("distributed")
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
-    ) as cluster:
-        done = run(BASIN, BASIN, "--out", tmp_path, "--scheduler", cluster.scheduler_address)
-    assert done.returncode == 0, done.stderr
-    assert summary_of(tmp_path)["sessions"][0]["found_after_scans"] == 0
-
-
-def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path):
-    pytest.importorskip("distributed")
-    line = refused(BASIN, BASIN, "--out", tmp_path, "--scheduler", "tcp://127.0.0.1:9")
-    assert line.startswith("map_bag: --scheduler tcp://127.0.0.1:9: ")

@@ -30,7 +30,8 @@ def test_the_table_has_time_and_pose_of_every_trajectory():
 
 def test_map_table_and_picture_are_written(tmp_path):
     write_run(tmp_path / "new", "a bag", RUN, Recording([], 0, TRACK, TRUTH))
-    assert {path.name for path in (tmp_path / "new").iterdir()} == {"map.mlsm", "map.ply", "map.png", "trajectory.csv"}
+    trajectories = {"trajectory.csv", "dead_reckoning.tum", "corrected.tum", "truth.tum"}
+    assert {path.name for path in (tmp_path / "new").iterdir()} == {"map.mlsm", "map.ply", "map.png", *trajectories}
     assert len(read_ply(tmp_path / "new/map.ply")) == 1
     picture = matplotlib.image.imread(str(tmp_path / "new/map.png"))[..., :3]
     for color in ("#999999", "#1f5fa8", "#111111"):

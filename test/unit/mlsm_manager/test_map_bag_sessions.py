@@ -1,0 +1,32 @@
+"""map_bag with several recordings of one place."""
+
+import numpy as np
+import pytest
+from map_bag_runs import BASIN, run, summary_of
+
+from mlsm_manager.surface_map.files.map_file import read_map
+
+# map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
+pytest.importorskip("tf2_py")
+TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
+
+
+def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(tmp_path):
+    done = run(BASIN, BASIN, "--out", tmp_path)
+    assert done.returncode == 0, done.stderr
+    summary = summary_of(tmp_path)
+    (second,) = summary["sessions"]
+    assert (second["found_after_scans"], second["matched"]) == (0, second["scans"])
+    first, second = (np.loadtxt(str(tmp_path / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
+    assert np.hypot(*(first - second)[-20:, 4:6].T).max() < 0.5
+    assert read_map(tmp_path / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
+
+
+def test_a_dask_cluster_prepares_further_recordings(tmp_path):
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, dashboard_address=None, host="127.0.0.1"
+    ) as cluster:
+        done = run(BASIN, BASIN, "--out", tmp_path, "--scheduler", cluster.scheduler_address)
+    assert done.returncode == 0, done.stderr
+    assert summary_of(tmp_path)["sessions"][0]["found_after_scans"] == 0
