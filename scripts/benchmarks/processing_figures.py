@@ -12,21 +12,25 @@ from benchmarks.map_figures import RESOLUTION, scan
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.ros.conversions import matrix_from_message
+from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
 from sonar_processing.filters.echo_extractor import EchoExtractor
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.messages.reader import BeamReader
+from sonar_processing.messages.type_table import OWN
 from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
-    beam_from_message,
     cloud_from_message,
     cloud_to_message,
 )
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
+from underwater_map_construction.msg import SonarScanLine
 
 
 def message_rows() -> List[Row]:
@@ -49,6 +53,10 @@ def message_rows() -> List[Row]:
     ]
 
 
+def _beam(message: SonarScanLine) -> Beam:
+    return BeamReader(BeamMessageParameters()).read(OWN, message).beams[0]
+
+
 def chain_rows() -> List[Row]:
     """Measure beams to inserted blocks on the recorded tour of the basin."""
     beams, poses = [], {}
@@ -64,7 +72,7 @@ def chain_rows() -> List[Row]:
         assembler, surface_map = ScanAssembler(SonarToCloudParameters()), MultiLevelSurfaceMap(RESOLUTION)
         stages = [Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())]
         for message in beams:
-            beam = beam_from_message(message)
+            beam = _beam(message)
             cloud = assembler.add(PlacedBeam(beam, poses[beam.stamp_ns], is_moving=False))
             if cloud is not None:
                 for stage in stages:
@@ -77,7 +85,7 @@ def chain_rows() -> List[Row]:
 
 def extraction_rows() -> List[Row]:
     """Measure the echo extractor on a turn of the recorded tour of the basin, as it comes to the stage."""
-    beams = [beam_from_message(message) for message in processing_graph.recorded_beams()]
+    beams = [_beam(message) for message in processing_graph.recorded_beams()]
     scan = PolarScan.of([PlacedBeam(beam, np.eye(4), is_moving=False) for beam in beams])
     parameters = SonarToCloudParameters()
     cloud, extractor = scan.cloud(parameters), EchoExtractor(EchoExtractorParameters())

@@ -10,6 +10,11 @@ from typing import Iterator, Tuple
 _PART = ".umc_part"
 
 
+def ros_path(path: str) -> Path:
+    """Return a path in which ~ stands for the home; a relative one lies in ROS_HOME, ~/.ros where that is not set."""
+    return (Path(os.environ.get("ROS_HOME") or "~/.ros") / Path(path).expanduser()).expanduser()
+
+
 def write_whole(path: Path, data: bytes) -> None:
     """Write `data` to `path`, making its folder; on any failure an older file stays as it was. Raises OSError."""
     with whole_file(path) as temporary:

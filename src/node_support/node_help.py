@@ -7,6 +7,7 @@ import textwrap
 from enum import Enum
 from typing import List, Mapping, Type
 
+from node_support.command_line import write_help
 from node_support.node_table import DIAGNOSTICS, HOSTS, NODES, Interface, Role
 from node_support.parameters import ParameterSet, describe
 
@@ -30,14 +31,14 @@ def answer_help(
     tunable: whether dynamic_reconfigure can change parameters while the node runs.
     """
     if _is_asked():
-        print(node_help(node, {"": parameters, **groups}, tunable))
+        write_help(node_help(node, {"": parameters, **groups}, tunable), sys.stdout)
         sys.exit(0)
 
 
 def answer_pipeline_help(host: str) -> None:
     """Do as `answer_help` for a node that hosts several nodes in one process."""
     if _is_asked():
-        print(host_help(host))
+        write_help(host_help(host), sys.stdout)
         sys.exit(0)
 
 

@@ -53,7 +53,9 @@ def _serves(name: str, kind: str, text: str) -> Interface:
     return Interface(Role.SERVICE, name, kind, text)
 
 
-_BEAMS_IN = _subscribes(topics.BEAMS, "SonarScanLine", "beams")
+_BEAMS_IN = _subscribes(
+    topics.BEAMS, "SonarScanLine", "beams; also of the types of other sonars, see [sonars](sonars.md)"
+)
 _JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo")
 _DRIVER_JOINTS_IN = _subscribes(
     topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
@@ -77,6 +79,18 @@ NODES: Dict[str, NodeDescription] = {
         "See [the emulated head](imagenex_852_driver.md#the-emulated-head).",
         (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
     ),
+    "ping360_driver": NodeDescription(
+        "Driver of the Blue Robotics Ping360 sonar, over serial and UDP. See [the driver](ping360_driver.md).",
+        (
+            _DRIVER_JOINTS_IN,
+            _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"),
+        ),
+    ),
+    "ping360_emulator": NodeDescription(
+        "An emulated Ping360 on a pseudo-terminal or a UDP port, with faults at random or on request. "
+        "See [the emulated head](ping360_driver.md#the-emulated-head).",
+        (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
+    ),
     "sonar_to_cloud": NodeDescription(
         "Assembles beams into scans (thesis 6.5.2). A beam waits until tf can place it at its own stamp. "
         "See [sonar_processing](sonar_processing.md#sonar_to_cloud).",
@@ -89,7 +103,14 @@ NODES: Dict[str, NodeDescription] = {
             ),
             _publishes(topics.SCANS, "StampedIntensityCloud", f"scans; {_AS_POINTS}"),
             _publishes(topics.LASER_POINTS, "sensor_msgs/PointCloud2", "scans of the LASER modes"),
-            _publishes(topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping or hector"),
+            _publishes(
+                topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping, hector or slam_toolbox"
+            ),
+            _publishes(
+                topics.TURNS,
+                "sensor_msgs/PointCloud2",
+                "every revolution, x y z intensity time in the sonar's frame",
+            ),
             _publishes(
                 topics.POLAR_SCANS,
                 "StampedIntensityCloud",
@@ -219,8 +240,8 @@ NODES: Dict[str, NodeDescription] = {
                 "depth; `depth_type` sets the type",
             ),
             _subscribes(
-                topics.MATCHED_VELOCITY,
-                "geometry_msgs/TwistWithCovarianceStamped",
+                topics.MATCHED_ODOMETRY,
+                "nav_msgs/Odometry",
                 "velocity that mlsm_core estimates, if `velocity_source` is ESTIMATE",
             ),
             _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "velocity if `velocity_source` is COMMANDS"),

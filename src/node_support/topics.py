@@ -15,6 +15,9 @@ LASER_POINTS = "sonar/scan/laserCloud"
 LASER_SCANS = "sonar/scan/laserScan"
 """LaserScan: whole revolutions of the head as a planar laser would measure them."""
 
+TURNS = "sonar/scan/turn"
+"""PointCloud2 with a time per point: whole revolutions of the head, seen from the pose of the newest beam."""
+
 POLAR_SCANS = "sonar/scan/polar"
 """StampedIntensityCloud, organised: whole revolutions of the head, one row for each beam."""
 
@@ -95,9 +98,6 @@ MATCHED_POSE = "MLSM/pose"
 
 MATCHED_ODOMETRY = "MLSM/odometry"
 """Odometry: the vehicle in the map at the newest match."""
-
-MATCHED_VELOCITY = "MLSM/velocity"
-"""TwistWithCovarianceStamped: the vehicle's velocity along its own axes, as its scans tell it."""
 
 MATCHED_PATH = "MLSM/path"
 """Path: the vehicle in the map at all matches."""

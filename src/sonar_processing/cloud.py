@@ -51,6 +51,11 @@ class IntensityCloud:
         """Number of points that are not finite although no stage removed them; organised clouds hold removed ones."""
         return 0 if self.is_organized else len(self) - int(np.count_nonzero(self.valid))
 
+    def beyond(self, limit: float) -> np.ndarray:
+        """Return (n,) bool: points with a coordinate beyond `limit` [m], infinite ones too; NaN is not."""
+        with np.errstate(invalid="ignore"):
+            return (np.abs(self.points[:, :3]) > limit).any(axis=1)
+
     def select(self, keep: np.ndarray) -> "IntensityCloud":
         """Return the cloud with the points where `keep` (n,) bool holds, stamps staying with their points.
 

@@ -9,10 +9,11 @@ import pytest
 
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.offline.bag_recording import BagNames, read_recording
+from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from recordings.reading.reader import Request
 
 ROOT = Path(__file__).resolve().parents[2]
 # Longer than the solver's window, so that frozen scans take part.
@@ -24,7 +25,7 @@ def recorded():
     bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_whole_blind.bag"
     if not bag.is_file():
         pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
-    recording = read_recording(bag, BagNames("/sonar/raw", "odom", "base_link", None))
+    recording = read_recording(bag, Request())
     parameters = suited(ReplayParameters(), EchoShape.PLATEAU, fixed=())
     found = scans_of(recording, parameters.echoes())
     scans = [scan for _, (scan, _) in zip(range(_SCANS), found)]

@@ -45,14 +45,15 @@ class BadClouds(unittest.TestCase):
         """Connect to every stage."""
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
-        cls.inputs = {s: rospy.Publisher(topic, StampedIntensityCloud, queue_size=10) for s, topic in STAGES.items()}
+        inputs = {**STAGES, "matching": "/sonar/scan/echoes"}
+        cls.inputs = {s: rospy.Publisher(topic, StampedIntensityCloud, queue_size=10) for s, topic in inputs.items()}
         for publisher in cls.inputs.values():
             wait_for_publisher_links(publisher, 1)
 
     def send_to_all(self, cloud: StampedIntensityCloud) -> None:
         """Publish on every stage's input."""
-        for publisher in self.inputs.values():
-            publisher.publish(cloud)
+        for stage in STAGES:
+            self.inputs[stage].publish(cloud)
 
     def expect_for_all(self, counter: str, number: int) -> None:
         """Wait for a counter of every stage."""
@@ -95,6 +96,13 @@ class BadClouds(unittest.TestCase):
         """1000 km away is a broken transform, not a wall."""
         self.inputs["mlsm_core"].publish(message(wall() + np.float32([1e6, 0, 0, 0])))
         self.diagnostics.wait_for("mlsm_core", "points outside the map", 400)
+
+    def test_5_echoes_at_extreme_coordinates_are_left_out_of_the_match(self) -> None:
+        """What no sonar can have heard is counted, and the rest of the scan is used."""
+        points = wall()
+        points[:3, 0] = 1e30, -1e6, 3e38
+        self.inputs["matching"].publish(message(points))
+        self.diagnostics.wait_for("mlsm_core", "echoes outside the map", 3)
 
     def test_6_a_cloud_in_another_frame_is_refused_by_the_map(self) -> None:
         """The map cannot know where the sonar was."""

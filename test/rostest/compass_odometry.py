@@ -6,7 +6,7 @@ import unittest
 
 import rospy
 import rostest
-from geometry_msgs.msg import Quaternion, TwistWithCovarianceStamped
+from geometry_msgs.msg import Quaternion
 from graph import Diagnostics, Inbox, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
@@ -29,7 +29,7 @@ class DeadReckoning(unittest.TestCase):
             inbox.wait_for_link()
         cls.headings = _publisher("/imu", Imu)
         cls.depths = _publisher("/depth", Float64)
-        cls.velocities = _publisher("/MLSM/velocity", TwistWithCovarianceStamped)
+        cls.velocities = _publisher("/MLSM/odometry", Odometry)
         cls.now = rospy.Time.now()
 
     def _go(self, seconds: float, yaw: float) -> Odometry:
@@ -46,8 +46,8 @@ class DeadReckoning(unittest.TestCase):
         self.depths.publish(Float64(data=3.0))
         self.diagnostics.wait_for("dead_reckoning", "depths in", 1)
         start = self._go(0.0, math.pi / 2.0).pose.pose.position
-        velocity = TwistWithCovarianceStamped()
-        velocity.header.stamp, velocity.header.frame_id = self.now, "base_link"
+        velocity = Odometry(child_frame_id="base_link")
+        velocity.header.stamp, velocity.header.frame_id = self.now, "map"
         velocity.twist.twist.linear.x = 0.5
         self.velocities.publish(velocity)
         self.diagnostics.wait_for("dead_reckoning", "velocities in", 1)

@@ -1,17 +1,20 @@
 #!/usr/bin/env python3
 """No message on any topic that a node subscribes to ends it or is an internal error; then a sane scan passes.
 
-Arguments: the number of messages and the seed.
+Arguments: one or many processes, the number of messages and the seed.
 """
 
 import math
 import os
+import subprocess
 import sys
 import threading
 import time
 import unittest
 import xmlrpc.client
-from typing import Any, Dict, List, Tuple
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, Dict, List, Set, Tuple
 
 import numpy as np
 import rosgraph
@@ -20,12 +23,14 @@ import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
-from graph import Inbox, wait_for_publisher_links
+from graph import Inbox, wait_for_publisher_links, wait_until
 from random_messages import RandomMessages
+from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
+from tf2_msgs.msg import TFMessage
 
 from underwater_map_construction.msg import SonarScanLine
 
@@ -34,7 +39,11 @@ FAR = 150.0
 BEAMS = 120
 PER_SECOND = 1500
 BATCH = 50
-NOT_FUZZED = {"/rosout", "/rosout_agg", "/clock"}
+# What those get who take any type and use some.
+TAKEN_AS_ANY_TYPE = {"/sonar/raw": SonarScanLine._type, "/sonar/rays": PointCloud2._type}
+NOT_FUZZED = {"/rosout", "/rosout_agg"}
+CLOCK_PERIOD = 0.02  # s: what random messages on /clock did to the time is mended after this
+START_TIMEOUT = 120.0  # s: on two busy cores
 
 
 class Fuzz(unittest.TestCase):
@@ -43,18 +52,24 @@ class Fuzz(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         """Find the nodes, their processes and what they subscribe to."""
-        cls.messages, cls.seed = int(sys.argv[1]), int(sys.argv[2])
+        cls.nodes = _launched(sys.argv[1])
+        cls.messages, cls.seed = int(sys.argv[2]), int(sys.argv[3])
         cls.statuses: Dict[str, Dict[str, str]] = {}
+        cls.reporting: Set[str] = set()
         cls.lock = threading.Lock()
+        threading.Thread(target=_publish_time, daemon=True).start()
         rospy.Subscriber("/diagnostics", DiagnosticArray, cls._take_diagnostics, queue_size=100)
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         cls.map.wait_for_link()
+        wait_until(lambda: cls.nodes <= cls.reporting, START_TIMEOUT, required=False)
+        assert cls.nodes <= cls.reporting, f"did not start: {cls.nodes - cls.reporting}"
         cls.processes = _processes()
         cls.topics = _subscribed(cls.processes)
 
     @classmethod
     def _take_diagnostics(cls, array: DiagnosticArray) -> None:
         with cls.lock:
+            cls.reporting.add(array._connection_header["callerid"])
             for status in array.status:
                 cls.statuses[status.name] = {item.key: item.value for item in status.values}
 
@@ -64,6 +79,7 @@ class Fuzz(unittest.TestCase):
         self._publish()
         self._expect_all_alive()
         self._expect_a_scan()
+        self._expect_the_correction()
         self._expect_no_internal_error()
         self._expect_all_alive()
 
@@ -99,9 +115,8 @@ class Fuzz(unittest.TestCase):
     def _expect_a_scan(self) -> None:
         """Send good beams far away from all others until the map has them."""
         rospy.Publisher("/startMatching", Bool, queue_size=1, latch=True).publish(Bool(False))
-        for service in ("/mlsm_core/reset_map",):
-            rospy.wait_for_service(service, timeout=20.0)
-            rospy.ServiceProxy(service, Trigger)()
+        rospy.wait_for_service("/mlsm_core/reset_map", timeout=20.0)
+        rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)()
         transforms = tf2_ros.StaticTransformBroadcaster()
         transforms.sendTransform(_mount())
         beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
@@ -114,6 +129,32 @@ class Fuzz(unittest.TestCase):
                 return
             time.sleep(1.0)
         self.fail(f"no sane scan in the map; {self.statuses}")
+
+    def _expect_the_correction(self) -> None:
+        """Wait for map -> odom, which a timer of its own sends."""
+        Inbox("/tf", TFMessage).wait_for(_is_correction)
+
+
+def _is_correction(message: TFMessage) -> bool:
+    """Return whether a message of tf holds a map -> odom of the last seconds."""
+    now = time.time()
+    return any(t.header.frame_id == "map" and abs(t.header.stamp.to_sec() - now) < 5.0 for t in message.transforms)
+
+
+def _launched(processes: str) -> Set[str]:
+    """Return the nodes that publish diagnostics: all that are launched."""
+    launch_file = Path(__file__).resolve().parent / "fuzz.launch"
+    command = ["roslaunch", "--nodes", str(launch_file), f"processes:={processes}", "files:=unused"]
+    return set(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split())
+
+
+def _publish_time() -> None:
+    """Publish the time as the simulated one, so that nodes subscribe to /clock and recover from what comes there."""
+    publisher = rospy.Publisher("/clock", Clock, queue_size=1)
+    with suppress(rospy.ROSException):  # the end of this process closes the topic
+        while not rospy.is_shutdown():
+            publisher.publish(Clock(rospy.Time.from_sec(time.time())))
+            time.sleep(CLOCK_PERIOD)
 
 
 def _mount() -> TransformStamped:
@@ -158,9 +199,8 @@ def _subscribed(processes: Dict[str, int]) -> Dict[str, str]:
     topics: Dict[str, Any] = {
         topic: dict(kinds).get(topic, "*") for topic, nodes in subscribers if set(nodes) & set(processes)
     }
-    # Who takes any type gets one that it can use.
     return {
-        topic: "sensor_msgs/PointCloud2" if kind == "*" else kind
+        topic: TAKEN_AS_ANY_TYPE[topic] if kind == "*" else kind
         for topic, kind in topics.items()
         if topic not in NOT_FUZZED
     }

@@ -38,7 +38,7 @@ class TestLoad(unittest.TestCase):
         assert rate > 0.9 * FASTEST_RATE
         sequence = [beam.header.seq for beam in listener.received]
         assert sequence == list(range(sequence[0], sequence[0] + len(sequence)))
-        lost = [health[count] for count in ("timeouts", "bad frames", "unexpected replies")]
+        lost = [health[count] for count in ("timeouts", "bad frames", "unexpected replies", "early replies")]
         assert lost == ["0", "0", "0"]
 
 

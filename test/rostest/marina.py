@@ -17,11 +17,12 @@ from scipy.spatial import cKDTree
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from mlsm_manager.offline.bag_recording import BagNames, read_recording
+from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from node_support.geometry.planar import composed, wrapped
+from recordings.reading.reader import Request
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 TOPICS = ("/sonar/raw", "/tf", "/tf_static", "/cmd_vel")
@@ -98,7 +99,7 @@ def replayed(bag: Path) -> Replayed:
     """Return what map_bag makes of a bag with the parameters of the live graph."""
     options = [str(bag), "--out", "nowhere", "--parameters", str(TEST_DATA / "marina_live.yaml")]
     parameters = map_bag_arguments(options).parameters
-    raw = read_recording(bag, BagNames("/sonar/raw", "odom", "base_link", None))
+    raw = read_recording(bag, Request())
     found = raw.corrected(parameters.part(BeamCorrection))
     return replay(found, [scan for scan, _ in scans_of(found, parameters.echoes())], parameters, lambda _: None)
 

@@ -8,6 +8,7 @@ import rospy
 import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import Inbox, rows
+from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 
 
@@ -20,6 +21,15 @@ class PlayBag(unittest.TestCase):
         fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
         fixes.wait_for(lambda _: len(fixes.messages) >= 2)
         self.assertGreater(len(rows(maps.messages[-1])), 300)
+
+    def test_the_clock_never_stands_still(self) -> None:
+        """It goes on in steps of 10 ms of wall time while messages are played."""
+        clocks = Inbox("/clock", Clock)
+        clocks.wait_for(lambda _: len(clocks.messages) >= 500)
+        times = [message.clock.to_sec() for message in clocks.messages]
+        steps = [later - earlier for earlier, later in zip(times, times[1:])]
+        self.assertGreater(min(steps), 0.0)
+        self.assertLess(max(steps), 0.3)
 
 
 if __name__ == "__main__":

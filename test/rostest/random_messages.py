@@ -7,9 +7,10 @@ from typing import Any, Callable, Dict, List
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import TransformStamped
+from geometry_msgs.msg import Quaternion, TransformStamped
+from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
-from sensor_msgs.msg import JointState, LaserScan
+from sensor_msgs.msg import Imu, JointState, LaserScan
 from tf2_msgs.msg import TFMessage
 
 from sonar_processing.cloud import IntensityCloud
@@ -35,12 +36,15 @@ class RandomMessages:
             "underwater_map_construction/StampedIntensityCloud": self._cloud,
             "sensor_msgs/PointCloud2": lambda: self._cloud().cloud,
             "sensor_msgs/LaserScan": self._laser_scan,
+            "sensor_msgs/Imu": self._compass,
             "sensor_msgs/JointState": lambda: JointState(name=["sonar_servo_joint"], position=[self._float()]),
             "tf2_msgs/TFMessage": self._transforms,
         }
 
     def message(self, kind: str) -> Any:
         """Return a message of a type such as sensor_msgs/PointCloud2."""
+        if kind == "rosgraph_msgs/Clock":
+            return self._clock()
         make = self._sane.get(kind)
         if make is None or self._random.random() < 0.1:
             return self._filled(get_message_class(kind)())
@@ -109,6 +113,11 @@ class RandomMessages:
             stamp.nsecs = 2**32 - 1
         return stamp
 
+    def _clock(self) -> Clock:
+        """Return any time that rospy can put into a message again: with too many nanoseconds it cannot."""
+        stamp = self.stamp()
+        return Clock(genpy.Time(stamp.secs, min(stamp.nsecs, 999_999_999)))
+
     def _beam(self) -> SonarScanLine:
         beam = SonarScanLine(maxrange_meters=50.0, range_resolution=1.0, angle=self._random.uniform(-4.0, 4.0))
         beam.header.stamp, beam.header.frame_id = genpy.Time.from_sec(time.time()), "sonar"
@@ -130,6 +139,12 @@ class RandomMessages:
         scan.header.stamp, scan.header.frame_id = genpy.Time.from_sec(time.time()), "sonar"
         scan.ranges = [self._random.uniform(0.5, 49.0) for _ in range(181)]
         return scan
+
+    def _compass(self) -> Imu:
+        heading = self._random.uniform(-math.pi, math.pi)
+        compass = Imu(orientation=Quaternion(z=math.sin(heading / 2.0), w=math.cos(heading / 2.0)))
+        compass.header.stamp, compass.header.frame_id = genpy.Time.from_sec(time.time()), "base_link"
+        return compass
 
     def _transforms(self) -> TFMessage:
         transforms: List[TransformStamped] = []

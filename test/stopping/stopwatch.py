@@ -28,7 +28,7 @@ def seconds_to_stop_without_nodes(log: Path) -> float:
 
 
 def _seconds_to_stop(command: List[str], nodes: Set[str], log: Path) -> float:
-    port = _free_port()
+    port = free_port()
     environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(log.parent)}
     with log.open("wb") as output:
         launch = subprocess.Popen(
@@ -45,7 +45,8 @@ def _seconds_to_stop(command: List[str], nodes: Set[str], log: Path) -> float:
             launch.kill()
 
 
-def _free_port() -> int:
+def free_port() -> int:
+    """Return a port on which nobody listens."""
     with socket.socket() as probe:
         probe.bind(("localhost", 0))
         return probe.getsockname()[1]

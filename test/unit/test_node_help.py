@@ -70,5 +70,17 @@ def test_the_arguments_that_roslaunch_adds_do_not_hide_the_question():
 
 
 def test_every_node_is_described():
-    programs = {"convert_852", "map_bag", "map_tool", "play_852", "record_852", "simulate_bag"}
+    programs = {
+        "convert_852", "convert_bag", "map_bag", "map_tool", "play_852", "play_bag", "record_852", "simulate_bag",
+    }  # fmt: skip
     assert {*NODES, *HOSTS, *programs} == set(EXECUTABLES)
+
+
+@pytest.mark.parametrize("node", ["mlsm_core", "mapping", "map_bag", "map_tool", "simulate_bag", "convert_852"])
+def test_help_that_nobody_reads_to_its_end_ends_without_a_word(node):
+    reader, writer = os.pipe()
+    os.close(reader)
+    command = [sys.executable, str(ROOT / "nodes" / node), "--help"]
+    done = subprocess.run(command, stdout=writer, stderr=subprocess.PIPE, text=True, timeout=30, check=False)
+    os.close(writer)
+    assert done.stderr == ""

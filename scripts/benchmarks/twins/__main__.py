@@ -15,10 +15,11 @@ from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.path import live_path, solved_path
-from mlsm_manager.offline.bag_recording import BagNames, read_recording
+from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.evaluation import position_error
 from mlsm_manager.offline.recording import Recording, scans_of
 from node_support.geometry.planar import inverse, transformed
+from recordings.reading.reader import Request
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, ExtractionMode
 
 
@@ -28,7 +29,7 @@ def main() -> None:
     parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
     parser.add_argument("twins", nargs="*", default=list(TWINS), help="which ones; default: " + ", ".join(TWINS))
     arguments = parser.parse_args()
-    source = read_recording(arguments.bag, BagNames("/sonar/raw", "odom", "base_link", None))
+    source = read_recording(arguments.bag, Request())
     for name in arguments.twins:
         for path, error in zip(("live", "batch"), errors(twin_of(source, TWINS[name]), TWINS[name])):
             print(f"{name}, {path}: {error.mean:.2f} m in the mean, {error.max:.2f} m at most")

@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, Tuple
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist, TwistWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, Imu
 from std_msgs.msg import Float64
@@ -53,7 +53,7 @@ class DeadReckoning:
     def _subscribe(self) -> None:
         parameters = self._live.current
         velocities: Dict[VelocitySource, Tuple[str, type, Callable[[Any], None]]] = {
-            VelocitySource.ESTIMATE: (topics.MATCHED_VELOCITY, TwistWithCovarianceStamped, self._take_estimate),
+            VelocitySource.ESTIMATE: (topics.MATCHED_ODOMETRY, Odometry, self._take_estimate),
             VelocitySource.COMMANDS: (topics.VELOCITY_COMMANDS, Twist, self._take_command),
         }
         depths: Dict[DepthType, Tuple[type, Callable[[Any], float]]] = {
@@ -77,7 +77,7 @@ class DeadReckoning:
         with self._lock:
             self._reckoner.take_depth(depth)
 
-    def _take_estimate(self, message: TwistWithCovarianceStamped) -> None:
+    def _take_estimate(self, message: Odometry) -> None:
         stamp_ns = message.header.stamp.to_nsec()
         self._transforms.check_stamp(stamp_ns)
         self._take_velocity(stamp_ns, message.twist.twist)

@@ -10,11 +10,14 @@ from imagenex_852_driver.line.reply_wait import ReplyWait
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol import Reply, ReplyKind, ReplyParser, SwitchCommand
 from sonar_driver.line.device import LineDevice
+from sonar_driver.line.port import Port, open_port
 
-# A busy line counts as quiet after a pause of _QUIET; _LONGEST_DRAIN is the longest wait for that. Both in seconds.
-_QUIET = 0.005
+# A busy line counts as quiet after a pause of _QUIET: USB adapters pass bytes on in pieces up to 16 ms apart.
+# _LONGEST_DRAIN is the longest wait for that. Both in seconds.
+_QUIET = 0.02
 _LONGEST_DRAIN = 0.2
 _UNEXPECTED = "a reply came late or twice"
+_EARLY = "a reply came before the sound can have returned"
 
 
 @dataclass(frozen=True)
@@ -34,16 +37,18 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         connection: ConnectionParameters,
         stop: Optional[threading.Event] = None,
         clock: Callable[[], float] = time.time,
+        elapsed: Callable[[], float] = time.monotonic,
+        opener: Callable[[str, int], Port] = open_port,
     ) -> None:
-        """`clock` gives the stamps of the pings, in seconds."""
-        super().__init__(connection, DeviceStats(), stop, clock)
+        """As `LineDevice` takes them."""
+        super().__init__(connection, DeviceStats(), stop, clock, elapsed, opener)
         self._timing = connection.timing()
         self._parser = ReplyParser()
 
     def _ping(self, command: SwitchCommand) -> Optional[Ping]:
         self._drain()
         stamp = self._clock() + self._timing.ping_leaves()
-        wait = ReplyWait(command, self.connection, time.monotonic())
+        wait = ReplyWait(command, self.connection, self.elapsed())
         self._recorder.count("pings")
         try:
             self._port.write(command.encode())
@@ -53,6 +58,8 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
             raise
         finally:
             self._recorder.note(parser=self._parser.counts)
+        if wait.early_replies:
+            self._recorder.count("early_replies", _EARLY, wait.early_replies)
         if wait.unexpected_replies:
             self._recorder.count("unexpected_replies", _UNEXPECTED, wait.unexpected_replies)
         return self._judge(wait, stamp)
@@ -60,9 +67,9 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
     def _collect(self, wait: ReplyWait) -> None:
         while wait.reply is None and not self.stop.is_set():
             # Taken before the read, so that bytes that arrived while this process stalled are read before it gives up.
-            now = time.monotonic()
+            now = self.elapsed()
             data = self._port.read(self._bytes_to_read(wait, now))
-            wait.take(data, self._parser.feed(data), time.monotonic())
+            wait.take(data, self._parser.feed(data), self.elapsed())
             if wait.over(now, self._parser.pending):
                 break
 
@@ -98,10 +105,10 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         return Ping(stamp, wait.command, reply)
 
     def _await_late_reply(self) -> None:
-        deadline = time.monotonic() + self.connection.late_window
+        deadline = self.elapsed() + self.connection.late_window
         limit = deadline + self._timing.transmission(ReplyKind.IGX.length)
         while not self.stop.is_set():
-            now = time.monotonic()
+            now = self.elapsed()
             if now >= limit or (now >= deadline and not self._parser.pending):
                 return
             if self._unexpected(self._port.read(max(1, self._port.in_waiting))):
@@ -109,10 +116,10 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
 
     def _drain(self) -> None:
         """Empty the line before a command; wait until a head that is still sending has finished."""
-        deadline = time.monotonic() + _LONGEST_DRAIN
+        deadline = self.elapsed() + _LONGEST_DRAIN
         for data in self._waiting():
             self._unexpected(data)
-            if time.monotonic() < deadline:
+            if self.elapsed() < deadline:
                 self.stop.wait(_QUIET)
         self._parser.reset()
 

@@ -22,6 +22,7 @@ class ReplyWait:
         leaves, begins = timing.ping_leaves(), timing.reply_begins(command)
         self.command = command
         self.reply: Optional[Reply] = None
+        self.early_replies = 0
         self.unexpected_replies = 0
         self.patience = begins + connection.reply_margin
         self._earliest = start + leaves + _SURELY_TOO_EARLY * (begins - leaves)
@@ -31,13 +32,13 @@ class ReplyWait:
         self._last_deadline = start + timing.reply_ends(command) + connection.reply_margin + connection.byte_gap
         self._last_byte = float("inf")
         self._early_bytes = 0
-        self._unexpected_bytes = 0
+        self._early_reply_bytes = 0
         self._received = 0
 
     @property
     def answer_bytes(self) -> int:
         """Number of received bytes that do not belong to the reply to an earlier command."""
-        return max(0, self._received - max(self._early_bytes, self._unexpected_bytes))
+        return max(0, self._received - max(self._early_bytes, self._early_reply_bytes))
 
     @property
     def answered(self) -> bool:
@@ -86,8 +87,8 @@ class ReplyWait:
     def _sort(self, replies: List[ParsedReply]) -> None:
         for offset, reply in replies:
             if offset < self._early_bytes:
-                self.unexpected_replies += 1
-                self._unexpected_bytes = max(self._unexpected_bytes, offset + reply.kind.length)
+                self.early_replies += 1
+                self._early_reply_bytes = max(self._early_reply_bytes, offset + reply.kind.length)
             else:
                 # Two replies at once were read after a stall; the earlier one is an old reply that the head sent twice.
                 self.unexpected_replies += int(self.reply is not None)

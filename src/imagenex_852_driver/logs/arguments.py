@@ -5,11 +5,12 @@ import math
 from typing import List
 
 from node_support import topics
+from node_support.command_line import CommandLine
 
 
 def play_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
-    parser = argparse.ArgumentParser("play_852", description="Publish the pings of a .852 log on sonar/raw.")
+    parser = CommandLine("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
     _add_rate(parser)
     parser.add_argument("--loop", action="store_true", help="start again at the end")
@@ -20,7 +21,7 @@ def play_arguments(arguments: List[str]) -> argparse.Namespace:
 
 def record_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return file and driver; exits on a bad command line."""
-    parser = argparse.ArgumentParser("record_852", description="Append the beams of sonar/raw to a .852 log.")
+    parser = CommandLine("record_852", description="Append the beams of sonar/raw to a .852 log.")
     parser.add_argument("file", help="log to append to")
     parser.add_argument("--driver", default="imagenex_852_driver", help="node whose settings go into the log")
     return parser.parse_args(arguments)
@@ -28,7 +29,7 @@ def record_arguments(arguments: List[str]) -> argparse.Namespace:
 
 def convert_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return file, out, rate, start, topic, frame_id and inverted; exits on a bad command line."""
-    parser = argparse.ArgumentParser("convert_852", description="Convert a .852 log to a bag.")
+    parser = CommandLine("convert_852", description="Convert a .852 log to a bag.")
     parser.add_argument("file", help="log to convert")
     parser.add_argument("--out", required=True, help="bag to write; an existing one is replaced")
     _add_rate(parser)

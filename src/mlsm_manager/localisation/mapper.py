@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Dict, Iterator, List, Mapping, Optional, Tuple
+from typing import Deque, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
 
 import numpy as np
 
@@ -73,10 +73,18 @@ class CloudUpdate:
     carved: Optional[CarveReport] = None
 
 
+class HasBlocks(Protocol):
+    """What has blocks: a map, or the free space of keyframes."""
+
+    @property
+    def blocks(self) -> Blocks:
+        """A copy of all of them."""
+
+
 class LayerCopies(Mapping[Layer, Blocks]):
     """The blocks of maps, copied when they are asked for."""
 
-    def __init__(self, maps: Dict[Layer, MultiLevelSurfaceMap]) -> None:
+    def __init__(self, maps: Dict[Layer, HasBlocks]) -> None:
         self._maps = maps
 
     def __getitem__(self, layer: Layer) -> Blocks:
@@ -128,7 +136,12 @@ class Mapper:
         tiles = self.shown.take_changed_tiles()
         return tiles, self.shown.in_tiles(tiles)
 
-    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+    @property
+    def keyframes(self) -> Mapping[str, np.ndarray]:
+        """None: a pose never changes once its scan is in the map."""
+        return {}
+
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
         """Take stored maps in the place of the present ones, and forget the place.
 
         A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
@@ -231,9 +244,7 @@ class Mapper:
         positions = None if carver is None else self._history.positions(times)
         if positions is None:
             return CloudUpdate(report, False, unplaced)
-        # A level beam: the sonar is as deep as what it hears.
-        origins = np.column_stack([positions, points[:, 2]])
-        carved = carver.carve(self.shown, self.free, FirstEchoes.of_points(points, times, origins), points)
+        carved = carver.carve(self.shown, self.free, FirstEchoes.of_level(points, times, positions), points)
         return CloudUpdate(report, False, unplaced, carved)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:

@@ -157,8 +157,9 @@ class MlsmNodeParameters(ParameterSet):
         1000.0, "greatest height that MLSM/grid shows", unit="m", low=-20000.0, high=20000.0, tunable=False
     )
     map_directory: str = parameter(
-        "~/.ros/maps", "the only folder that maps are written to and loaded from", tunable=False
-    )
+        "maps", "the only folder that maps are written to and loaded from; a relative path is in $ROS_HOME (~/.ros)",
+        tunable=False,
+    )  # fmt: skip
     map: str = parameter(
         "", "name of a map in map_directory to start with; the vehicle is searched in it", tunable=False,
         may_be_empty=True,

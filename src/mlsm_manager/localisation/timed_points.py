@@ -1,6 +1,7 @@
 """Points with the times of their beams: all that the map needs of a cloud."""
 
 from dataclasses import dataclass
+from typing import Sequence
 
 import numpy as np
 
@@ -27,6 +28,12 @@ class TimedPoints:
     def of_scan(cls, scan: Scan) -> "TimedPoints":
         """Return the points of a scan."""
         return cls(scan.points, scan.times, scan.reference_time)
+
+    @classmethod
+    def joined(cls, clouds: "Sequence[TimedPoints]") -> "TimedPoints":
+        """Return the points of clouds (at least one), one after the other, as one cloud."""
+        points, times = ([getattr(cloud, name) for cloud in clouds] for name in ("points", "times"))
+        return cls(np.concatenate(points), np.concatenate(times), max(cloud.end for cloud in clouds))
 
     def __len__(self) -> int:
         return len(self.points)

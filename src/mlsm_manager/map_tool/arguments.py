@@ -6,13 +6,14 @@ from typing import List
 
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.export.formats import ENDINGS
+from node_support.command_line import CommandLine
 
 _MAPS = "a map (.mlsm, or a .ply of this package)"
 
 
 def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return `command` and what it needs; exits on a bad command line."""
-    parser = argparse.ArgumentParser("map_tool", description="Look at, export, crop, merge and compare maps.")
+    parser = CommandLine("map_tool", description="Look at, export, crop, merge and compare maps.")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True
     info = commands.add_parser("info", help="say what maps hold")

@@ -1,7 +1,7 @@
 """What a run found out about its sonar and its odometry."""
 
 from dataclasses import dataclass, fields
-from typing import Any, Dict
+from typing import Any, Dict, Tuple
 
 import numpy as np
 
@@ -40,6 +40,11 @@ class Calibration:
         of_odometry = cls.of_live(solver).deviations[2:]
         values = np.append(batch.state.run[[RANGE_SCALE, DELAY]], batch.state.nodes[-1, [SCALE, DIRECTION]])
         return cls(values, np.concatenate([of_run, of_odometry]))
+
+    @property
+    def by_name(self) -> Dict[str, Tuple[float, float]]:
+        """Value and deviation of each of NAMES."""
+        return {name: (float(value), float(own)) for name, value, own in zip(NAMES, self.values, self.deviations)}
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return values and deviations by name, rounded for people."""

@@ -1,6 +1,6 @@
 """live.yaml: parameters with which the live nodes do what map_bag did."""
 
-from dataclasses import fields
+from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Dict, Mapping, Type
 
@@ -10,6 +10,7 @@ from mlsm_manager.localisation.parameters import MapInput, MatchInput, MlsmCoreP
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.files import write_whole
 from node_support.parameters import ParameterSet
+from recordings.reading.parameters import ReadingParameters
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
@@ -19,7 +20,14 @@ NODES: Dict[str, Type[ParameterSet]] = {
     "echo_extractor": EchoExtractorParameters,
     "mlsm_core": MlsmCoreParameters,
 }
-_SHARED: Dict[str, Type[ParameterSet]] = {**NODES, "sonar_to_cloud": BeamCorrection}
+
+
+@dataclass(frozen=True)
+class _CloudParameters(ReadingParameters, BeamCorrection):
+    """What sonar_to_cloud and a replay know by the same name and meaning."""
+
+
+_SHARED: Dict[str, Type[ParameterSet]] = {**NODES, "sonar_to_cloud": _CloudParameters}
 _COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take it as parameters:=FILE.\n"
 
 

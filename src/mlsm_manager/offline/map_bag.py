@@ -5,19 +5,20 @@ import time
 from argparse import Namespace
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any, Dict, List, Optional
 
 import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.offline.bag_recording import BagNames, read_recording
+from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
-from mlsm_manager.offline.north_east_down import suspicions
+from mlsm_manager.offline.mission_report import mission_of
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
@@ -26,6 +27,7 @@ from mlsm_manager.offline.run_files import (
     CORRECTED,
     ODOMETRY,
     REFINED,
+    REPORT,
     Run,
     errors_of,
     write_run,
@@ -33,9 +35,13 @@ from mlsm_manager.offline.run_files import (
     write_trajectory,
 )
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
+from mlsm_manager.report.mission import Mission
+from mlsm_manager.self_check.north_east_down import suspicions
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
+from recordings.inspection.report import report
+from recordings.inspection.survey import survey
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 # The frame that live.yaml's nodes call their map by default.
@@ -46,6 +52,9 @@ def run_map_bag() -> None:
     """Run map_bag with the command line; ends with one line and status 1 when something is wrong with the input."""
     try:
         options = map_bag_arguments(sys.argv[1:])
+        if options.inspect:
+            print("\n\n".join(report(survey(bag, options.request), options.request) for bag in options.bags))
+            return
         summary = map_bag(options)
     except (ParameterError, RecordingError) as error:
         sys.exit(f"map_bag: {error}")
@@ -59,8 +68,9 @@ def run_map_bag() -> None:
 def map_bag(options: Namespace) -> Dict[str, Any]:
     """Map the bag and write the files; return what summary.json holds. Raises RecordingError and OSError."""
     start = time.monotonic()
-    names = BagNames(options.beams, options.odom_frame, options.base_frame, options.truth, options.ned)
-    recording = read_recording(options.bags[0], names)
+    recording = read_recording(options.bags[0], options.request)
+    for note in recording.notes:
+        print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
     beams = [placed.beam for placed in recording.beams]
     parameters = suited(options.parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
@@ -71,13 +81,13 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     refined = _refined(recording, replayed, parameters) if options.refine else None
     found = None if replayed.solver is None else Found.of(replayed, refined)
     known = parameters if found is None else found.calibration.applied(parameters)
-    sessions = _further_sessions(replayed, known, names, options)
+    sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known)
     run = run if found is None else replace(run, trust=found.trust)
     write_run(options.out, " ".join(bag.name for bag in options.bags), run, recording)
     for number, session in enumerate(sessions, start=2):
         write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, _poses(session.replayed))
-    write_live(options.out / "live.yaml", known, names.odom_frame, names.base_frame)
+    write_live(options.out / "live.yaml", known, options.odom_frame, options.base_frame)
     seconds = time.monotonic() - start
     summary = {
         **run.counts,
@@ -90,7 +100,19 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         **errors_of(run, recording),
     }
     write_summary(options.out, summary)
+    errors, title = errors_of(run, recording), " ".join(bag.name for bag in options.bags)
+    _write_report(options.out, mission_of(title, recording, replayed, refined, run, found, errors, known.to_mapping()))
     return summary
+
+
+def _write_report(folder: Path, mission: Mission) -> None:
+    """Write report.html where plotly is installed, else say what to install."""
+    try:
+        from mlsm_manager.report.page import write_report
+    except ImportError:
+        print("map_bag: report.html needs plotly; install it with: pip install plotly", file=sys.stderr)
+        return
+    write_report(folder / REPORT, mission)
 
 
 def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
@@ -125,16 +147,14 @@ def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParamet
         return refine(recording.track, replayed.scans, replayed.solver, parameters.resolution)
 
 
-def _further_sessions(
-    first: Replayed, parameters: ReplayParameters, names: BagNames, options: Namespace
-) -> List[Session]:
+def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Namespace) -> List[Session]:
     """Replay all bags but the first, each in the map of those before, with the first one's calibration."""
     bags, sessions = options.bags[1:], []
     if not bags:
         return []
     known = _stored(first, parameters)
     with executor_for(len(bags), options.scheduler) as executor:
-        read = partial(read_recording, names=replace(names, truth=None))
+        read = partial(read_recording, request=replace(options.request, truth=None))
         for bag, ready in zip(bags, prepared_in_parallel(bags, read, parameters, executor)):
             with _bar(len(ready[1]), "scan", bag.name[:9]) as bar:
                 sessions.append(add_session(bag, ready, parameters, known, bar.update))
@@ -177,4 +197,7 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
     if "trust" in summary:
         lines.append(summary["trust"])
-    return [*lines, f"in {options.out}: map.mlsm map.ply map.png trajectory.csv live.yaml summary.json"]
+    files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]
+    if (options.out / REPORT).exists():
+        files.append(REPORT)
+    return [*lines, f"in {options.out}: {' '.join(files)}"]

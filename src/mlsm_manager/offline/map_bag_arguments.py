@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List
 
 import yaml
 
@@ -10,28 +10,31 @@ from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from node_support import topics
+from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
+from recordings.reading.arguments import add_reading_arguments, request_of, set_values
+from recordings.reading.parameters import ReadingParameters
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
-    """Return bags, out, scheduler, truth, refine, beams, frames and parameters; exits on a bad command line.
+    """Return bags, out, inspect, scheduler, refine, frames, parameters and request; exits on a bad command line.
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
-    parser = argparse.ArgumentParser("map_bag", description="Map a recording without a ROS master.")
+    parser = CommandLine("map_bag", description="Map a recording without a ROS master.")
     parser.add_argument(
         "bags", type=Path, nargs="+", metavar="bag",
-        help="recording with beams and tf (odom, base_link, sonar); each further one starts in the map of those before",
+        help="recording: a bag of ROS 1 or ROS 2, or the log of a sonar's maker; each further one starts in the map of "
+        "those before",
     )  # fmt: skip
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
     )
-    parser.add_argument("--out", type=Path, required=True, help="folder to write to; created if missing")
+    parser.add_argument("--out", type=Path, help="folder to write to; created if missing")
+    parser.add_argument("--inspect", action="store_true", help="say what a bag holds, and write nothing")
     parser.add_argument(
         "--matcher", choices=[name.value for name in MatcherName], help="match scan by scan, with this matcher"
     )
-    parser.add_argument("--truth", help="topic of the true position, from which errors are measured")
     parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
     parser.add_argument(
         "--no-calibrate",
@@ -41,21 +44,23 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     )
     parser.add_argument("--parameters", type=Path, help="yaml file, such as a live.yaml; --set overrides it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
-    parser.add_argument("--beams", default=f"/{topics.BEAMS}", help="topic of the beams (default: %(default)s)")
-    parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
-    parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: %(default)s)")
-    parser.add_argument("--ned", action="store_true", help="the odometry counts x north, y east, z down")
+    add_reading_arguments(parser)
     options = parser.parse_args(arguments)
     if options.refine and len(options.bags) > 1:
         parser.error("--refine smooths one recording, not several")
+    if options.out is None and not options.inspect:
+        parser.error("the following arguments are required: --out")
+    if options.vehicle and len(options.bags) > 1:
+        parser.error("--vehicle belongs to one recording, not to several")
     values = _from_file(options.parameters) if options.parameters else {}
-    values.update(_pair(text, parser) for text in options.set)
+    values.update(set_values(parser, options.set))
     if options.matcher:
         values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
     options.fixed = frozenset(values)
     options.parameters = ReplayParameters.from_mapping(values)
+    options.request = request_of(options, options.parameters.part(ReadingParameters))
     if options.refine and options.parameters.estimator is not Estimator.JOINT:
         raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
     return options
@@ -69,13 +74,3 @@ def _from_file(path: Path) -> Dict[str, Any]:
     if not isinstance(values, dict):
         raise ParameterError(f"{path}: must hold lines of KEY: VALUE")
     return replay_values(values)
-
-
-def _pair(text: str, parser: argparse.ArgumentParser) -> Tuple[str, Any]:
-    key, separator, value = text.partition("=")
-    if not (key and separator):
-        parser.error(f"--set {text}: must be KEY=VALUE")
-    try:
-        return key, yaml.safe_load(value)
-    except yaml.YAMLError:
-        return key, value

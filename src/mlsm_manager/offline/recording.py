@@ -1,6 +1,6 @@
 """What a bag holds, as the cores take it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Iterator, List, Optional, Tuple
 
 import numpy as np
@@ -33,13 +33,14 @@ class Truth:
 class Recording:
     """beams: in the order of their stamps, placed in odom. unplaced: number of beams that tf could not place.
 
-    track: T_odom_base over the whole recording. seconds: its length.
+    track: T_odom_base over the whole recording. seconds: its length. notes: what was assumed, as sentences.
     """
 
     beams: List[PlacedBeam]
     unplaced: int
     track: Track
     truth: Optional[Truth]
+    notes: List[str] = field(default_factory=list)
 
     def corrected(self, correction: BeamCorrection) -> "Recording":
         """Return the recording with all beams corrected, each placed by the odometry at its new stamp.

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from node_support.parameters import with_defaults
+from recordings.reading.parameters import ReadingParameters
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 
@@ -26,7 +27,7 @@ from sonar_processing.filters.echo_extraction import EchoExtractorParameters
     min_gain_over_second=0.0,
     max_jump=6.0,
 )
-class ReplayParameters(LocaliserParameters, BeamCorrection, EchoExtractorParameters):
+class ReplayParameters(LocaliserParameters, ReadingParameters, BeamCorrection, EchoExtractorParameters):
     """All that --set may change; where a default differs from the live nodes', it is what recordings showed."""
 
     def echoes(self) -> EchoExtractorParameters:

@@ -11,6 +11,7 @@ from mlsm_manager.offline.evaluation import aligned_truth, position_error
 from mlsm_manager.offline.picture import Doubts, Path2d, draw_map
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.trust import Trust
+from mlsm_manager.offline.tum_files import tum_files
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
 from mlsm_manager.surface_map.storage import write_ply
@@ -20,10 +21,11 @@ from node_support.geometry.planar import wrapped
 ODOMETRY = "dead_reckoning"
 CORRECTED = "corrected"
 REFINED = "refined"
-_LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
-_COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
+REPORT = "report.html"
+LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
+COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
-_TRUTH_COLOR = "#111111"
+TRUTH_COLOR = "#111111"
 # More would hide the path.
 _MOST_ELLIPSES = 40
 
@@ -47,10 +49,12 @@ class Run:
 
 
 def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
-    """Write map.mlsm, map.ply, map.png and trajectory.csv, each whole or not at all; raises OSError."""
+    """Write map.mlsm, map.ply, map.png, trajectory.csv and the .tum files, each whole or not at all; raises OSError."""
     write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
     write_trajectory(folder / "trajectory.csv", run.times, run.poses)
+    for path, text in tum_files(run.times, run.poses, recording.truth).items():
+        write_whole(folder / path, text.encode("ascii"))
     draw_map(folder / "map.png", name, run.blocks, [], _paths(run, recording), _doubts(run))
 
 
@@ -94,7 +98,7 @@ def _doubts(run: Run) -> Optional[Doubts]:
 
 
 def _paths(run: Run, recording: Recording) -> List[Path2d]:
-    paths = [Path2d(poses[:, :2], _LABELS[name], _COLORS[name]) for name, poses in run.poses.items()]
+    paths = [Path2d(poses[:, :2], LABELS[name], COLORS[name]) for name, poses in run.poses.items()]
     truth = _truth_path(run, recording)
     return paths if truth is None else [*paths, truth]
 
@@ -103,4 +107,4 @@ def _truth_path(run: Run, recording: Recording) -> Optional[Path2d]:
     if recording.truth is None:
         return None
     positions = aligned_truth(run.times, run.poses[ODOMETRY], recording.truth)
-    return Path2d(positions, "truth", _TRUTH_COLOR)
+    return Path2d(positions, "truth", TRUTH_COLOR)

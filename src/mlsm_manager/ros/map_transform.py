@@ -8,8 +8,9 @@ import tf2_ros
 from geometry_msgs.msg import TransformStamped
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from node_support.headers import check_stamp
 from node_support.health import Health
-from node_support.ros.node import guarded
+from node_support.ros.clock_timer import every_clock_period
 
 
 class MapTransform:
@@ -24,14 +25,14 @@ class MapTransform:
         self._health = health
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._last_stamp = rospy.Time(0)
-        period = rospy.Duration(1.0 / parameters().transform_rate)
-        self._timer = rospy.Timer(period, guarded(health, self._send), reset=True)
+        every_clock_period(1.0 / parameters().transform_rate, self._send, health)
 
-    def _send(self, _event: object) -> None:
+    def _send(self) -> None:
         parameters = self._parameters()
         stamp = rospy.Time.now() + rospy.Duration(parameters.transform_tolerance)
         if stamp == self._last_stamp:
             return
+        check_stamp(stamp.to_nsec())
         self._last_stamp = stamp
         x, y, yaw = self._correction()
         message = TransformStamped()

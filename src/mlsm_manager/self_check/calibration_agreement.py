@@ -20,4 +20,5 @@ def halves_agree(
     distances = np.abs(np.asarray(first) - np.asarray(second)) / spread
     worst = int(np.argmax(distances))
     text = f"halves differ most in {names[worst]}: {first[worst]:.4g} and {second[worst]:.4g}, deviations"
-    return Verdict("calibration of the halves", float(distances[worst]), limit, text)
+    question = "Do the first and the second half of the run find the same errors of sonar and odometry?"
+    return Verdict("calibration of the halves", float(distances[worst]), limit, text, question=question)

@@ -23,6 +23,7 @@ def recent_agreement(
         f"share of the last {scans} scans",
         True,
         _lost(times, agreements, scans, limit, agrees),
+        "Do the newest scans lie on the map that earlier scans made?",
     )
 
 

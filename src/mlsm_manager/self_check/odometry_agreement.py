@@ -39,9 +39,17 @@ def against_odometry(
     direction = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
     across = direction / np.sqrt(_HEADING_SPREAD**2 + walk)
     return (
-        _verdict("distance against odometry", "longest or shortest stretch, deviations", along, starts, window, limit),
-        _verdict("direction against odometry", "most turned stretch, deviations", across, starts, window, limit),
-    )
+        Verdict(
+            "distance against odometry", _worst(along), limit, "longest or shortest stretch, deviations",
+            doubtful=_doubtful(along, starts, window, limit),
+            question="Is the corrected path as long as the odometry says, within what the odometry may err?",
+        ),
+        Verdict(
+            "direction against odometry", _worst(across), limit, "most turned stretch, deviations",
+            doubtful=_doubtful(across, starts, window, limit),
+            question="Does the corrected path turn as the odometry does, all along the run?",
+        ),
+    )  # fmt: skip
 
 
 def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray, window: float) -> np.ndarray:
@@ -52,6 +60,9 @@ def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray, window: floa
     return x + 1j * y
 
 
-def _verdict(name: str, text: str, deviations: np.ndarray, starts: np.ndarray, window: float, limit: float) -> Verdict:
-    worst = float(np.abs(deviations).max()) if len(deviations) else np.nan
-    return Verdict(name, worst, limit, text, doubtful=merged(starts[np.abs(deviations) > limit], window))
+def _worst(deviations: np.ndarray) -> float:
+    return float(np.abs(deviations).max()) if len(deviations) else np.nan
+
+
+def _doubtful(deviations: np.ndarray, starts: np.ndarray, window: float, limit: float) -> np.ndarray:
+    return merged(starts[np.abs(deviations) > limit], window)

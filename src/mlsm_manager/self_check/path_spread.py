@@ -15,14 +15,18 @@ def settings_agree(times: np.ndarray, paths: np.ndarray, deviations: np.ndarray,
     step = float(np.median(np.diff(times)))
     far = merged(times[(distance > limit).any(axis=0)], step)
     value = float(np.sqrt((distance**2).mean(axis=1)).max()) if len(distance) else np.nan
-    return Verdict("spread over settings", value, limit, "farthest path, told deviations", doubtful=far)
+    question = "Does the path stay where it is when the solver's settings change a little?"
+    return Verdict(
+        "spread over settings", value, limit, "farthest path, told deviations", doubtful=far, question=question
+    )
 
 
 def told_deviation(times: np.ndarray, deviations: np.ndarray, limit: float = 5.0) -> Verdict:
     """Return the largest of the path's own 2-D deviations (m,) [m] at `times` (m,) [s]."""
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
     doubtful = merged(times[deviations > limit], step)
-    return Verdict("told deviation", float(deviations.max()), limit, "largest along the path, m", doubtful=doubtful)
+    text, question = "largest along the path, m", "How far off may the position be, by the solver's own account?"
+    return Verdict("told deviation", float(deviations.max()), limit, text, doubtful=doubtful, question=question)
 
 
 def per_minute(times: np.ndarray, deviations: np.ndarray) -> np.ndarray:

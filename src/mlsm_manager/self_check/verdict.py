@@ -11,7 +11,7 @@ class Verdict:
 
     name: of the check. value: what was found; NaN where the run is too short to tell. limit: above it (below it where
     `more_is_better`) the check fires. text: what the figure means, one line. doubtful: (k, 2) s, beginnings and ends
-    of the stretches that made it fire.
+    of the stretches that made it fire. question: what the check looks at, for people who do not know the solver.
     """
 
     name: str
@@ -20,6 +20,7 @@ class Verdict:
     text: str
     more_is_better: bool = False
     doubtful: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
+    question: str = ""
 
     @property
     def fires(self) -> bool:

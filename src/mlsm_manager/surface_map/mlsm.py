@@ -92,6 +92,10 @@ class MultiLevelSurfaceMap:
         rows, owners = self._store.find(cell_keys(cells))
         return self._store.blocks(rows, self.resolution), rows, owners
 
+    def at(self, rows: np.ndarray) -> Blocks:
+        """Return a copy of the blocks in `rows` (n,), which `find` named."""
+        return self._store.blocks(rows, self.resolution)
+
     def count_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks in `rows` (n,), none twice."""
         self._store.add_crossings(rows, beams)

@@ -16,9 +16,14 @@ from diagnostic_updater import DiagnosticStatusWrapper, Updater
 from node_support.errors import RefusedInput
 from node_support.health import Health
 from node_support.parameters import ParameterError
+from node_support.ros.master_watch import MasterWatch
 
 DIAGNOSTICS_PERIOD = 1.0  # s: as often as diagnostic aggregators expect it
 _SPIN_STEP = 0.05  # s: soon enough to end a node at once, seldom enough to cost nothing
+_UNKNOWN_TO_MASTER = (
+    "the ROS master was restarted and does not know this node, so that nobody can connect to it; the node ends. "
+    "Parameters were lost with the old master: restart the launch file"
+)
 _END_STEP = 0.01  # s: roslaunch waits for every node
 
 
@@ -36,7 +41,7 @@ class Node(Protocol):
 def run(name: str, make_node: Callable[[], Node]) -> NoReturn:
     """Initialise the node, make it, publish its diagnostics, wait for Ctrl-C and end the process.
 
-    ParameterError and StartError end it with one line and status 1.
+    ParameterError, StartError and the loss of its registration at the master end it with one line and status 1.
     """
     interrupt = _Interrupt()
     try:
@@ -54,7 +59,11 @@ def _run(name: str, make_node: Callable[[], Node], interrupt: "_Interrupt") -> i
     except (ParameterError, StartError) as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         return 1
+    watch = MasterWatch()
     while not rospy.is_shutdown() and not interrupt.came:
+        if watch.is_lost:
+            rospy.logfatal("%s: %s", rospy.get_name(), _UNKNOWN_TO_MASTER)
+            return 1
         time.sleep(_SPIN_STEP)
     return 0
 

@@ -58,6 +58,10 @@ class TfBuffer:
         """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
         check_stamp(stamp_ns, self._references_ns(), self._tolerance)
 
+    def knows(self, frame: str) -> bool:
+        """Return whether any transform from or to a frame has come."""
+        return bool(self._buffer._frameExists(frame))
+
     def obstacle(self, target: str, source: str, stamp_ns: int) -> str:
         """Return why `source` cannot be placed in `target` at a stamp [ns]; empty when it can."""
         check_stamp(stamp_ns)

@@ -5,9 +5,9 @@ from typing import Any, Dict, Iterable, List, Tuple
 import numpy as np
 
 from recordings.bags.bag import Bag
-from recordings.messages.stamps import stamp_ns
 from recordings.transforms.frame_tree import FrameTree, Link
 from recordings.transforms.pose_track import PoseTrack
+from sonar_processing.messages.fields import stamp_ns
 
 _MOVING, _FIXED = "/tf", "/tf_static"
 TRANSFORM_TOPICS = (_MOVING, _FIXED)
@@ -38,7 +38,7 @@ def pose_track(messages: Iterable[Any]) -> PoseTrack:
 
 def heading_track(messages: Iterable[Any]) -> PoseTrack:
     """Return the orientations of Imu messages, at the origin; may be empty. Raises AttributeError for others."""
-    return _track([(stamp_ns(one), (0.0, 0.0, 0.0), _rotation(one.orientation)) for one in messages])
+    return _track([(stamp_ns(one.header), (0.0, 0.0, 0.0), _rotation(one.orientation)) for one in messages])
 
 
 def frame_name(name: str) -> str:
@@ -53,13 +53,13 @@ def _links(messages: Iterable[Any]) -> Dict[Link, PoseTrack]:
             link = frame_name(one.header.frame_id), frame_name(one.child_frame_id)
             if all(link) and link[0] != link[1]:
                 pose = _vector(one.transform.translation), _rotation(one.transform.rotation)
-                samples.setdefault(link, []).append((stamp_ns(one), *pose))
+                samples.setdefault(link, []).append((stamp_ns(one.header), *pose))
     return {link: _track(found) for link, found in samples.items()}
 
 
 def _sample(message: Any) -> _Sample:
     pose = getattr(message.pose, "pose", message.pose)
-    return stamp_ns(message), _vector(pose.position), _rotation(pose.orientation)
+    return stamp_ns(message.header), _vector(pose.position), _rotation(pose.orientation)
 
 
 def _track(samples: List[_Sample]) -> PoseTrack:

@@ -25,11 +25,19 @@ class LineDevice(ABC, Generic[Command, Ping]):
         zero: LineStats,
         stop: Optional[threading.Event] = None,
         clock: Callable[[], float] = time.time,
+        elapsed: Callable[[], float] = time.monotonic,
+        opener: Callable[[str, int], Port] = open_port,
     ) -> None:
-        """`zero` is what the counts start from; `clock` gives the stamps of the pings, in seconds."""
+        """`zero` is what the counts start from.
+
+        `clock` gives the stamps of the pings, `elapsed` the time for the deadlines, both in seconds. `opener` opens a
+        port, as `open_port` does.
+        """
         self.connection = connection
         self.stop = stop or threading.Event()
+        self.elapsed = elapsed
         self._clock = clock
+        self._opener = opener
         self._recorder = StatsRecorder(zero)
         self._port: Optional[Port] = None
 
@@ -42,7 +50,7 @@ class LineDevice(ABC, Generic[Command, Ping]):
         """Open the port and greet the head; raises a PortError and remembers its text."""
         self.close()
         try:
-            self._port = open_port(self.connection.port, self.connection.baud_rate)
+            self._port = self._opener(self.connection.port, self.connection.baud_rate)
             with port_losses(self.connection.port):
                 self._greet()
         except PortError as error:

@@ -1,7 +1,6 @@
 """The driver's loop: sends pings until it is stopped, and reconnects whenever the port is lost."""
 
 import contextlib
-import time
 from typing import Callable, Generic
 
 from sonar_driver.line.device import Command, LineDevice, Ping
@@ -21,7 +20,7 @@ class Scanner(Generic[Command, Ping]):
         self._device = device
         self._on_ping = on_ping
         self._back_off = device.connection.back_off_first
-        self._last_reply = time.monotonic()
+        self._last_reply = self._device.elapsed()
 
     def connect(self) -> None:
         """Open the port for the first time; `run` waits for a port that does not exist yet.
@@ -45,7 +44,7 @@ class Scanner(Generic[Command, Ping]):
             ping = self._device.ping(self.command)
         except PortUnavailableError:
             return
-        now = time.monotonic()
+        now = self._device.elapsed()
         if ping is not None:
             self._last_reply = now
             self._back_off = self._device.connection.back_off_first
@@ -63,5 +62,5 @@ class Scanner(Generic[Command, Ping]):
             self._device.open()
         except PortError:
             return False
-        self._last_reply = time.monotonic()
+        self._last_reply = self._device.elapsed()
         return True

@@ -7,6 +7,7 @@ from typing import Any, Mapping, Optional, Type
 import rospy
 
 from node_support import topics
+from node_support.headers import check_stamp
 from node_support.parameters import ParameterSet
 from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import StartError, guarded
@@ -100,6 +101,7 @@ class DriverNode:
     def _publish(self, ping: Any) -> None:
         message = self._model.message(ping, self._live.current, self._tilt.for_beam())
         if message is not None:
+            check_stamp(message.header.stamp.to_nsec())
             self._beams.publish(message)
             self.health.count("beams out")
 

@@ -9,6 +9,9 @@ from node_support.errors import RefusedInput
 
 MAX_BINS = 4096  # Four times what scanning sonars send (Micron 800, Imagenex 852 500); more is a broken message
 
+# m: ten times what scanning sonars hear; farther points would only cost precision.
+FARTHEST_RANGE = 10_000.0
+
 
 @dataclass(frozen=True)
 class Beam:
@@ -35,6 +38,9 @@ class Beam:
             raise RefusedInput("beams refused", f"{bins} bins, must be 1 to {MAX_BINS}; check the driver")
         if not (math.isfinite(self.range_resolution) and self.range_resolution > 0.0):
             raise RefusedInput("beams refused", f"range_resolution {self.range_resolution}, must be above 0 m")
+        if bins * self.range_resolution > FARTHEST_RANGE:
+            reach = f"{bins} bins of {self.range_resolution:g} m reach {bins * self.range_resolution:g} m"
+            raise RefusedInput("beams refused", f"{reach}, must be at most {FARTHEST_RANGE:g} m; check the driver")
         if not (math.isfinite(self.angle) and math.isfinite(self.sensor_angle)):
             raise RefusedInput("beams refused", f"head at {self.angle} rad, servo at {self.sensor_angle} rad")
         if not self.frame_id:

@@ -12,10 +12,9 @@ from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_point_stamps, check_stamp
-from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.scans.laser_scan import PlanarLaserScan
-from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
+from underwater_map_construction.msg import StampedIntensityCloud
 
 StampedIntensityCloudArrays = numpy_msg(StampedIntensityCloud)
 """StampedIntensityCloud whose time stamps are a numpy array, as subscribers and publishers here use it."""
@@ -36,21 +35,6 @@ def check_header(head: Header, kind: str) -> None:
     """Raise RefusedInput, a bad frame counted as `kind`, for a header whose stamp or frame nobody can use."""
     check_frame(head.frame_id, kind)
     check_stamp(head.stamp.to_nsec())
-
-
-def beam_from_message(message: SonarScanLine) -> Beam:
-    """Return the beam of a SonarScanLine; raises RefusedInput for one that cannot be used."""
-    if not message.maxrange_meters > 0.0:
-        raise RefusedInput("beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m")
-    check_header(message.header, "beams refused")
-    return Beam(
-        stamp_ns=message.header.stamp.to_nsec(),
-        frame_id=message.header.frame_id,
-        angle=message.angle,
-        intensities=np.frombuffer(bytes(message.intensities), dtype=np.uint8),
-        range_resolution=message.range_resolution,
-        sensor_angle=message.sensorAngle,
-    )
 
 
 def cloud_from_message(message: StampedIntensityCloud) -> IntensityCloud:

@@ -10,10 +10,11 @@ from std_msgs.msg import Float64, UInt32
 from node_support import topics
 from node_support.parameters import ParameterError
 from node_support.ros.joint_angle import JointAngle
-from node_support.ros.node import every, guarded, make_health
+from node_support.ros.node import every, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from sonar_processing.beams.beam import Beam
+from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
-from underwater_map_construction.msg import SonarScanLine
 from underwater_map_construction.srv import SetScanMode, SetScanModeRequest, SetScanModeResponse
 
 TICK_PERIOD = 0.1  # s: short against every timeout of sonar_control
@@ -35,7 +36,7 @@ class SonarControl:
         )
         rospy.Service("~set_mode", SetScanMode, self._set_mode)
         self._joint = JointAngle(self._live.current.joint, self.health, self._take_angle)
-        rospy.Subscriber(topics.BEAMS, SonarScanLine, guarded(self.health, self._take_beam), queue_size=100)
+        BeamSubscriber(self._take_beam, self._live.current, self.health)
         every(TICK_PERIOD, self._tick, self.health)
 
     def _use_parameters(self, parameters: SonarControlParameters) -> None:
@@ -53,7 +54,7 @@ class SonarControl:
         with self._lock:
             self._scan.take_joint(rospy.get_time(), angle)
 
-    def _take_beam(self, beam: SonarScanLine) -> None:
+    def _take_beam(self, beam: Beam) -> None:
         with self._lock:
             before = self._scan.sweeps
             self._scan.take_beam(rospy.get_time(), beam.angle)

@@ -9,13 +9,12 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 
 from node_support import topics
-from node_support.ros.node import guarded, make_health
+from node_support.ros.node import make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.beams.beam import Beam
-from sonar_processing.ros.conversions import beam_from_message, header
-from sonar_processing.ros.subscribers import subscribe_to_beams
+from sonar_processing.ros.beam_subscriber import BeamSubscriber
+from sonar_processing.ros.conversions import header
 from sonar_processing.scans.image import PolarImage, SonarImageParameters
-from underwater_map_construction.msg import SonarScanLine
 
 QUEUE_SIZE = 2  # Who is slow sees fewer images and not old ones
 
@@ -29,7 +28,7 @@ class SonarImage(rospy.SubscribeListener):
         self.health = make_health("sonar_image")
         self.healths = [self.health]
         self._lock = threading.Lock()
-        self._beams: Optional[rospy.Subscriber] = None
+        self._beams: Optional[BeamSubscriber] = None
         self._next_image = 0.0
         self._live = ReconfigurableParameters(
             SonarImageParameters, namespace, "SonarImage", self.health, self._use_parameters
@@ -45,7 +44,7 @@ class SonarImage(rospy.SubscribeListener):
         with self._lock:
             if self._beams is None:
                 self._picture.clear()
-                self._beams = subscribe_to_beams(guarded(self.health, self._take))
+                self._beams = BeamSubscriber(self._take, self._live.current, self.health, self._picture.clear)
 
     def peer_unsubscribe(self, _topic: str, others: int) -> None:
         """Stop when the last subscriber has gone."""
@@ -54,9 +53,7 @@ class SonarImage(rospy.SubscribeListener):
                 self._beams.unregister()
                 self._beams = None
 
-    def _take(self, message: SonarScanLine) -> None:
-        self.health.count("beams in")
-        beam = beam_from_message(message)
+    def _take(self, beam: Beam) -> None:
         picture = self._picture
         with self.health.timed():
             image = picture.draw(beam)

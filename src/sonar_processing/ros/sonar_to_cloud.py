@@ -5,19 +5,21 @@ from typing import Optional
 from node_support import topics
 from node_support.ros.node import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.head_watch import HeadWatch
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.cloud_sink import CloudSink
-from sonar_processing.ros.conversions import beam_from_message
+from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.publishers import CloudPublisher, PointsPublisher
 from sonar_processing.ros.revolution_publisher import RevolutionPublisher
-from sonar_processing.ros.subscribers import subscribe_to_beams, subscribe_to_velocity
+from sonar_processing.ros.sonar_mount import SonarMount
+from sonar_processing.ros.subscribers import subscribe_to_velocity
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.revolution_collector import RevolutionCollector
-from underwater_map_construction.msg import SonarScanLine
 
 
 class SonarToCloud:
@@ -35,6 +37,7 @@ class SonarToCloud:
         self._scan_sink = scan_sink
         self._moving_state = MovingState()
         self._revolution = RevolutionCollector()
+        self._head = HeadWatch()
         self._live = ReconfigurableParameters(
             SonarToCloudParameters, namespace, "SonarToCloud", self.health, self._use_parameters
         )
@@ -44,11 +47,15 @@ class SonarToCloud:
         self._revolutions = RevolutionPublisher(self.health, polar_sink)
         parameters = self._live.current
         self._filter = TransformFilter(
-            parameters.target_frame, self.health, self._forget_scan, parameters.stamp_tolerance
+            parameters.target_frame,
+            self.health,
+            self._forget_scan,
+            parameters.stamp_tolerance,
+            SonarMount(parameters, self.health.name),
         )
         self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)
-        subscribe_to_beams(guarded(self.health, self._take_beam))
+        BeamSubscriber(self._take_beam, parameters, self.health, self._filter.forget, self._filter.make_room)
 
     def _use_parameters(self, parameters: SonarToCloudParameters) -> None:
         self._assembler = ScanAssembler(parameters)
@@ -57,10 +64,10 @@ class SonarToCloud:
         self._assembler.clear()
         self._revolution.clear()
 
-    def _take_beam(self, message: SonarScanLine) -> None:
-        self.health.count("beams in")
-        beam = beam_from_message(message)
+    def _take_beam(self, beam: Beam) -> None:
         self.health.count("points in", beam.intensities.size)
+        for event, number in self._head.add(beam).items():
+            self.health.count(event.value, number)
         self._filter.add(self._live.current.corrected(beam), self._is_moving(beam.stamp_ns))
 
     def _is_moving(self, stamp_ns: int) -> bool:

@@ -1,4 +1,4 @@
-"""Subscriptions to beams, clouds and velocities."""
+"""Subscriptions to clouds and velocities."""
 
 from typing import Any, Callable, Dict, Tuple
 
@@ -6,17 +6,13 @@ import rospy
 from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 
-from node_support import topics
 from node_support.health import Health
 from node_support.ros.node import guarded
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays
 from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import VelocityType
-from underwater_map_construction.msg import SonarScanLine
 
-_BEAM_BUFFER_BYTES = 2**20  # hundreds of beams: rospy reads a whole buffer before it drops any
 _CLOUD_BUFFER_BYTES = 2**24  # a cloud of a million points; rospy reads one that is larger in pieces, slowly
-_BEAM_QUEUE = 200  # more than the 120 that wait for tf
 _QUEUE_SIZE = 10  # scans come every few seconds, and only the newest velocity counts
 
 _VELOCITY_KINDS: Dict[VelocityType, Tuple[type, Callable[[Any], Twist]]] = {
@@ -24,18 +20,6 @@ _VELOCITY_KINDS: Dict[VelocityType, Tuple[type, Callable[[Any], Twist]]] = {
     VelocityType.TWIST_STAMPED: (TwistStamped, lambda message: message.twist),
     VelocityType.ODOMETRY: (Odometry, lambda message: message.twist.twist),
 }
-
-
-def subscribe_to_beams(callback: Callable[[SonarScanLine], None]) -> rospy.Subscriber:
-    """Subscribe to the beams without delay."""
-    return rospy.Subscriber(
-        topics.BEAMS,
-        SonarScanLine,
-        callback,
-        queue_size=_BEAM_QUEUE,
-        buff_size=_BEAM_BUFFER_BYTES,
-        tcp_nodelay=True,
-    )
 
 
 def subscribe_to_clouds(topic: str, callback: Callable[[StampedIntensityCloudArrays], None]) -> rospy.Subscriber:

@@ -1,7 +1,7 @@
 """Holds beams back until tf can place them at their own stamps; rospy's tf2 has no MessageFilter."""
 
 import threading
-from collections import deque
+from collections import Counter, deque
 from typing import Callable, Deque, List, NamedTuple, Optional
 
 import message_filters
@@ -14,6 +14,7 @@ from node_support.ros.node import guarded
 from node_support.ros.tf_buffer import JUMP_BACK, TfBuffer
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.ros.sonar_mount import SonarMount
 
 QUEUE_SIZE = 120  # One revolution of the usual head: tf may be late by a scan, not by more
 _WAIT = 0.5  # s: beams and transforms wake the thread; this is for shutdown alone
@@ -27,16 +28,24 @@ class _WaitingBeam(NamedTuple):
 class TransformFilter(message_filters.SimpleFilter):
     """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
-    At most `QUEUE_SIZE` beams wait. A beam is dropped and counted when the queue is full, when it is older than one
-    that was delivered, or when tf can place a later beam of its frame but not this one. A stamp more than
-    `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are forgotten.
+    At most `QUEUE_SIZE` beams wait, or what `make_room` was told. A beam is dropped and counted when the queue is full,
+    when it is older than one that was delivered, or when tf can place a later beam of its frame but not this one. A
+    stamp more than `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are
+    forgotten.
     """
 
     def __init__(
-        self, target_frame: str, health: Health, on_time_jump: Callable[[], None], stamp_tolerance: float = DAY
+        self,
+        target_frame: str,
+        health: Health,
+        on_time_jump: Callable[[], None],
+        stamp_tolerance: float = DAY,
+        mount: Optional[SonarMount] = None,
     ) -> None:
-        """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
+        """`stamp_tolerance`: how far stamps may be from odometry and clock, s. `mount`: places frames that tf lacks."""
         super().__init__()
+        self._mount = mount
+        self._most = QUEUE_SIZE
         self._target_frame = target_frame
         self._health = health
         self._on_time_jump = guarded(health, on_time_jump)
@@ -57,11 +66,22 @@ class TransformFilter(message_filters.SimpleFilter):
         with self._condition:
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
-            if len(self._queue) >= QUEUE_SIZE:
+            if len(self._queue) >= self._most:
                 oldest = self._queue.popleft().beam
-                self._drop(oldest, self._obstacle(oldest) or f"{QUEUE_SIZE} newer beams wait, the machine is too slow")
+                self._drop(oldest, self._obstacle(oldest) or f"{self._most} newer beams wait, the machine is too slow")
             self._newest_ns = beam.stamp_ns
             self._queue.append(_WaitingBeam(beam, is_moving))
+            self._condition.notify()
+
+    def make_room(self, beams: int) -> None:
+        """Let so many beams wait that come at once: those of a whole turn in one message."""
+        self._most = max(QUEUE_SIZE, 2 * beams)
+
+    def forget(self) -> None:
+        """Forget the waiting beams and the unfinished scan, because they were read wrongly."""
+        with self._condition:
+            self._queue.clear()
+            self._jumped = True
             self._condition.notify()
 
     def _take_older(self, beam: Beam) -> None:
@@ -85,6 +105,8 @@ class TransformFilter(message_filters.SimpleFilter):
     def _deliver_ready(self) -> None:
         with self._condition:
             jumped, self._jumped = self._jumped, False
+            if self._mount is not None:
+                self._mount.look_at(Counter(entry.beam.frame_id for entry in self._queue), self._transforms)
             ready = self._pop_ready()
         if jumped:
             self._on_time_jump()

@@ -8,9 +8,10 @@ import numpy as np
 
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import wrapped
-from node_support.parameters import ParameterSet, parameter
+from node_support.parameters import parameter
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_width import beam_width_parameter
+from sonar_processing.messages.parameters import BeamMessageParameters
 
 MOST_PIXELS = 3000  # A picture of 9 MB; more, at the rate of beams, is too much for a network
 _USUAL_PIXELS = 501  # Odd, so that the head is in the middle of a pixel; a bin is then about a pixel
@@ -18,7 +19,7 @@ _WIDEST_STEP = 0.2  # rad: a wider step is no step but a gap, as where a sector 
 
 
 @dataclass(frozen=True)
-class SonarImageParameters(ParameterSet):
+class SonarImageParameters(BeamMessageParameters):
     """Parameters of sonar_image."""
 
     metres_per_pixel: float = parameter(

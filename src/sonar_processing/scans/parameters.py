@@ -8,6 +8,8 @@ from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.beams.beam_width import beam_width_parameter
+from sonar_processing.beams.mounting import MountingParameters
+from sonar_processing.messages.parameters import BeamMessageParameters
 
 
 class ScanMode(Enum):
@@ -92,5 +94,7 @@ class ScanParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class SonarToCloudParameters(BeamCorrection, ScanParameters, StampParameters):
+class SonarToCloudParameters(
+    MountingParameters, BeamMessageParameters, BeamCorrection, ScanParameters, StampParameters
+):
     """Parameters of sonar_to_cloud."""

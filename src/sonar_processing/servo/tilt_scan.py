@@ -8,7 +8,8 @@ from typing import Callable, List, Optional
 import numpy as np
 
 from node_support.health import Health
-from node_support.parameters import ParameterError, ParameterSet, parameter
+from node_support.parameters import ParameterError, parameter
+from sonar_processing.messages.parameters import BeamMessageParameters
 from sonar_processing.scans.head_turn import SweepCounter
 
 JUMP_BACK = 1.0  # s: messages overtake each other by less; more is a bag that loops
@@ -22,7 +23,7 @@ class ControlMode(Enum):
 
 
 @dataclass(frozen=True)
-class SonarControlParameters(ParameterSet):
+class SonarControlParameters(BeamMessageParameters):
     """Parameters of sonar_control."""
 
     mode: ControlMode = parameter(

@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Mapping, Sequence
 
 import yaml
 
+from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
 
 COMPRESSIONS = ("none", "lz4", "bz2")
@@ -20,7 +21,7 @@ yaml/sonar_simulator_default.yaml lists the keys that --set takes."""
 
 def parse(arguments: Sequence[str]) -> argparse.Namespace:
     """Return world, script, out, parameters, set, robot, compression and quiet; exits on a bad command line."""
-    parser = argparse.ArgumentParser(
+    parser = CommandLine(
         "simulate_bag",
         description="Write the bag of a simulated survey: beams, tf, odometry and truth. Needs no ROS master.",
         epilog=_EPILOG,

@@ -1,62 +1,30 @@
 """Drives an emulated head with every fault at a given rate and settles the accounts.
 
-Command line: python3 fault_experiment.py [replies wanted] [rate of each fault]
+Command line: python3 fault_experiment.py [COMMANDS RATE]; 10,000 commands, a third of them with a fault, unless told
+otherwise. RATE is the share of each of the eight faults.
 """
 
+import os
 import sys
-import tempfile
-import threading
-import time
 from dataclasses import dataclass
 from typing import List
+
+sys.path.append(os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "sonar_driver"))
+
+from numbered_pings import NumberedEchoes, RecordingInjector
+from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
 from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol.settings import HeadSettings
-from sonar_driver.emulator import EchoSource, Fault, FaultInjector, HeadServer, PtyLine
+from sonar_driver.emulator import Fault
 from sonar_driver.line.scanner import Scanner
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
-WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
 # Beyond the longest wait for a reply.
 LATENESS = 0.12
-# Ten times the speed of wire and water.
-FAST_LINE = {"baud_rate": 1152000, "speed_of_sound": 15000.0}
-
-
-class NumberedEchoes(EchoSource):
-    """Writes the number of the ping into the first echoes."""
-
-    def __init__(self):
-        self.count = 0
-
-    def echoes(self, ping):
-        self.count += 1
-        return (self.count - 1).to_bytes(4, "big") + bytes(ping.bin_count - 4)
-
-
-class RecordingInjector(FaultInjector):
-    """Remembers the fault of every ping, and stops the driver after a number of commands."""
-
-    def __init__(self, rates, seed, commands, stop):
-        super().__init__(rates, seed)
-        self.of_pings: List[Fault] = []
-        self._left = commands
-        self._stop = stop
-
-    def next(self):
-        self._left -= 1
-        if self._left < 0:
-            self._stop.set()
-            self.counts[Fault.DROPPED] += 1
-            self.of_pings.append(Fault.DROPPED)
-            return Fault.DROPPED
-        fault = super().next()
-        if fault not in WITHOUT_PING:
-            self.of_pings.append(fault)
-        return fault
 
 
 @dataclass(frozen=True)
@@ -77,40 +45,37 @@ def fault_rates(rate: float, reply_margin: float) -> FaultRates852:
     return FaultRates852(**dict.fromkeys(names, rate), **lasting)
 
 
-def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.08) -> Account:
-    """Let the head see `commands` commands outside of silences; return the account."""
-    stop = threading.Event()
+def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.1) -> Account:
+    """Let the head see `commands` commands outside of silences, in virtual time; return the account."""
+    time = VirtualTime()
+    stop = VirtualStop(time)
     faults = RecordingInjector(fault_rates(rate, reply_margin), seed, commands, stop)
+    connection = ConnectionParameters(reply_margin=reply_margin, late_window=2 * LATENESS, byte_gap=reply_margin / 2)
+    timing = connection.timing()
+    line = VirtualLine(Emulated852(NumberedEchoes(), faults, timing), timing.baud_rate, time)
+    device = SonarDevice(connection, stop, time.elapsed, time.elapsed, line.open)
     delivered: List[int] = []
-    with tempfile.TemporaryDirectory() as directory:
-        connection = ConnectionParameters(
-            port=f"{directory}/sonar",
-            reply_margin=reply_margin,
-            late_window=2 * LATENESS,
-            byte_gap=reply_margin / 2,
-            back_off_first=0.05,
-            **FAST_LINE,
-        )
-        head = Emulated852(NumberedEchoes(), faults, connection.timing())
-        device = SonarDevice(connection, stop)
-        scanner = Scanner(
-            device,
-            HeadSettings(max_range=50).command(),
-            lambda ping: delivered.append(int.from_bytes(ping.reply.echoes[:4], "big")),
-        )
-        begin = time.monotonic()
-        with HeadServer(head, PtyLine(connection.port)):
-            scanner.connect()
-            scanner.run()
-        seconds = time.monotonic() - begin
+    scanner = Scanner(
+        device,
+        HeadSettings(max_range=50).command(),
+        lambda ping: delivered.append(int.from_bytes(ping.reply.echoes[:4], "big")),
+    )
+    scanner.connect()
+    scanner.run()
     expected = [number for number, fault in enumerate(faults.of_pings) if fault in GOOD]
-    return Account(expected, delivered, dict(faults.counts), device.stats, seconds)
+    return Account(expected, delivered, dict(faults.counts), device.stats, time.now)
+
+
+def main() -> None:
+    """Print the account of a run."""
+    commands, rate = (int(sys.argv[1]), float(sys.argv[2])) if len(sys.argv) > 2 else (10000, 1.0 / 24.0)
+    account = run(commands, rate)
+    faults = {fault.value: count for fault, count in account.faults.items()}
+    print(f"{commands} commands, {account.seconds:.0f} s on the line: {faults}")
+    print(account.stats)
+    same = "the same in order" if account.expected == account.delivered else "NOT the same"
+    print(f"{len(account.expected)} good replies sent, {len(account.delivered)} delivered, {same}")
 
 
 if __name__ == "__main__":
-    account = run(int(sys.argv[1]) if len(sys.argv) > 1 else 10000, float(sys.argv[2]) if len(sys.argv) > 2 else 0.05)
-    print({fault.value: count for fault, count in account.faults.items()})
-    print(account.stats)
-    print(f"{len(account.expected)} good replies sent, {len(account.delivered)} delivered,", end=" ")
-    print("the same in order" if account.expected == account.delivered else "NOT the same", end=", ")
-    print(f"{account.seconds:.0f} s")
+    main()

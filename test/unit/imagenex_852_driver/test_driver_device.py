@@ -3,6 +3,7 @@ import time
 
 import pytest
 from driver_line import served
+from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
 from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
@@ -170,6 +171,18 @@ def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
     assert device.ping(SwitchCommand(max_range=5)) is None
     assert device.stats.replies == 0
     device.close()
+
+
+def test_replies_before_sound_can_have_returned_are_dropped_and_counted_on_their_own():
+    time = VirtualTime()
+    connection = ConnectionParameters(speed_of_sound=1400.0)
+    head = Emulated852(timing=ConnectionParameters(speed_of_sound=2000.0).timing())
+    line = VirtualLine(head, connection.baud_rate, time)
+    device = SonarDevice(connection, VirtualStop(time), time.elapsed, time.elapsed, line.open)
+    device.open()
+    assert [device.ping(SwitchCommand(max_range=50)) for _ in range(5)] == [None] * 5
+    stats = device.stats
+    assert (stats.early_replies, stats.unexpected_replies, stats.timeouts) == (5, 0, 5)
 
 
 class EchoingLine(Emulated852):

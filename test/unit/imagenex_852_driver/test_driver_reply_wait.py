@@ -26,7 +26,7 @@ def test_a_reply_that_began_before_sound_was_back_answers_another_command(wait):
     wait.take(bytes(64), [], START + 0.01)
     wait.take(bytes(449), [ParsedReply(0, REPLY)], BEGINS)
     assert wait.reply is None
-    assert wait.unexpected_replies == 1
+    assert (wait.early_replies, wait.unexpected_replies) == (1, 0)
 
 
 def test_the_answer_behind_an_early_reply_is_taken(wait):

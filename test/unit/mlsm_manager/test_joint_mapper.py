@@ -118,3 +118,30 @@ def test_a_run_says_whether_it_can_be_trusted():
 def test_late_beams_make_it_wait_for_odometry():
     assert localiser_after(0)[0].lookahead == 0.0
     assert localiser_after(0, sonar_delay_deviation=0.1)[0].lookahead == pytest.approx(0.3)
+
+
+def test_free_space_is_known_between_the_vehicle_and_the_walls():
+    localiser, _ = localiser_after(6)
+    free = localiser.free
+    assert len(free) > 1000
+    assert np.hypot(*(free.centers - SCANS[2].reference_pose[:2]).T).min() < 1.0
+    walls = {tuple(cell) for cell in localiser.blocks.cells.tolist()}
+    assert len(walls.intersection(map(tuple, free.cells.tolist()))) < 0.2 * len(walls)
+
+
+def test_free_space_is_known_without_matching_too():
+    localiser, _ = localiser_after(3, start_matching=False)
+    assert len(localiser.free) > 1000
+
+
+def test_free_space_is_not_known_where_nobody_wants_it():
+    localiser, _ = localiser_after(3, carve=False)
+    assert len(localiser.free) == 0
+
+
+def test_a_stored_map_gives_its_free_space_back():
+    localiser, _ = localiser_after(4)
+    stored = localiser.stored("map", {}, 0.0, "")
+    other, _ = localiser_after(0)
+    other.restore(stored, same_odometry=False)
+    assert len(other.free) == len(localiser.free)

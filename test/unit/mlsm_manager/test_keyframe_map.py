@@ -1,5 +1,7 @@
 """A map drawn from keyframes is that of their last places."""
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -19,9 +21,17 @@ def cloud(number):
     return TimedPoints(points, np.full(len(points), float(number)), float(number))
 
 
-def moved_by(shift):
-    """Return what places clouds `shift` m along x."""
-    return lambda cloud: cloud.points + np.array([shift, 0.0, 0.0, 0.0])
+@dataclass(frozen=True)
+class MovedBy:
+    """Places clouds `shift` m along x, heard from a sonar that was at x = y = 0 in odom."""
+
+    shift: float
+
+    def points(self, cloud):
+        return cloud.points + np.array([self.shift, 0.0, 0.0, 0.0])
+
+    def origins(self, cloud):
+        return np.tile([self.shift, 0.0], (len(cloud), 1))
 
 
 def made_at_once(*parts):
@@ -49,32 +59,32 @@ def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
             keyframes.append(cloud(number))
             shown.add(keyframes[-1])
         elif step == "draw":
-            shown.draw(moved_by(0.3 * shift), -np.inf)
+            shown.draw(MovedBy(0.3 * shift), -np.inf)
         else:
             inserted.append(cloud(number).points)
             shown.insert(inserted[-1])
-    place = moved_by(0.3 * last)
+    place = MovedBy(0.3 * last)
     shown.settle(place)
-    assert_same(shown.map.blocks, made_at_once(*inserted, *(place(keyframe) for keyframe in keyframes)))
-    assert shown.keyframes == 0
+    assert_same(shown.map.blocks, made_at_once(*inserted, *(place.points(keyframe) for keyframe in keyframes)))
+    assert shown.moving == []
 
 
 def test_a_keyframe_that_moves_leaves_nothing_behind():
     shown = KeyframeMap(RESOLUTION, LIMIT)
     shown.add(cloud(1))
-    shown.draw(moved_by(0.0), -np.inf)
-    shown.draw(moved_by(50.0), -np.inf)
-    assert_same(shown.map.blocks, made_at_once(moved_by(50.0)(cloud(1))))
+    shown.draw(MovedBy(0.0), -np.inf)
+    shown.draw(MovedBy(50.0), -np.inf)
+    assert_same(shown.map.blocks, made_at_once(MovedBy(50.0).points(cloud(1))))
 
 
 def test_a_settled_keyframe_stays_where_it_was_drawn():
     shown = KeyframeMap(RESOLUTION, LIMIT)
     for number in (1, 2):
         shown.add(cloud(number))
-    shown.draw(moved_by(0.0), settled_until=1.0)
-    assert shown.keyframes == 1
-    shown.draw(moved_by(50.0), settled_until=1.0)
-    assert_same(shown.map.blocks, made_at_once(cloud(1).points, moved_by(50.0)(cloud(2))))
+    shown.draw(MovedBy(0.0), settled_until=1.0)
+    assert len(shown.moving) == 1
+    shown.draw(MovedBy(50.0), settled_until=1.0)
+    assert_same(shown.map.blocks, made_at_once(cloud(1).points, MovedBy(50.0).points(cloud(2))))
 
 
 @pytest.mark.parametrize("settled_until", [-np.inf, np.inf])
@@ -82,4 +92,4 @@ def test_the_report_is_that_of_the_newest_keyframe(settled_until):
     shown = KeyframeMap(RESOLUTION, LIMIT)
     for number in (1, 2):
         shown.add(cloud(number))
-    assert shown.draw(moved_by(2.0 * LIMIT), settled_until).outside == len(cloud(2))
+    assert shown.draw(MovedBy(2.0 * LIMIT), settled_until).report.outside == len(cloud(2))

@@ -50,6 +50,9 @@ def test_the_live_matcher_and_mapper_are_those_of_the_replay(written):
     assert core.map_settings() == USED.map_settings()
 
 
+ANY_FRAME = st.sampled_from(["odom", "map", "corrected_map", "base_link", "5", "true", "\u00e9 #: x"])
+
+
 def values_of(field):
     """Return a strategy of all that a parameter may be, its limits among them."""
     told = describe(field)
@@ -57,12 +60,13 @@ def values_of(field):
         return st.sampled_from(field.type)
     if field.type is bool:
         return st.booleans()
+    if field.type is str:
+        return ANY_FRAME
     kind = st.integers if field.type is int else st.floats
     return st.one_of(st.sampled_from([field.type(told.low), field.type(told.high)]), kind(told.low, told.high))
 
 
 ANY_PARAMETERS = st.fixed_dictionaries({field.name: values_of(field) for field in dataclasses.fields(ReplayParameters)})
-ANY_FRAME = st.sampled_from(["odom", "map", "corrected_map", "base_link", "5", "true", "\u00e9 #: x"])
 
 
 @given(ANY_PARAMETERS, ANY_FRAME, ANY_FRAME)

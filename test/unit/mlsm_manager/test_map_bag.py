@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from importlib.util import find_spec
 from pathlib import Path
 
 import numpy as np
@@ -21,7 +22,11 @@ pytest.importorskip("tf2_py")
 
 ROOT = Path(__file__).resolve().parents[3]
 BASIN = ROOT / "test/data/basin.bag"
-FILES = {"map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json"}
+FILES = {
+    "map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json",
+    "dead_reckoning.tum", "corrected.tum", "refined.tum", "truth.tum",
+    *(["report.html"] if find_spec("plotly") else []),
+}  # fmt: skip
 TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
 COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
 
@@ -77,6 +82,18 @@ def test_a_simulated_basin_is_mapped_where_it_is(basin):
     assert summary["corrected"]["mean"] < 0.1
     assert summary["refined"]["mean"] < 0.1
     assert summary["echoes"]["mode"] == "MATCHED_FILTER"
+
+
+def test_each_trajectory_is_a_tum_file_too(basin):
+    """As evo takes them: time, x y z, quaternion x y z w."""
+    table = np.genfromtxt(basin / "trajectory.csv", delimiter=",", names=True)
+    tum = np.loadtxt(str(basin / "refined.tum"))
+    assert tum.shape == (len(table), 8)
+    assert np.allclose(tum[:, 0], table["time"])
+    assert np.allclose(tum[:, 1], table["refined_x"], atol=1e-4)
+    yaw = 2.0 * np.arctan2(tum[:, 6], tum[:, 7])
+    assert np.allclose(np.cos(yaw - table["refined_yaw"]), 1.0)
+    assert len(np.loadtxt(str(basin / "truth.tum"))) > 100
 
 
 def test_what_it_found_is_what_another_run_knows_beforehand(basin, tmp_path):

@@ -1,4 +1,4 @@
-"""Temporary files of processes that were killed while they wrote."""
+"""Temporary files of processes that were killed while they wrote, and where relative paths lead."""
 
 import os
 import signal
@@ -7,7 +7,7 @@ import sys
 
 import pytest
 
-from node_support.files import remove_abandoned_parts, whole_file, write_whole
+from node_support.files import remove_abandoned_parts, ros_path, whole_file, write_whole
 
 WRITER = """
 import sys, time
@@ -60,3 +60,17 @@ def test_other_hidden_files_stay(tmp_path):
     (tmp_path / ".map.ply.backup").write_text("mine")
     remove_abandoned_parts(tmp_path)
     assert os.listdir(str(tmp_path)) == [".map.ply.backup"]
+
+
+@pytest.mark.parametrize(
+    ("path", "whole"), [("maps", "/robot/.ros/maps"), ("~/maps", "/robot/maps"), ("/maps", "/maps")]
+)
+def test_relative_paths_lie_in_ros_home(monkeypatch, path, whole):
+    monkeypatch.setenv("HOME", "/robot")
+    monkeypatch.delenv("ROS_HOME", raising=False)
+    assert str(ros_path(path)) == whole
+
+
+def test_ros_home_can_be_elsewhere(monkeypatch):
+    monkeypatch.setenv("ROS_HOME", "/data/ros")
+    assert str(ros_path("maps")) == "/data/ros/maps"

@@ -8,12 +8,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import write_mcap, write_sqlite_bag
 
-from mlsm_manager.offline.bag_recording import BagNames, read_recording
+from mlsm_manager.offline.bag_recording import read_recording
 from recordings.bags.bag import Bag
 from recordings.errors import RecordingError
+from recordings.reading.reader import Request
 
 BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
-NAMES = BagNames("/sonar/raw", "odom", "base_link", "/ground_truth")
+NAMES = Request(truth="/ground_truth")
 
 
 @pytest.fixture(scope="module")

@@ -34,6 +34,13 @@ def test_bins_have_a_length(resolution):
         _beam(range_resolution=resolution)
 
 
+@pytest.mark.parametrize("resolution", [2.51, 1e6, 1e30, 1e308])
+def test_a_beam_reaches_10_km_at_most(resolution):
+    with pytest.raises(RefusedInput, match="must be at most 10000 m") as refused:
+        _beam(4000, range_resolution=resolution)
+    assert refused.value.kind == "beams refused"
+
+
 @pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
 @pytest.mark.parametrize("name", ["angle", "sensor_angle"])
 def test_head_and_servo_point_somewhere(name, value):
@@ -75,6 +82,12 @@ def test_a_point_with_a_stamp_that_is_not_finite_is_not_valid():
     cloud = cloud_of([1, 2, 3])
     cloud.time_stamps[0] = np.nan
     assert cloud.valid.tolist() == [False, True, True]
+
+
+def test_points_beyond_a_limit_are_told_from_those_that_were_removed():
+    cloud = cloud_of([1, 2, 3, 4, 5])
+    cloud.points[:, 1] = 100.0, -100.1, 3e38, np.nan, -np.inf
+    assert cloud.beyond(100.0).tolist() == [False, True, True, False, True]
 
 
 def test_selected_points_keep_their_stamps():

@@ -19,9 +19,10 @@ from node_support.errors import RefusedInput
 from node_support.geometry.matrices import pose_matrix, quaternion_of
 from node_support.ros.conversions import matrix_from_message
 from sonar_processing.cloud import IntensityCloud
+from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.messages.reader import BeamReader
 from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
-    beam_from_message,
     cloud_from_message,
     cloud_to_message,
     header,
@@ -51,6 +52,10 @@ def _line(**values):
         "sensorAngle": -0.125,
     }
     return SonarScanLine(**{**defaults, **values})
+
+
+def _beam(message):
+    return BeamReader(BeamMessageParameters()).read(SonarScanLine._type, message).beams[0]
 
 
 def _sent(message, received_type):
@@ -84,34 +89,34 @@ def test_a_header_holds_every_stamp_exactly(stamp_ns):
 
 
 def test_a_beam_has_what_its_message_says():
-    beam = beam_from_message(_sent(_line(), SonarScanLine))
+    beam = _beam(_sent(_line(), SonarScanLine))
     assert (beam.stamp_ns, beam.frame_id, beam.angle) == (STAMP_NS, "sonar", 0.5)
     assert (beam.range_resolution, beam.sensor_angle) == (0.25, -0.125)
     assert beam.intensities.tolist() == [1, 2, 255]
 
 
 def test_a_beam_can_be_made_of_a_list_of_intensities():
-    assert beam_from_message(_line(intensities=[1, 2, 255])).intensities.tolist() == [1, 2, 255]
+    assert _beam(_line(intensities=[1, 2, 255])).intensities.tolist() == [1, 2, 255]
 
 
 @pytest.mark.parametrize("value", [0.0, -1.0, math.nan])
 @pytest.mark.parametrize("name", ["maxrange_meters", "range_resolution"])
 def test_a_beam_without_a_range_is_refused(name, value):
     with pytest.raises(RefusedInput, match=f"{name} {value}") as refused:
-        beam_from_message(_line(**{name: value}))
+        _beam(_line(**{name: value}))
     assert refused.value.kind == "beams refused"
 
 
 @pytest.mark.parametrize("bins", [0, 10000])
 def test_a_beam_of_no_or_of_too_many_bins_is_refused(bins):
     with pytest.raises(RefusedInput, match=f"{bins} bins"):
-        beam_from_message(_line(intensities=bytes(bins)))
+        _beam(_line(intensities=bytes(bins)))
 
 
 @pytest.mark.parametrize("name", ["angle", "sensorAngle"])
 def test_a_beam_with_an_angle_that_is_not_a_number_is_refused(name):
     with pytest.raises(RefusedInput, match="nan"):
-        beam_from_message(_line(**{name: math.nan}))
+        _beam(_line(**{name: math.nan}))
 
 
 @given(ANY_BITS, st.data())

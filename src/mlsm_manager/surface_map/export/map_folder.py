@@ -8,14 +8,15 @@ from typing import Optional
 from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
 from mlsm_manager.surface_map.files.errors import MapFileError
 from mlsm_manager.surface_map.files.map_file import ENDING, StoredMap, read_map
+from node_support.files import ros_path
 
 
 class MapFolder:
     """Saves and loads maps by name; nothing is written or read outside of the folder."""
 
     def __init__(self, folder: str) -> None:
-        """`folder`: a path in which ~ stands for the home; it is made when the first map is saved."""
-        self.folder = Path(folder).expanduser()
+        """`folder`: as `ros_path` takes it; it is made when the first map is saved."""
+        self.folder = ros_path(folder)
 
     def path(self, name: str) -> Path:
         """Return where the map `name` lies; an ending that tells no format is part of the name.

@@ -26,6 +26,11 @@ class FirstEchoes:
         first = order[np.append(True, np.diff(times[order]) > 0.0)] if len(order) else order
         return FirstEchoes(origins[first], points[first, :3])
 
+    @staticmethod
+    def of_level(points: np.ndarray, times: np.ndarray, places: np.ndarray) -> "FirstEchoes":
+        """As `of_points` for level beams from `places` (n, 2) m: the sonar is as deep as what it hears."""
+        return FirstEchoes.of_points(points, times, np.column_stack([places, points[:, 2]]))
+
 
 @dataclass(frozen=True)
 class BeamPaths:

@@ -19,6 +19,7 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
 from mlsm_manager.surface_map.free_space.beam_paths import BeamPaths, FirstEchoes, beam_paths
+from mlsm_manager.surface_map.free_space.pairing import pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.parameters import ParameterSet, parameter
 
@@ -57,6 +58,23 @@ class CarveReport:
     crossed: int
     removed: int
 
+    def __add__(self, other: "CarveReport") -> "CarveReport":
+        return CarveReport(self.free + other.free, self.crossed + other.crossed, self.removed + other.removed)
+
+
+@dataclass(frozen=True)
+class BeamFindings:
+    """What the beams of a scan say of a map as it was when they were asked.
+
+    free: a block for each cell that is free. crossed: (m) copies of blocks that were crossed. rows: (m,) where the map
+    keeps them, until it changes. beams: (m,) number of beams that crossed each.
+    """
+
+    free: Blocks
+    crossed: Blocks
+    rows: np.ndarray
+    beams: np.ndarray
+
 
 @dataclass(frozen=True)
 class Carver:
@@ -71,7 +89,14 @@ class Carver:
     def carve(
         self, occupied: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray
     ) -> CarveReport:
-        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side.
+        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side."""
+        findings = self.findings(occupied, beams, points)
+        removed = self.charge(occupied, findings)
+        note_free(free, findings.free)
+        return CarveReport(len(findings.free), len(findings.rows), removed)
+
+    def findings(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> BeamFindings:
+        """Return what a scan says whose points (n, >= 3) are in `occupied` already.
 
         A beam says nothing about what lies behind the first block in its way, even where its echo came from farther:
         either that block or that echo is wrong. That block counts a crossing, unless the scan itself hit its cell.
@@ -83,37 +108,40 @@ class Carver:
         first = np.full(len(beams.origins), np.inf)
         np.minimum.at(first, paths.beam[pair], paths.distance[pair])
         crossing = (paths.distance[pair] == first[paths.beam[pair]]) & ~hit[paths.cell[pair]]
-        crossed, removed = self._charge(occupied, blocks, rows, block[crossing])
         before = (paths.distance < first[paths.beam]) & ~hit[paths.cell]
-        noted = _free_blocks(paths.take(before), occupied.resolution)
-        free.insert_blocks(noted.take(~_known(noted, free)))
-        return CarveReport(len(noted), crossed, removed)
+        number = np.bincount(block[crossing], minlength=len(blocks))
+        crossed = np.flatnonzero(number)
+        free = _free_blocks(paths.take(before), occupied.resolution)
+        return BeamFindings(free, blocks.take(crossed), rows[crossed], number[crossed])
+
+    def charge(self, occupied: MultiLevelSurfaceMap, findings: BeamFindings) -> int:
+        """Count the crossings, remove the blocks with too many, and return how many these are.
+
+        `occupied` must be as it was when the findings were made.
+        """
+        occupied.count_crossings(findings.rows, findings.beams)
+        gone = self.is_outworn(findings.crossed, findings.crossed.crossed + findings.beams)
+        occupied.remove(findings.rows[gone])
+        return int(np.count_nonzero(gone))
+
+    def is_outworn(self, blocks: Blocks, crossings: np.ndarray) -> np.ndarray:
+        """Return (n,) which of the blocks must go after so many crossings (n,) in a row."""
+        points = np.minimum(blocks.count, _MOST_POINTS)
+        return crossings > self.parameters.crossings_least + self.parameters.crossings_per_point * points
 
     def _meetings(self, paths: BeamPaths, blocks: Blocks, owners: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return pairs (k,) of `paths` and blocks (k,) that lie in the way of their beams."""
-        sizes = np.diff(np.append(paths.starts, len(paths.cell)))
-        number = sizes[owners]
-        block = np.repeat(np.arange(len(owners)), number)
-        rank = np.arange(len(block)) - np.repeat(np.cumsum(number) - number, number)
-        pair = paths.starts[owners][block] + rank
+        block, pair = pairs_of_groups(paths.starts, len(paths.cell), owners)
         half = np.maximum(paths.distance[pair] * np.tan(self.parameters.fan_core / 2.0), blocks.resolution / 2.0)
         above = blocks.bottom[block] - paths.height[pair]
         below = paths.height[pair] - blocks.height[block]
         inside = np.maximum(above, below) <= half
         return pair[inside], block[inside]
 
-    def _charge(
-        self, occupied: MultiLevelSurfaceMap, blocks: Blocks, rows: np.ndarray, crossings: np.ndarray
-    ) -> Tuple[int, int]:
-        """Count `crossings`, indices of blocks, and remove those with too many; return how many of both."""
-        beams = np.bincount(crossings, minlength=len(blocks))
-        crossed = np.flatnonzero(beams)
-        occupied.count_crossings(rows[crossed], beams[crossed])
-        total = blocks.crossed[crossed] + beams[crossed]
-        points = np.minimum(blocks.count[crossed], _MOST_POINTS)
-        gone = total > self.parameters.crossings_least + self.parameters.crossings_per_point * points
-        occupied.remove(rows[crossed[gone]])
-        return len(crossed), int(np.count_nonzero(gone))
+
+def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> None:
+    """Put into `free` which of the blocks, one per cell, are not known well enough to be free."""
+    free.insert_blocks(noted.take(~_known(noted, free)))
 
 
 def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:

@@ -1,0 +1,152 @@
+"""Sends damaged messages of other packages' sonars through the adapters, the scans and the laser scan: none may crash.
+
+scripts/fuzz_beams [MESSAGES [SEED]]
+"""
+
+import argparse
+import math
+import random
+import struct
+from collections import Counter
+from types import SimpleNamespace
+from typing import Any, List
+
+import genpy
+import numpy as np
+
+from benchmarks.foreign_messages import DEFINITIONS, message_classes, sane_message, serialised
+from benchmarks.table import print_table
+from node_support.errors import RefusedInput
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.head_watch import HeadWatch
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.messages.reader import BeamReader
+from sonar_processing.ros.message_classes import MessageClasses
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.laser_scan import planar_laser_scan
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.scans.polar_scan import PolarScan
+from sonar_processing.scans.revolution_collector import RevolutionCollector
+
+MESSAGES = 100_000
+_FLOATS = (0.0, -0.0, -1.0, 1e-40, 7.0, 400.0, 1e9, 3e38, math.nan, math.inf, -math.inf)
+_SECONDS = (0, 1, 2**31 - 1, 2**31, 2**32 - 1)
+_FRAMES = ("", "/", "/sonar", "so\0nar", "a" * 3000, "\u00fc \n")
+_DAMAGED_DEFINITIONS = 0.002  # Share: each takes 10 ms
+
+
+class Fuzzer:
+    """Counts what becomes of each message: "taken", the kind of its refusal, or the exception that nobody caught."""
+
+    def __init__(self, seed: int) -> None:
+        self.outcomes: Counter[str] = Counter()
+        self.crashes: List[str] = []
+        self._random = random.Random(seed)
+        self._parameters = SonarToCloudParameters()
+        self._classes, self._reader = MessageClasses(), BeamReader(BeamMessageParameters())
+        self._watch, self._assembler = HeadWatch(), ScanAssembler(self._parameters)
+        self._revolution = RevolutionCollector()
+
+    def send(self, number: int) -> None:
+        """Send message number `number`, sane or damaged."""
+        kind = self._random.choice(list(DEFINITIONS))
+        message = self.message(kind, number)
+        try:
+            typed = self._classes.deserialised(message)
+            for beam in self._reader.read(kind, typed).beams:
+                self._process(beam)
+        except RefusedInput as refused:
+            self.outcomes[refused.kind] += 1
+        except Exception as error:  # Whatever it is, it is what is looked for
+            self.outcomes["crashes"] += 1
+            self.crashes.append(f"{kind}: {type(error).__name__}: {error}")
+        else:
+            self.outcomes["taken"] += 1
+
+    def _process(self, beam: Beam) -> None:
+        self._watch.add(beam)
+        placed = PlacedBeam(self._parameters.corrected(beam), np.eye(4), is_moving=False)
+        self._assembler.add(placed)
+        turn = self._revolution.add(placed)
+        if turn is not None:
+            planar_laser_scan(PolarScan.of(turn), self._parameters)
+
+    def message(self, kind: str, number: int) -> Any:
+        """Return a message of a kind, sane or damaged, as a subscriber to AnyMsg gets it."""
+        made = sane_message(kind, number)
+        if self._random.random() < 0.6:
+            self._spoil(made)
+        try:
+            data = serialised(made)
+        except genpy.SerializationError:
+            data = serialised(sane_message(kind, number))
+        if self._random.random() < 0.3:
+            data = self._damaged(data)
+        header = {
+            "type": kind,
+            "md5sum": message_classes(kind)[kind]._md5sum,
+            "message_definition": DEFINITIONS[kind],
+        }
+        if self._random.random() < _DAMAGED_DEFINITIONS:
+            definition = self._damaged(DEFINITIONS[kind].encode()).decode(errors="replace")
+            header.update(md5sum=str(number), message_definition=definition)
+        return SimpleNamespace(_connection_header=header, _buff=data)
+
+    def _spoil(self, message: genpy.Message) -> None:
+        """Replace one field by what no driver should send."""
+        name, kind = self._random.choice(list(zip(message.__slots__, message._slot_types)))
+        if name == "header":
+            self._spoil_header(message.header)
+        elif kind == "uint8[]":
+            setattr(message, name, bytes(self._random.choice((0, 1, 3, 200, 4096, 5000))))
+        elif kind.endswith("[]"):
+            setattr(message, name, getattr(message, name) * self._random.choice((0, 1, 2, 100)))
+        elif kind.startswith("float"):
+            setattr(message, name, self._random.choice((*_FLOATS, self._random.uniform(-500.0, 500.0))))
+        else:
+            setattr(message, name, self._random.choice((0, 1, 2 ** int(kind[4:]) - 1)))
+
+    def _spoil_header(self, header: Any) -> None:
+        if self._random.random() < 0.5:
+            header.frame_id = self._random.choice(_FRAMES)
+        else:
+            header.stamp = genpy.Time(self._random.choice(_SECONDS), self._random.choice((0, 999_999_999)))
+
+    def _damaged(self, data: bytes) -> bytes:
+        changed = bytearray(data)
+        what = self._random.randrange(4)
+        place = self._random.randrange(len(changed))
+        if what == 0:
+            del changed[place:]
+        elif what == 1:
+            changed[place : place + 4] = struct.pack("<I", self._random.getrandbits(32))
+        elif what == 2:
+            changed[place:place] = self._random.getrandbits(64).to_bytes(8, "little")
+        else:
+            changed[place] ^= 1 << self._random.randrange(8)
+        return bytes(changed)
+
+
+def fuzz(messages: int, seed: int) -> Fuzzer:
+    """Send that many messages."""
+    fuzzer = Fuzzer(seed)
+    for number in range(messages):
+        fuzzer.send(number)
+    return fuzzer
+
+
+def main() -> None:
+    """Print what became of the messages; end with status 1 after a crash."""
+    parser = argparse.ArgumentParser(prog="scripts/fuzz_beams", description=__doc__)
+    parser.add_argument("messages", type=int, nargs="?", default=MESSAGES)
+    parser.add_argument("seed", type=int, nargs="?", default=1)
+    arguments = parser.parse_args()
+    fuzzer = fuzz(arguments.messages, arguments.seed)
+    print_table([(name, str(number), "") for name, number in sorted(fuzzer.outcomes.items())])
+    print("\n".join(fuzzer.crashes[:10]) or f"no crash; {sum(fuzzer.outcomes.values())} messages counted")
+    raise SystemExit(bool(fuzzer.crashes))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,120 @@
+"""Water with nothing in it: no scan of noise may lead to a fix.
+
+PYTHONPATH=src:scripts python3 -m benchmarks.open_water [SCANS]
+"""
+
+import argparse
+from dataclasses import dataclass
+from typing import Callable, Dict, Iterator, List
+
+import numpy as np
+
+from benchmarks.table import Row, print_table
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.echo_shape import echo_shape_of, suited
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.geometry.matrices import pose_matrix
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+
+SCANS = 1000
+_BEAMS, _BINS, _RESOLUTION = 120, 250, 0.2
+_SECONDS_PER_TURN = 16.0
+_START = 1000.0
+_SPEED, _TURN_RATE = 0.3, 0.01  # m/s, rad/s: circles of 30 m, so that the vehicle comes back
+_SPECKLE = 6.0  # Echo strength: mean of a receiver's noise at a usual gain
+_BUBBLES, _BUBBLE_STRENGTH = 30, 120.0  # Echoes of a turn that nothing stands behind
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """fixes: scans whose match was accepted. farthest: m, the largest correction of a position."""
+
+    scans: int
+    fixes: int
+    farthest: float
+
+
+def silence(_rng: np.random.Generator) -> np.ndarray:
+    """Return strengths (beams, bins) of a turn in which nothing is heard."""
+    return np.zeros((_BEAMS, _BINS))
+
+
+def speckle(rng: np.random.Generator) -> np.ndarray:
+    """Return a turn of receiver noise: amplitudes of Rayleigh's distribution."""
+    return rng.rayleigh(_SPECKLE / np.sqrt(np.pi / 2.0), (_BEAMS, _BINS))
+
+
+def bubbles(rng: np.random.Generator) -> np.ndarray:
+    """Return a turn of receiver noise with a few strong echoes that are elsewhere in the next turn."""
+    strengths = speckle(rng)
+    strengths[rng.integers(0, _BEAMS, _BUBBLES), rng.integers(5, _BINS, _BUBBLES)] = _BUBBLE_STRENGTH
+    return strengths
+
+
+WATERS: Dict[str, Callable[[np.random.Generator], np.ndarray]] = {
+    "silence": silence,
+    "receiver noise": speckle,
+    "noise and bubbles": bubbles,
+}
+
+
+def recording(turn: Callable[[np.random.Generator], np.ndarray], scans: int, seed: int) -> Recording:
+    """Return a recording of a vehicle that drives circles in open water."""
+    times = _START + np.arange(scans * _BEAMS + 1) * _SECONDS_PER_TURN / _BEAMS
+    yaws = _TURN_RATE * (times - _START)
+    radius = _SPEED / _TURN_RATE
+    poses = np.column_stack([radius * np.sin(yaws), radius * (1.0 - np.cos(yaws)), yaws])
+    beams = [
+        PlacedBeam(beam, pose_matrix((x, y, -3.0), (0.0, 0.0, yaw)), is_moving=True)
+        for beam, (x, y, yaw) in zip(_beams(turn, times, np.random.default_rng(seed)), poses)
+    ]
+    return Recording(beams, 0, Track(times, poses), None)
+
+
+def _beams(
+    turn: Callable[[np.random.Generator], np.ndarray], times: np.ndarray, rng: np.random.Generator
+) -> Iterator[Beam]:
+    for number in range(len(times) // _BEAMS):
+        strengths = np.clip(np.rint(turn(rng)), 0, 255).astype(np.uint8)
+        for step in range(_BEAMS):
+            stamp = round(1e9 * times[number * _BEAMS + step])
+            yield Beam(stamp, "sonar", 2.0 * np.pi * step / _BEAMS, strengths[step], _RESOLUTION)
+
+
+def outcome(turn: Callable[[np.random.Generator], np.ndarray], estimator: Estimator, scans: int, seed: int) -> Outcome:
+    """Map open water as map_bag does."""
+    made = recording(turn, scans, seed)
+    parameters = ReplayParameters(estimator=estimator)
+    parameters = suited(parameters, echo_shape_of([placed.beam for placed in made.beams]), frozenset())
+    found = [scan for scan, _ in scans_of(made, parameters.echoes())]
+    replayed = replay(made, found, parameters, lambda _: None)
+    return Outcome(len(found), _fixes(replayed), _farthest(replayed))
+
+
+def _fixes(replayed: Replayed) -> int:
+    return sum(update.accepted and update.result is not None for update in replayed.updates)
+
+
+def _farthest(replayed: Replayed) -> float:
+    return float(np.hypot(*(replayed.corrected - replayed.odometry)[:, :2].T).max())
+
+
+def rows(scans: int = SCANS) -> List[Row]:
+    """Return the figures of all waters and both estimators."""
+    table: List[Row] = []
+    for name, turn in WATERS.items():
+        for estimator in Estimator:
+            one = outcome(turn, estimator, scans, seed=1)
+            text = f"{one.fixes} of {one.scans} scans, correction up to {one.farthest:.2f} m"
+            table.append((f"fixes in {name}, {estimator.value}", text, "0"))
+    return table
+
+
+if __name__ == "__main__":
+    parser = argparse.ArgumentParser(prog="python3 -m benchmarks.open_water", description=__doc__)
+    parser.add_argument("scans", type=int, nargs="?", default=SCANS)
+    print_table(rows(parser.parse_args().scans))

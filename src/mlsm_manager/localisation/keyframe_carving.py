@@ -1,0 +1,148 @@
+"""Free space as keyframes saw it: what those that may still move say is found anew when they have moved."""
+
+from collections import deque
+from dataclasses import dataclass
+from typing import Deque, List, Optional, Tuple
+
+import numpy as np
+
+from mlsm_manager.localisation.placement import Placement
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.surface_map.blocks import Blocks, cells_of
+from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
+from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import BeamFindings, Carver, CarveReport
+from mlsm_manager.surface_map.free_space.pairing import pairs_of_groups
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.overlay import Overlay
+
+_STRAYED = 0.5
+"""Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
+_MOST_FOLLOWED = 2
+"""The beams of so many keyframes are followed with each scan, which takes 4 ms each: those that moved farthest first,
+and a new one before them. More would take over a fifth of the time of a scan. What settles is followed in any case."""
+
+
+@dataclass(frozen=True)
+class _Look:
+    """points: (n, 4) of a keyframe in map when its beams were followed. findings: what they said then."""
+
+    points: np.ndarray
+    findings: BeamFindings
+
+
+class KeyframeCarving:
+    """The free space of a KeyframeMap, and which of its blocks must go because beams go through them.
+
+    Keyframes that are settled carve for ever, in the order of time. What the others say is kept beside the map.
+    """
+
+    def __init__(self, resolution: float, limit: float, carver: Optional[Carver]) -> None:
+        """`carver`: None where nothing is to be carved."""
+        self._carver = carver
+        self._free = MultiLevelSurfaceMap(resolution, limit)
+        self._looks: Deque[Optional[_Look]] = deque()
+        self._hit_cells, self._hit_by = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
+
+    @property
+    def blocks(self) -> Blocks:
+        """A copy of what is known to be free, as all keyframes see it now."""
+        overlay = Overlay(self._free)
+        for look in self._looks:
+            if look is not None:
+                overlay.lay(look.findings.free)
+        blocks = self._free.blocks
+        overlay.take_off()
+        return blocks
+
+    def restore(self, free: Blocks) -> None:
+        """Take what was known to be free. Raises ValueError for another resolution."""
+        self._free.insert_blocks(free)
+
+    def carve(
+        self, surface_map: MultiLevelSurfaceMap, points: np.ndarray, times: np.ndarray, origins: np.ndarray
+    ) -> Optional[CarveReport]:
+        """Carve for ever along the beams of points (n, 4) in the map, taken at `times` (n,) s from `origins` (n, 2) m.
+
+        Return None where nothing is to be carved.
+        """
+        if self._carver is None:
+            return None
+        beams = FirstEchoes.of_level(points, times, origins)
+        return self._carver.carve(surface_map, self._free, beams, points)
+
+    def forget_oldest(self) -> None:
+        """Forget what the oldest keyframe said, because it is settled."""
+        if self._looks:
+            self._looks.popleft()
+
+    def look(
+        self,
+        surface_map: MultiLevelSurfaceMap,
+        clouds: List[TimedPoints],
+        points: List[np.ndarray],
+        placement: Placement,
+    ) -> None:
+        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`."""
+        if self._carver is None:
+            return
+        self._looks.extend([None] * (len(clouds) - len(self._looks)))
+        for number in self._strayed(points, surface_map.resolution):
+            cloud, there = clouds[number], points[number]
+            beams = FirstEchoes.of_level(there, cloud.times, placement.origins(cloud))
+            self._looks[number] = _Look(there, self._carver.findings(surface_map, beams, there))
+        self._hit_cells, self._hit_by = _newest_hits(points, surface_map.resolution)
+
+    def outworn(self, surface_map: MultiLevelSurfaceMap) -> np.ndarray:
+        """Return the rows (n,) of blocks of the map that go if the moving keyframes are where they are thought to be.
+
+        A keyframe with a point in a cell ends the count of the crossings that older ones saw there.
+        """
+        nothing = np.empty(0, dtype=np.int64)
+        looks = [(number, look.findings) for number, look in enumerate(self._looks) if look is not None]
+        if not looks:
+            return nothing
+        crossed = np.concatenate([_extents(findings.crossed) for _, findings in looks])
+        keys = np.concatenate([cell_keys(findings.crossed.cells) for _, findings in looks])
+        beams = np.concatenate([findings.beams for _, findings in looks])
+        number = np.repeat([number for number, _ in looks], [len(findings.beams) for _, findings in looks])
+        counts = number > self._last_hit(keys)
+        keys, crossed, beams = keys[counts], crossed[counts], beams[counts]
+        order = np.argsort(keys, kind="stable")
+        cells, starts = np.unique(keys[order], return_index=True)
+        blocks, rows, owners = surface_map.find(cells_of_keys(cells))
+        block, entry = pairs_of_groups(starts, len(keys), owners)
+        entry = order[entry]
+        same = (crossed[entry, 0] <= blocks.height[block]) & (crossed[entry, 1] >= blocks.bottom[block])
+        more = np.bincount(block[same], weights=beams[entry[same]], minlength=len(blocks))
+        return rows[(more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)]
+
+    def _strayed(self, points: List[np.ndarray], resolution: float) -> List[int]:
+        """Return the numbers of the keyframes to be looked at again."""
+        moved = np.array([_moved(look, there) for look, there in zip(self._looks, points)])
+        farthest = np.argsort(-moved, kind="stable")[:_MOST_FOLLOWED]
+        return farthest[moved[farthest] > _STRAYED * resolution].tolist()
+
+    def _last_hit(self, keys: np.ndarray) -> np.ndarray:
+        """Return the number (n,) of the newest keyframe with a point in each cell, -1 where there is none."""
+        if not len(self._hit_cells):
+            return np.full(len(keys), -1)
+        place = np.minimum(np.searchsorted(self._hit_cells, keys), len(self._hit_cells) - 1)
+        return np.where(self._hit_cells[place] == keys, self._hit_by[place], -1)
+
+
+def _moved(look: Optional[_Look], points: np.ndarray) -> float:
+    """Return by how many metres the keyframe has moved at most; infinity for one that was never looked at."""
+    return np.inf if look is None else float(np.abs(points - look.points)[:, :2].max(initial=0.0))
+
+
+def _extents(blocks: Blocks) -> np.ndarray:
+    return np.column_stack([blocks.bottom, blocks.height])
+
+
+def _newest_hits(points: List[np.ndarray], resolution: float) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the keys of all cells with points, sorted, and the number of the newest keyframe in each."""
+    keys = cell_keys(cells_of(np.concatenate(points), resolution))
+    number = np.repeat(np.arange(len(points)), [len(part) for part in points])
+    cells, last = np.unique(keys[::-1], return_index=True)
+    return cells, number[::-1][last]

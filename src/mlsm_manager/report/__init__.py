@@ -1,0 +1,1 @@
+"""report.html: what a mission was, for people without ROS. One file that opens anywhere without a network."""

@@ -1,0 +1,167 @@
+"""The figures of a report."""
+
+from typing import List, Optional
+
+import numpy as np
+import plotly.graph_objects as go
+
+from mlsm_manager.report.map_image import map_image
+from mlsm_manager.report.mission import Mission, Path, Uncertainty
+
+SCAN_TRACE = "scan at the chosen time"
+VEHICLE_TRACE = "vehicle at the chosen time"
+_MOST_ELLIPSES = 60  # more would hide the path
+_MOST_BLOCKS = 100_000  # in 3-D: with more, computers without a graphics card can hardly turn the view
+_MOST_PATH_POINTS = 5000  # of a path: more cannot be told apart on a screen
+_ELLIPSE_DEVIATIONS = 2.0
+_DOUBT = "#cc3377"
+_SCAN = "#e07b00"
+_LEAST_EXTENT = 0.08  # of the longest side: keeps a flat map from being a line
+_FULL_VIEW = 2.0  # plotly's unit of length: the longest side then fills the view
+_ELLIPSE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 25)
+
+
+def map_from_above(mission: Mission) -> go.Figure:
+    """Return the map with all paths; the last two traces are filled by the slider."""
+    figure = go.Figure()
+    if len(mission.blocks):
+        picture = map_image(mission.blocks)
+        (left, bottom), (right, top) = picture.low, picture.high
+        figure.add_layout_image(
+            source=picture.url, xref="x", yref="y", x=left, y=top, sizex=right - left, sizey=top - bottom,
+            sizing="stretch", layer="below",
+        )  # fmt: skip
+        _add_line(figure, [left, right], [bottom, top], "", "rgba(0,0,0,0)", hidden=True)
+    for path in mission.paths:
+        shown = thinned(path)
+        _add_line(figure, shown.poses[:, 0], shown.poses[:, 1], path.name, path.color)
+    if mission.uncertainty is not None:
+        _add_uncertainty(figure, mission.best, mission.uncertainty)
+    figure.add_trace(go.Scattergl(x=[], y=[], mode="markers", name=SCAN_TRACE, marker={"color": _SCAN, "size": 4}))
+    figure.add_trace(
+        go.Scatter(
+            x=[], y=[], mode="markers", name=VEHICLE_TRACE,
+            marker={"color": _SCAN, "size": 12, "symbol": "circle-open", "line": {"width": 3}},
+        )
+    )  # fmt: skip
+    figure.update_xaxes(title="x [m]")
+    figure.update_yaxes(title="y [m]", scaleanchor="x")
+    return _laid_out(figure, 650)
+
+
+def map_in_3d(mission: Mission) -> go.Figure:
+    """Return the blocks as points at their means, and the best path.
+
+    Their colour is their height or, in a flat map, the number of their points.
+    """
+    step = max(1, -(-len(mission.blocks) // _MOST_BLOCKS))
+    blocks = mission.blocks.take(np.arange(0, len(mission.blocks), step))
+    mean = blocks.mean.astype(np.float32)
+    flat = not len(mean) or np.ptp(mean[:, 2]) < blocks.resolution
+    shade, told = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
+    name = "map" if step == 1 else f"map, one block of {step}"
+    figure = go.Figure(
+        go.Scatter3d(
+            x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
+            marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": told}},
+        )
+    )  # fmt: skip
+    path = thinned(mission.best)
+    height = np.full(len(path.times), float(np.median(mean[:, 2])) if len(mean) else 0.0, dtype=np.float32)
+    figure.add_trace(
+        go.Scatter3d(
+            x=path.poses[:, 0], y=path.poses[:, 1], z=height, mode="lines", name=path.name,
+            line={"color": path.color, "width": 4},
+        )
+    )  # fmt: skip
+    places = np.concatenate([mean[:, :3], np.column_stack([path.poses[:, :2], height])])
+    extent = np.maximum(np.ptp(places, axis=0) / max(np.ptp(places, axis=0).max(), 1e-3), _LEAST_EXTENT) * _FULL_VIEW
+    figure.update_scenes(
+        aspectmode="manual", aspectratio=dict(zip("xyz", extent.tolist())),
+        camera={"eye": {"x": 0.0, "y": -1.3, "z": 1.4}},
+        xaxis_title="x [m]", yaxis_title="y [m]", zaxis_title="z [m]",
+    )  # fmt: skip
+    return _laid_out(figure, 600)
+
+
+def correction_over_time(mission: Mission) -> go.Figure:
+    """Return how far the paths are from the odometry, and how certain the best one says it is."""
+    figure = go.Figure()
+    odometry = mission.paths[0]
+    for path in mission.paths[1:]:
+        shown = thinned(path)
+        columns = [np.interp(shown.times, odometry.times, odometry.poses[:, axis]) for axis in (0, 1)]
+        distance = np.hypot(shown.poses[:, 0] - columns[0], shown.poses[:, 1] - columns[1])
+        _add_line(figure, shown.times - mission.start, distance, f"{path.name} from {odometry.name}", path.color)
+    if mission.uncertainty is not None:
+        told = mission.uncertainty
+        radius = np.sqrt(np.trace(told.covariances, axis1=1, axis2=2))
+        _add_line(figure, told.times - mission.start, radius, "standard deviation of the position", _DOUBT)
+        for begin, end in told.doubtful - mission.start:
+            figure.add_vrect(x0=begin, x1=end, fillcolor=_DOUBT, opacity=0.15, line_width=0)
+    figure.update_xaxes(title="time [s]")
+    figure.update_yaxes(title="distance [m]", rangemode="tozero")
+    return _laid_out(figure, 350)
+
+
+def sensor_health(mission: Mission) -> go.Figure:
+    """Return echoes and missing beams of every scan."""
+    times = np.array([scan.time for scan in mission.scans]) - mission.start
+    echoes = [len(scan.points) for scan in mission.scans]
+    figure = go.Figure(go.Bar(x=times, y=[scan.missing for scan in mission.scans], name="missing beams", yaxis="y2"))
+    _add_line(figure, times, echoes, "echoes", "#1f5fa8")
+    figure.update_layout(
+        yaxis={"title": "echoes per scan", "rangemode": "tozero"},
+        yaxis2={"title": "missing beams", "overlaying": "y", "side": "right", "rangemode": "tozero"},
+    )
+    figure.update_xaxes(title="time [s]")
+    return _laid_out(figure, 300)
+
+
+def thinned(path: Path) -> Path:
+    """Return a path of at most some thousand points."""
+    step = max(1, len(path.times) // _MOST_PATH_POINTS)
+    return Path(path.name, path.color, path.times[::step], path.poses[::step].astype(np.float32))
+
+
+def _add_uncertainty(figure: go.Figure, best: Path, told: Uncertainty) -> None:
+    shown = slice(None, None, max(1, len(told.times) // _MOST_ELLIPSES))
+    centers = np.column_stack([np.interp(told.times[shown], best.times, best.poses[:, axis]) for axis in (0, 1)])
+    x, y = _ellipses(centers, told.covariances[shown])
+    _add_line(figure, x, y, "two standard deviations", _DOUBT, width=1)
+    gap = np.array([[np.nan, np.nan]])
+    stretches: List[np.ndarray] = []
+    for begin, end in told.doubtful:
+        inside = (best.times >= begin) & (best.times <= end)
+        stretches += [best.poses[inside, :2], gap]
+    if stretches:
+        places = np.concatenate(stretches)
+        _add_line(figure, places[:, 0], places[:, 1], "doubtful", "rgba(204,51,119,0.35)", width=9)
+
+
+def _ellipses(centers: np.ndarray, covariances: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
+    """Return x and y of ellipses at centers (k, 2), with gaps between them."""
+    values, vectors = np.linalg.eigh(covariances)
+    axes = vectors * (_ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0)))[:, np.newaxis, :]
+    circle = np.stack([np.cos(_ELLIPSE_ANGLES), np.sin(_ELLIPSE_ANGLES)])
+    outline = centers[:, :, np.newaxis] + axes @ circle
+    closed = np.concatenate([outline, np.full((len(centers), 2, 1), np.nan)], axis=2).astype(np.float32)
+    return closed[:, 0].ravel(), closed[:, 1].ravel()
+
+
+def _add_line(
+    figure: go.Figure, x: np.ndarray, y: np.ndarray, name: str, color: str, width: float = 2, hidden: bool = False
+) -> None:
+    line = {"color": color, "width": width}
+    figure.add_trace(
+        go.Scatter(
+            x=x, y=y, mode="lines", name=name, line=line, showlegend=not hidden, hoverinfo="skip" if hidden else None
+        )
+    )
+
+
+def _laid_out(figure: go.Figure, height: int, title: Optional[str] = None) -> go.Figure:
+    return figure.update_layout(
+        template="plotly_white", height=height, title=title, margin={"l": 60, "r": 20, "t": 20, "b": 50},
+        legend={"orientation": "h", "y": -0.15},
+    )  # fmt: skip

@@ -1,0 +1,76 @@
+"""What a report tells of a mission, as plain arrays."""
+
+from dataclasses import dataclass, field
+from typing import Any, Dict, List, Mapping, Optional, Tuple
+
+import numpy as np
+
+from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.blocks import Blocks
+
+
+@dataclass(frozen=True)
+class ScanRecord:
+    """One turn of the head.
+
+    time: s, of its last beam. points: (n, 2) m, its echoes in map. beams: how many made it. missing: how many more the
+    head would have sent at its own pace. rejection: why it was not used; empty where it was.
+    """
+
+    time: float
+    points: np.ndarray
+    beams: int
+    missing: int
+    rejection: str = ""
+
+
+@dataclass(frozen=True)
+class Path:
+    """A way of the vehicle. times: (m,) s. poses: (m, >= 2) x y [m] in map."""
+
+    name: str
+    color: str
+    times: np.ndarray
+    poses: np.ndarray
+
+
+@dataclass(frozen=True)
+class Uncertainty:
+    """How certain the last path is. times: (k,) s. covariances: (k, 2, 2) m^2. doubtful: (d, 2) s, stretches of time
+    that a check found doubtful.
+    """
+
+    times: np.ndarray
+    covariances: np.ndarray
+    doubtful: np.ndarray
+
+
+@dataclass(frozen=True)
+class Mission:
+    """Everything that the report shows.
+
+    title: names of the recordings. paths: the first is the odometry, the last one the best. scans: oldest first, at
+    least one. verdicts: of all checks; none where none was made. calibration: name -> (value, deviation).
+    facts: name -> value, for the head of the page. parameters: name -> value.
+    """
+
+    title: str
+    paths: List[Path]
+    scans: List[ScanRecord]
+    blocks: Blocks
+    verdicts: List[Verdict]
+    calibration: Mapping[str, Tuple[float, float]]
+    facts: Mapping[str, str]
+    parameters: Mapping[str, Any]
+    uncertainty: Optional[Uncertainty] = None
+    errors: Dict[str, Dict[str, float]] = field(default_factory=dict)
+
+    @property
+    def best(self) -> Path:
+        """The path that counts."""
+        return self.paths[-1]
+
+    @property
+    def start(self) -> float:
+        """Time [s] that the report counts from."""
+        return float(self.best.times[0])

@@ -1,0 +1,107 @@
+"""Puts everything into one HTML page."""
+
+from html import escape
+from pathlib import Path
+from string import Template
+from typing import Iterable, Mapping, Sequence
+
+from plotly.graph_objects import Figure
+from plotly.offline import get_plotlyjs
+
+from mlsm_manager.report.figures import (
+    SCAN_TRACE,
+    VEHICLE_TRACE,
+    correction_over_time,
+    map_from_above,
+    map_in_3d,
+    sensor_health,
+)
+from mlsm_manager.report.lights import Light, light_of, light_of_run, sentence
+from mlsm_manager.report.mission import Mission
+from mlsm_manager.report.page_template import PAGE
+from mlsm_manager.report.slider_data import slider_json
+from node_support.files import write_whole
+
+_LIGHT_COLORS = {Light.GREEN: "#2e8540", Light.AMBER: "#e0a526", Light.RED: "#c0392b", Light.GREY: "#999999"}
+_RUN_WORDS = {
+    Light.GREEN: "All checks are fine.",
+    Light.AMBER: "All checks pass, but some only just.",
+    Light.RED: "Do not rely on the marked stretches: at least one check failed.",
+    Light.GREY: "Nothing was checked.",
+}
+
+
+def write_report(path: Path, mission: Mission) -> None:
+    """Write the page whole or not at all; raises OSError."""
+    write_whole(path, report_page(mission).encode("utf-8"))
+
+
+def report_page(mission: Mission) -> str:
+    """Return the page; it needs no other file and no network."""
+    lights = [light_of(verdict) for verdict in mission.verdicts]
+    of_run = light_of_run(lights)
+    checks = [(_lamp(light), escape(verdict.question or verdict.name), escape(sentence(verdict)), light.value)
+              for verdict, light in zip(mission.verdicts, lights)]  # fmt: skip
+    return Template(PAGE).substitute(
+        title=escape(mission.title),
+        plotly=get_plotlyjs(),
+        summary=f"{_lamp(of_run)} {_RUN_WORDS[of_run]}",
+        facts=_table(("", ""), [(escape(name), escape(value)) for name, value in mission.facts.items()]),
+        checks=_table(("", "question", "what was found", ""), checks) if checks else "<p>No checks were made.</p>",
+        errors=_errors(mission),
+        above=_figure(map_from_above(mission), "above"),
+        solid=_figure(map_in_3d(mission), "solid"),
+        correction=_figure(correction_over_time(mission), "correction"),
+        health=_figure(sensor_health(mission), "health"),
+        calibration=_calibration(mission),
+        rejected=_rejected(mission),
+        parameters=_mapping(("parameter", "value"), mission.parameters),
+        last_scan=len(mission.scans) - 1,
+        scan_trace=SCAN_TRACE,
+        vehicle_trace=VEHICLE_TRACE,
+        scans=slider_json(mission),
+    )
+
+
+def _figure(figure: Figure, identity: str) -> str:
+    return figure.to_html(include_plotlyjs=False, full_html=False, div_id=identity, config={"displaylogo": False})
+
+
+def _lamp(light: Light) -> str:
+    return f'<span class="lamp" style="background:{_LIGHT_COLORS[light]}" title="{light.value}"></span>'
+
+
+def _errors(mission: Mission) -> str:
+    if not mission.errors:
+        return ""
+    rows = [
+        (escape(name.replace("_", " ")), *(f"{error[key]:.2f}" for key in ("mean", "sd", "max")))
+        for name, error in mission.errors.items()
+    ]
+    return "<h2>Distance from the truth [m]</h2>" + _table(("path", "mean", "sd", "max"), rows)
+
+
+def _calibration(mission: Mission) -> str:
+    if not mission.calibration:
+        return "<p>Nothing was calibrated.</p>"
+    rows = [
+        (escape(name.replace("_", " ")), f"{value:+.4f}", f"{deviation:.4f}")
+        for name, (value, deviation) in mission.calibration.items()
+    ]
+    return _table(("quantity", "found", "standard deviation"), rows)
+
+
+def _rejected(mission: Mission) -> str:
+    rows = [(f"{scan.time - mission.start:.0f}", escape(scan.rejection)) for scan in mission.scans if scan.rejection]
+    return _table(("time [s]", "why"), rows) if rows else "<p>No scan was rejected.</p>"
+
+
+def _mapping(head: Sequence[str], values: Mapping[str, object]) -> str:
+    return _table(head, [(escape(name), escape(str(value))) for name, value in values.items()])
+
+
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+    """Return a table of cells that are HTML already."""
+    titles = "".join(f"<th>{escape(title)}</th>" for title in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
+    return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>"

@@ -1,0 +1,1 @@
+"""Beams of a recording, from bags and from the logs of sonars' makers."""

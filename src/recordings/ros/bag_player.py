@@ -1,0 +1,122 @@
+"""Plays a bag with a clock that never stops before its end, however slow bag, machine and listeners are."""
+
+import threading
+from argparse import Namespace
+from dataclasses import dataclass
+from typing import Any, Dict, List, Sequence
+
+import genpy
+import rosbag
+import rospy
+from rosgraph_msgs.msg import Clock
+
+from node_support import topics
+from node_support.pace import Pace
+from node_support.ros.node import StartError, guarded, make_health
+from recordings.ros.upright import turn_up
+
+_CLOCK_PERIOD = 0.01  # s of wall time: as rosbag play does
+_WAIT_STEP = 0.05  # s: soon enough for a person
+_LAST_MESSAGES_LEAVE = 0.5  # s: rospy sends from a queue, which is lost when the process ends
+_QUEUE_SIZE = 1000
+
+
+@dataclass(frozen=True)
+class Played:
+    """One message of a bag: when it was recorded [s], where it is published, and itself."""
+
+    time: float
+    topic: str
+    message: Any
+
+
+class BagPlayer:
+    """Publishes the messages of a bag and /clock at their pace, then ends the node.
+
+    `rosbag play` publishes /clock only while it waits for the next message. It reads every message when it is due, and
+    where topics lie in chunks of their own it unpacks a chunk each time: with three such topics it fell behind at eight
+    times real time, and /clock stood still from then on. This player reads the bag first, one topic after the other.
+    """
+
+    def __init__(self, options: Namespace) -> None:
+        """Raises StartError for a bag that cannot be played."""
+        self._options = options
+        self._health = make_health("play_bag")
+        self.healths = [self._health]
+        self._messages = read_messages(options)
+        self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=10)
+        self._publishers = self._advertised()
+        self._ended = threading.Event()
+        rospy.on_shutdown(self._ended.set)
+        threading.Thread(target=guarded(self._health, self._play), daemon=True).start()
+
+    def _advertised(self) -> Dict[str, rospy.Publisher]:
+        kinds = {played.topic: type(played.message) for played in self._messages}
+        return {
+            topic: rospy.Publisher(topic, kind, queue_size=_QUEUE_SIZE, latch=topic == topics.STATIC_TRANSFORMS)
+            for topic, kind in kinds.items()
+        }
+
+    def _play(self) -> None:
+        self._wait_for_subscribers()
+        start, rate = self._messages[0].time, self._options.rate
+        pace, ticks = Pace(rate, self._ended.wait), 0
+        for played in self._messages:
+            while not self._ended.is_set() and start + ticks * _CLOCK_PERIOD * rate <= played.time:
+                self._tick(pace, ticks * _CLOCK_PERIOD * rate)
+                ticks += 1
+            pace.wait_for(played.time - start)
+            if self._ended.is_set():
+                return
+            self._publishers[played.topic].publish(played.message)
+            self._health.count("messages")
+        self._ended.wait(_LAST_MESSAGES_LEAVE)
+        rospy.signal_shutdown("the bag has ended")
+
+    def _tick(self, pace: Pace, since_start: float) -> None:
+        lost = pace.lost
+        pace.wait_for(since_start)
+        if pace.lost > lost:
+            detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with rate {self._options.rate:g}"
+            self._health.problem("delays", detail)
+        self._clock.publish(Clock(genpy.Time.from_sec(self._messages[0].time + since_start)))
+
+    def _wait_for_subscribers(self) -> None:
+        """Keep the first messages from being played to nobody."""
+        while not self._ended.wait(_WAIT_STEP):
+            missing = [topic for topic, publisher in self._publishers.items() if not publisher.get_num_connections()]
+            self._health.show("topics without subscriber", " ".join(missing))
+            if not missing:
+                return
+
+
+def read_messages(options: Namespace) -> List[Played]:
+    """Return the messages of a bag in the order in which they were recorded; raises StartError."""
+    try:
+        with rosbag.Bag(str(options.bag)) as bag:
+            found = bag.get_type_and_topic_info().topics
+            chosen = [topic for topic in found if not options.topics or topic in options.topics]
+            played = [one for topic in chosen for one in _messages(bag, topic)]
+    except rosbag.ROSBagUnindexedException:
+        raise StartError(f"{options.bag}: not indexed, the recording was cut off; run: rosbag reindex") from None
+    except OSError as error:
+        raise StartError(f"{options.bag}: {error.strerror or error}") from None
+    except (rosbag.ROSBagException, EOFError, ValueError) as error:
+        raise StartError(f"{options.bag}: no bag, or a broken one: {error}") from None
+    if not played:
+        raise StartError(f"{options.bag}: no message on {' '.join(options.topics or ['any topic'])}")
+    if options.ned:
+        _turn_all_up(played, options)
+    return sorted(played, key=lambda one: one.time)
+
+
+def _messages(bag: rosbag.Bag, topic: str) -> List[Played]:
+    # One topic at a time: rosbag keeps one decompressed chunk, and topics often lie in chunks of their own.
+    return [Played(time.to_sec(), topic, message) for _, message, time in bag.read_messages(topics=[topic])]
+
+
+def _turn_all_up(played: Sequence[Played], options: Namespace) -> None:
+    turned = [turn_up(one.message, options.odom_frame, options.base_frame) for one in played]
+    if not any(turned):
+        link = f"{options.odom_frame} -> {options.base_frame}"
+        raise StartError(f"{options.bag}: --ned turns the pose {link}, which is neither in tf nor in an Odometry")

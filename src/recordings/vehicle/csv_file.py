@@ -1,0 +1,94 @@
+"""A table of the vehicle's motion, one row per moment."""
+
+import csv
+from pathlib import Path
+from typing import Dict, List
+
+import numpy as np
+
+from recordings.errors import RecordingError
+from recordings.transforms.frame_tree import FrameTree
+from recordings.transforms.pose_track import PoseTrack
+from recordings.vehicle.motion import Motion, MotionNames, MotionSource, linked
+
+COLUMNS = {
+    "time": "s, of the same clock as the beams",
+    "x": "m, east or any other fixed direction",
+    "y": "m, to the left of x",
+    "z": "m, up",
+    "yaw": "rad, counter-clockwise from x",
+    "yaw_deg": "degrees, counter-clockwise from x",
+    "heading_deg": "degrees, clockwise from north, as a compass counts",
+    "depth": "m, down",
+}
+"""Columns that are read, by the names in the first line; others are left out."""
+
+_SUFFIXES = (".csv", ".txt", ".tsv")
+_HEADINGS = ("yaw", "yaw_deg", "heading_deg")
+
+
+def is_table(path: Path) -> bool:
+    """Return whether a file is a table, by its name."""
+    return path.suffix.lower() in _SUFFIXES
+
+
+def motion_of_csv(path: Path, names: MotionNames) -> Motion:
+    """Return the motion in a table with columns of `COLUMNS`: `time`, one of the headings, and x and y if known.
+
+    Raises RecordingError, with path and line, for a table that cannot be used.
+    """
+    table = _read(path)
+    headings = [name for name in _HEADINGS if name in table]
+    if "time" not in table or len(headings) != 1 or ("x" in table) != ("y" in table):
+        raise RecordingError(
+            f"{path}: columns {', '.join(table) or 'unknown'}; needs time, one of {', '.join(_HEADINGS)}, and x and y "
+            "or none of both"
+        )
+    times = table["time"]
+    zeros = np.zeros(len(times))
+    heights = table.get("z", -table["depth"] if "depth" in table else zeros)
+    places = np.column_stack([table.get("x", zeros), table.get("y", zeros), heights])
+    yaws = _yaws(headings[0], table[headings[0]])
+    turns = np.column_stack([zeros, zeros, np.sin(yaws / 2.0), np.cos(yaws / 2.0)])
+    track = PoseTrack.sorted_from(np.round(times * 1e9).astype(np.int64), places, turns)
+    source = MotionSource.POSES if "x" in table else MotionSource.HEADING
+    return Motion(linked(FrameTree(), names, track), source, [f"{source.value} from {path.name}: {len(track)} rows"])
+
+
+def _yaws(column: str, values: np.ndarray) -> np.ndarray:
+    if column == "heading_deg":
+        return np.pi / 2.0 - np.radians(values)
+    return np.radians(values) if column == "yaw_deg" else values
+
+
+def _read(path: Path) -> Dict[str, np.ndarray]:
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            rows = list(csv.reader(file, delimiter=_delimiter(file.readline(), file)))
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{path}: no table: {error}") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from None
+    names = [name.strip().lower() for name in rows[0]] if rows else []
+    kept = [(index, name) for index, name in enumerate(names) if name in COLUMNS]
+    lines = [(number, row) for number, row in enumerate(rows[1:], start=2) if any(row)]
+    if len(lines) < 2:
+        raise RecordingError(f"{path}: {len(lines)} rows; needs at least 2")
+    values = np.array([[_number(path, line, row, index, name) for index, name in kept] for line, row in lines])
+    return {name: values[:, column] for column, (_, name) in enumerate(kept)}
+
+
+def _delimiter(first_line: str, file: object) -> str:
+    file.seek(0)
+    return max(",;\t", key=first_line.count)
+
+
+def _number(path: Path, line: int, row: List[str], index: int, name: str) -> float:
+    text = row[index].strip() if index < len(row) else ""
+    try:
+        value = float(text)
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise RecordingError(f"{path}, line {line}: {name} = {text!r}, must be a number")
+    return value

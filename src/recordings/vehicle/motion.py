@@ -1,0 +1,134 @@
+"""Where the vehicle was, as far as a recording tells: poses, a heading, or nothing."""
+
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import List, Optional
+
+import numpy as np
+
+from recordings.bags.bag import Bag
+from recordings.errors import RecordingError
+from recordings.messages.poses import frame_name, frame_tree, heading_track, pose_track
+from recordings.messages.roles import Role, with_role
+from recordings.transforms.frame_tree import FrameTree
+from recordings.transforms.pose_track import PoseTrack
+
+_NO_SHIFT, _NO_TURN = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
+
+
+class MotionSource(Enum):
+    """What is known of the motion."""
+
+    POSES = "poses"
+    HEADING = "heading only"
+    STANDING = "declared as standing"
+
+
+@dataclass(frozen=True)
+class MotionNames:
+    """How the motion is called in a recording.
+
+    odometry: topic with poses, to be used instead of tf; None: tf, and where it does not link the frames the likeliest
+    topic. is_standing: the vehicle did not move. z_is_down: poses count x north, y east, z down; they are turned into
+    x, y left, z up (REP-103).
+    """
+
+    odom_frame: str = "odom"
+    base_frame: str = "base_link"
+    odometry: Optional[str] = None
+    is_standing: bool = False
+    z_is_down: bool = False
+
+
+@dataclass(frozen=True)
+class Motion:
+    """tree: links `odom_frame`, `base_frame` and the frames of the recording. notes: what was assumed, as sentences."""
+
+    tree: FrameTree
+    source: MotionSource
+    notes: List[str] = field(default_factory=list)
+
+
+def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> Motion:
+    """Return the motion that a bag tells; its topic `truth` is not used. Raises RecordingError where it tells none."""
+    tree = frame_tree(bag)
+    if names.is_standing:
+        return standing(tree, names)
+    if names.odometry is None and tree.way(names.odom_frame, names.base_frame) is not None:
+        return Motion(_upward(tree, names), MotionSource.POSES)
+    topic = names.odometry or _likeliest(bag, Role.ODOMETRY, truth)
+    if topic is not None:
+        return _of_poses(bag, tree, topic, names)
+    topic = _likeliest(bag, Role.HEADING, truth)
+    if topic is not None:
+        return _of_heading(bag, tree, topic, names)
+    raise RecordingError(_nothing(bag, tree, names))
+
+
+def standing(tree: FrameTree, names: MotionNames) -> Motion:
+    """Return the motion of a vehicle that did not move."""
+    return Motion(linked(tree, names, PoseTrack.fixed(_NO_SHIFT, _NO_TURN)), MotionSource.STANDING)
+
+
+def linked(tree: FrameTree, names: MotionNames, track: PoseTrack) -> FrameTree:
+    """Return a tree whose vehicle moves as `track`, poses of the base frame in odom, which may have z down."""
+    return _linked(tree, names, track.turned_up() if names.z_is_down else track)
+
+
+def _linked(tree: FrameTree, names: MotionNames, track: PoseTrack) -> FrameTree:
+    """Return the tree with the track as the only way from odom to the base frame, and one without other odometry."""
+    base_links = {link: one for link, one in tree.tracks.items() if link[1] != names.base_frame}
+    return FrameTree(base_links).with_track(names.odom_frame, names.base_frame, track)
+
+
+def _upward(tree: FrameTree, names: MotionNames) -> FrameTree:
+    link = (names.odom_frame, names.base_frame)
+    if names.z_is_down and link in tree.tracks:
+        return tree.with_track(*link, tree.tracks[link].turned_up())
+    return tree
+
+
+def _of_poses(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
+    if topic not in bag.topics:
+        raise RecordingError(f"no topic {topic}; there are {', '.join(sorted(bag.topics)) or 'none at all'}")
+    messages = [message for _, message in bag.messages(topic)]
+    try:
+        track = pose_track(messages)
+    except AttributeError:
+        kind = bag.topics[topic].type
+        raise RecordingError(
+            f"{topic} holds {kind}, must be Odometry, PoseStamped or PoseWithCovarianceStamped"
+        ) from None
+    if not len(track):
+        raise RecordingError(f"none of the {len(messages)} messages of {topic} holds a pose with a rotation")
+    tree = linked(tree, names, track)
+    child = frame_name(getattr(messages[0], "child_frame_id", ""))
+    if child and child != names.base_frame and names.base_frame not in frame_tree(bag).frames:
+        tree = tree.with_track(names.base_frame, child, PoseTrack.fixed(_NO_SHIFT, _NO_TURN))
+    said = "" if names.odometry else f", because tf does not link {names.odom_frame} and {names.base_frame}"
+    return Motion(tree, MotionSource.POSES, [f"odometry from {topic} ({bag.topics[topic].type}){said}"])
+
+
+def _of_heading(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
+    try:
+        track = heading_track(message for _, message in bag.messages(topic))
+    except AttributeError:
+        track = None
+    if track is None or not len(track):
+        raise RecordingError(f"{_nothing(bag, tree, names)}; {topic} holds no orientation either")
+    note = f"no odometry: heading from {topic} ({bag.topics[topic].type}), the position is unknown"
+    return Motion(linked(tree, names, track), MotionSource.HEADING, [note])
+
+
+def _likeliest(bag: Bag, role: Role, truth: Optional[str]) -> Optional[str]:
+    return next((topic.name for topic in with_role(bag.topics, role) if topic.name != truth), None)
+
+
+def _nothing(bag: Bag, tree: FrameTree, names: MotionNames) -> str:
+    topics = ", ".join(sorted(bag.topics)) or "none at all"
+    reason = tree.why_not(names.odom_frame, names.base_frame, np.zeros(0, dtype=np.int64))
+    tf = f"tf does not tell: {reason}" if tree.tracks else "no /tf"
+    return (
+        f"{tf}; and no topic holds odometry (Odometry, PoseStamped), so nothing tells where the beams were taken; "
+        f"there are {topics}; if the vehicle stood still, give --standing"
+    )

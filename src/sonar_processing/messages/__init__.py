@@ -1,0 +1,1 @@
+"""Messages of sonars, by type: plain attribute objects in, beams out."""

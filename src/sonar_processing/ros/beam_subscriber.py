@@ -1,0 +1,82 @@
+"""Subscribes to beams of any known message type."""
+
+from typing import Callable
+
+import rospy
+
+from node_support import topics
+from node_support.health import Health
+from node_support.ros.node import guarded
+from sonar_processing.beams.beam import Beam
+from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.messages.reader import BeamReader, Reading, beam_type
+from sonar_processing.messages.type_table import BEAM_TYPES, LASER_SCAN
+from sonar_processing.ros.message_classes import MessageClasses
+
+_BUFFER_BYTES = 2**20  # hundreds of beams: rospy reads a whole buffer before it drops any
+_QUEUE = 200  # more than the 120 that wait for tf
+
+
+class BeamSubscriber:
+    """Calls back with every beam, in whichever of the known types it comes."""
+
+    def __init__(
+        self,
+        take: Callable[[Beam], None],
+        parameters: BeamMessageParameters,
+        health: Health,
+        on_new_unit: Callable[[], None] = lambda: None,
+        on_message: Callable[[int], None] = lambda _: None,
+    ) -> None:
+        """`on_new_unit` is called when the angles of the beams so far turn out to be in another unit, `on_message` with
+        the number of beams of a message before they come.
+        """
+        self._take = guarded(health, take)
+        self._health = health
+        self._on_new_unit, self._on_message = on_new_unit, on_message
+        self._reader = BeamReader(parameters)
+        self._classes = MessageClasses()
+        self._subscriber = rospy.Subscriber(
+            topics.BEAMS,
+            rospy.AnyMsg,
+            guarded(health, self._take_message),
+            queue_size=_QUEUE,
+            buff_size=_BUFFER_BYTES,
+            tcp_nodelay=True,
+        )
+
+    def unregister(self) -> None:
+        """Stop to listen."""
+        self._subscriber.unregister()
+
+    def _take_message(self, message: rospy.AnyMsg) -> None:
+        self._health.count("messages in")
+        kind = message._connection_header["type"]
+        beam_type(kind)
+        reading = self._reader.read(kind, self._classes.deserialised(message))
+        self._tell(kind, reading)
+        self._health.count("beams in", len(reading.beams))
+        self._on_message(len(reading.beams))
+        for beam in reading.beams:
+            self._take(beam)
+
+    def _tell(self, kind: str, reading: Reading) -> None:
+        for note in reading.notes:
+            rospy.logwarn("%s: %s", self._health.name, note)
+        if kind == LASER_SCAN and reading.notes:
+            rospy.logwarn("%s: %s", self._health.name, _topics_instead())
+        if reading.refused:
+            self._health.problem("beams refused", f"{reading.refused} rays of a {kind}", reading.refused)
+        if reading.unit_changed:
+            self._health.problem("changes of the unit of angles", "the unfinished scan is forgotten; set angle_unit")
+            self._on_new_unit()
+
+
+def _topics_instead() -> str:
+    """Return which topics hold the beams that a LaserScan was made of."""
+    found = [
+        f"{name} ({kind})" for name, kind in rospy.get_published_topics() if kind in BEAM_TYPES and kind != LASER_SCAN
+    ]
+    if found:
+        return f"take the beams themselves instead of the LaserScan: remap {topics.BEAMS} to {' or '.join(found)}"
+    return "let the driver publish its beams, and take them instead of the LaserScan"

@@ -1,0 +1,132 @@
+#!/usr/bin/env python3
+"""Beams of other packages' types, published on sonar/raw, become scans; what is no beam is counted."""
+
+import sys
+import time
+import unittest
+from typing import Any
+
+import numpy as np
+import rospy
+import rostest
+from benchmarks.foreign_messages import message_classes, sane_message
+from benchmarks.fuzz_beams import Fuzzer
+from graph import Diagnostics, Inbox, rows, wait_for_publisher_links
+from rosgraph_msgs.msg import Log
+from sensor_msgs.msg import LaserScan, PointCloud2
+from std_msgs.msg import String
+
+STEPS = 200
+RAYS = 400
+DAMAGED = 500
+WALL = 12.0
+ECHO, MICRON = "ping360_sonar/SonarEcho", "micron_driver_ros/ScanLine"
+
+
+class ForeignBeams(unittest.TestCase):
+    """One node; its sonar is known to no tf, and mounted by parameters."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Listen to all that the node makes of turns."""
+        cls.diagnostics, cls.log = Diagnostics(), Inbox("/rosout", Log)
+        cls.turns = Inbox("/sonar/scan/turn", PointCloud2)
+        cls.scans = Inbox("/sonar/scan/sonarCloud/cloud", PointCloud2)
+        cls.lasers = Inbox("/sonar/scan/laserScan", LaserScan)
+        for inbox in (cls.turns, cls.scans, cls.lasers, cls.log):
+            inbox.wait_for_link()
+
+    def publish(self, kind: type, messages: Any) -> None:
+        """Publish messages of one class on sonar/raw, and give the topic back for another."""
+        publisher = rospy.Publisher("/sonar/raw", kind, queue_size=1000)
+        wait_for_publisher_links(publisher, 1)
+        for message in messages:
+            publisher.publish(message)
+            time.sleep(0.004)
+        publisher.unregister()
+
+    def publish_turns(self, kind: str, turns: int) -> None:
+        """Publish whole turns of a head in front of a round wall; more than a turn, so that one is complete."""
+        self.publish(message_classes(kind)[kind], (sane_message(kind, step) for step in range(turns * STEPS + 10)))
+
+    def wait_for_a_turn(self, kind: str) -> None:
+        """Publish turns of a kind until one has come through, and see that it is the wall."""
+        before = len(self.turns.messages)
+        self.publish_turns(kind, 3)
+        cloud = rows(self.turns.wait_for(lambda _: len(self.turns.messages) > before))
+        wall = np.linalg.norm(cloud[cloud[:, 3] == 120][:, :2], axis=1)
+        self.assertGreater(wall.size, STEPS)
+        np.testing.assert_allclose(wall, WALL, atol=1.0)
+
+    def wait_for_log(self, text: str) -> None:
+        """Wait until the node has logged a line that contains `text`."""
+        self.log.wait_for(lambda _: any(text in entry.msg for entry in self.log.messages))
+
+    def test_1_a_ping_360_that_sends_gradians(self) -> None:
+        """Its frame is mounted by the parameters, and the unit of its angles is told by their values."""
+        self.wait_for_a_turn(ECHO)
+        self.wait_for_log("gradians, told by their values")
+        self.wait_for_log("it is mounted in odom at 1 2 3 m")
+
+    def test_2_a_mount_by_parameters_places_the_scans(self) -> None:
+        """They lie around the mounted sonar."""
+        cloud = rows(self.scans.wait_for(lambda _: True))
+        wall = cloud[cloud[:, 3] == 120]
+        np.testing.assert_allclose(wall[:, :3].mean(axis=0), [1.0, 2.0, 3.0], atol=0.3)
+
+    def test_3_a_micron_on_the_same_topic(self) -> None:
+        """The type is that of each connection."""
+        self.wait_for_a_turn(MICRON)
+
+    def test_4_a_laser_scan_is_taken_with_a_warning_that_names_a_better_topic(self) -> None:
+        """The driver publishes its beams, too."""
+        kind = message_classes(ECHO)[ECHO]
+        other = rospy.Publisher("/ping360/data", kind, queue_size=1)
+        scan = LaserScan(angle_min=-3.14, angle_increment=6.28 / RAYS, range_max=50.0, ranges=[WALL] * RAYS)
+        scan.header.frame_id, scan.header.stamp = "sonar", rospy.Time.now()
+        before = int(self.diagnostics.values("sonar_to_cloud")["beams placed"])
+        self.publish(LaserScan, [scan])
+        self.diagnostics.wait_for("sonar_to_cloud", "beams placed", before + RAYS)
+        self.wait_for_log("/ping360/data (ping360_sonar/SonarEcho)")
+        other.unregister()
+
+    def test_5_what_is_no_beam_is_counted(self) -> None:
+        """The node lives."""
+        self.publish(String, [String("hello")] * 3)
+        self.diagnostics.wait_for("sonar_to_cloud", "messages of unknown types", 3)
+        self.wait_for_a_turn(MICRON)
+        self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
+
+    def test_6_damaged_messages_end_nothing(self) -> None:
+        """Each is counted, and the node goes on."""
+        before = int(self.diagnostics.values("sonar_to_cloud")["messages in"])
+        fuzzer, sent = Fuzzer(seed=3), message_classes(ECHO)[ECHO]
+
+        class Damaged(sent):
+            """What a driver sends whose memory is corrupt."""
+
+            def serialize(self, buff: Any) -> None:
+                buff.write(self.damaged)
+
+        def damaged(number: int) -> Damaged:
+            message = Damaged()
+            message.damaged = fuzzer.message(ECHO, number)._buff
+            return message
+
+        self.publish(Damaged, (damaged(number) for number in range(DAMAGED)))
+        self.diagnostics.wait_for("sonar_to_cloud", "messages in", before + DAMAGED)
+        self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
+        self.wait_for_a_turn(ECHO)
+
+    def test_7_laser_scans_come_of_every_turn(self) -> None:
+        """One stamp, no time between the rays, angles that increase."""
+        scan = self.lasers.messages[0]
+        self.assertEqual(scan.time_increment, 0.0)
+        self.assertGreater(scan.angle_increment, 0.0)
+        ranges = np.array(scan.ranges)
+        np.testing.assert_allclose(ranges[np.isfinite(ranges)], WALL, atol=1.0)
+
+
+if __name__ == "__main__":
+    rospy.init_node("foreign_beams")
+    rostest.rosrun("underwater_map_construction", "foreign_beams", ForeignBeams, sys.argv)

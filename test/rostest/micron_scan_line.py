@@ -1,0 +1,51 @@
+#!/usr/bin/env python3
+"""A real Micron of another team, in its own message type and without any tf: every beam arrives in the map."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from graph import Diagnostics, Inbox, recording, rows
+from sensor_msgs.msg import PointCloud2
+
+BEAMS = 2028
+TURNS = 10
+
+
+class MicronScanLine(unittest.TestCase):
+    """The launch file plays the recording once."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Wait until all beams are placed."""
+        recording("micron_scanline.bag")
+        cls.diagnostics = Diagnostics()
+        cls.map = Inbox("/MLSM/cloud", PointCloud2)
+        cls.turns = Inbox("/sonar/scan/polar/cloud", PointCloud2)
+        cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", BEAMS, timeout=60.0)
+
+    def test_no_beam_is_lost(self) -> None:
+        """All are read, placed by the mounting, and none is refused."""
+        values = self.diagnostics.values("sonar_to_cloud")
+        self.assertEqual((values["beams in"], values["beams placed"]), (str(BEAMS), str(BEAMS)))
+        self.assertFalse({"beams refused", "beams without transform", "internal errors"} & set(values))
+
+    def test_every_turn_is_a_scan(self) -> None:
+        """The head turned ten times."""
+        self.turns.wait_for(lambda _: len(self.turns.messages) >= TURNS)
+        self.assertEqual({cloud.height for cloud in self.turns.messages[1:]}, {200})
+
+    def test_the_map_holds_the_wall(self) -> None:
+        """Most blocks lie where the loudest echoes of the recording are, 3 to 10 m from the head."""
+        blocks = rows(self.map.wait_for(lambda cloud: cloud.width > 100))
+        distances = np.linalg.norm(blocks[:, :2], axis=1)
+        self.assertLess(np.percentile(distances, 5), 8.0)
+        self.assertGreater(np.percentile(distances, 50), 3.0)
+        self.assertLess(distances.max(), 10.3)
+
+
+if __name__ == "__main__":
+    rospy.init_node("micron_scan_line")
+    rostest.rosrun("underwater_map_construction", "micron_scan_line", MicronScanLine, sys.argv)

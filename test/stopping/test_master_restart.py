@@ -1,0 +1,102 @@
+"""A node whose master was restarted says so and ends, so that respawn helps; one whose master is away runs on."""
+
+import os
+import signal
+import subprocess
+import time
+import xmlrpc.client
+
+import pytest
+from stopwatch import ROOT, START_TIMEOUT, STOP_TIMEOUT, free_port
+
+from node_support.ros.master_watch import PERIOD
+
+NODES = ("thresholder", "mapping", "imagenex_852_driver", "gazebo_sonar")
+# Long enough for a node to ask the absent master more often than a new master has to be asked.
+AWAY = 4.0 * PERIOD
+
+
+class Master:
+    """A master that can be stopped and started again at its address."""
+
+    def __init__(self, logs):
+        self._port = free_port()
+        self.environment = {
+            **os.environ,
+            "ROS_MASTER_URI": f"http://localhost:{self._port}",
+            "ROS_LOG_DIR": str(logs),
+        }
+        self.start()
+
+    def start(self):
+        self.process = subprocess.Popen(
+            ["rosmaster", "--core", "-p", str(self._port)],
+            env=self.environment,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+        )
+
+    def stop(self):
+        self.process.kill()
+        self.process.wait()
+
+    def publishes_diagnostics(self, node):
+        try:
+            _, _, (publishers, _, _) = xmlrpc.client.ServerProxy(self.environment["ROS_MASTER_URI"]).getSystemState("/")
+        except OSError:
+            return False
+        return f"/{node}" in dict(publishers).get("/diagnostics", [])
+
+
+@pytest.fixture
+def master(tmp_path):
+    running = Master(tmp_path)
+    yield running
+    running.stop()
+
+
+@pytest.fixture
+def nodes(master):
+    """Return the processes of nodes that have begun to publish diagnostics, by name."""
+    started = {node: _started(node, master) for node in NODES}
+    try:
+        _wait_for_diagnostics(master, started)
+        yield started
+    finally:
+        for process in started.values():
+            process.kill()
+            process.communicate()
+
+
+def _started(node, master):
+    command = ["python3", str(ROOT / "nodes" / node)]
+    return subprocess.Popen(
+        command, env=master.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+    )
+
+
+def _wait_for_diagnostics(master, started):
+    deadline = time.monotonic() + START_TIMEOUT
+    while not all(master.publishes_diagnostics(node) for node in NODES):
+        states = {node: process.poll() for node, process in started.items()}
+        assert not any(states.values()), states
+        assert time.monotonic() < deadline, states
+        time.sleep(0.1)
+
+
+def test_nodes_outlive_a_master_that_is_away_and_end_when_a_new_one_does_not_know_them(master, nodes):
+    master.process.send_signal(signal.SIGSTOP)
+    time.sleep(AWAY)
+    master.process.send_signal(signal.SIGCONT)
+    time.sleep(AWAY)
+    assert {node: process.poll() for node, process in nodes.items()} == dict.fromkeys(NODES)
+
+    master.stop()
+    time.sleep(AWAY)
+    assert {node: process.poll() for node, process in nodes.items()} == dict.fromkeys(NODES)
+
+    master.start()
+    outputs = {node: process.communicate(timeout=STOP_TIMEOUT)[0] for node, process in nodes.items()}
+    assert {node: process.returncode for node, process in nodes.items()} == dict.fromkeys(NODES, 1)
+    told = {node: output.count("the ROS master was restarted") for node, output in outputs.items()}
+    assert told == dict.fromkeys(NODES, 1), outputs

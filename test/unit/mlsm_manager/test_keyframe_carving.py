@@ -1,0 +1,140 @@
+"""Keyframes carve free space, and take it back where they did not see it from."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+RESOLUTION, LIMIT, NEVER = 0.5, 1000.0, -np.inf
+CARVER = Carver(CarvingParameters(crossings_least=5, crossings_per_point=1.0), np.radians(2.5))
+ORIGIN = np.array([0.25, 0.25])
+
+
+@dataclass(frozen=True)
+class MovedBy:
+    """Places clouds `shift` m along y."""
+
+    shift: float
+
+    def points(self, cloud):
+        return cloud.points + np.array([0.0, self.shift, 0.0, 0.0])
+
+    def origins(self, cloud):
+        return np.tile(ORIGIN + np.array([0.0, self.shift]), (len(cloud), 1))
+
+
+def cloud(number, *echoes):
+    """Return keyframe `number`, which ends at that second, with a beam for each of the echoes (x, y) [m]."""
+    points = np.array([[x, y, -2.0, 50.0] for x, y in echoes]).reshape(-1, 4)
+    return TimedPoints(points, number + 0.001 * np.arange(len(points)), float(number))
+
+
+def carved_map(*clouds, place=None):
+    made = KeyframeMap(RESOLUTION, LIMIT, carver=CARVER)
+    for keyframe in clouds:
+        made.add(keyframe)
+        if place is not None:
+            made.draw(place, NEVER)
+    return made
+
+
+def cells(blocks):
+    return sorted(map(tuple, blocks.cells.tolist()))
+
+
+ECHO = st.tuples(st.integers(-8, 8).map(float), st.integers(-8, 8).map(lambda y: y + 0.3))
+
+
+@settings(max_examples=40, deadline=None)
+@given(st.lists(st.lists(ECHO, max_size=12), min_size=1, max_size=8), st.integers(-4, 4), st.integers(-4, 4))
+def test_what_is_settled_is_as_if_every_keyframe_had_carved_once_from_its_last_place(frames, early, last):
+    clouds = [cloud(number, *echoes) for number, echoes in enumerate(frames)]
+    shown = carved_map(*clouds, place=MovedBy(0.7 * early))
+    place = MovedBy(0.7 * last)
+    shown.settle(place)
+    occupied, free = MultiLevelSurfaceMap(RESOLUTION, LIMIT), MultiLevelSurfaceMap(RESOLUTION, LIMIT)
+    for keyframe in clouds:
+        points = place.points(keyframe)
+        occupied.insert(points)
+        beams = FirstEchoes.of_level(points, keyframe.times, place.origins(keyframe))
+        CARVER.carve(occupied, free, beams, points)
+    assert cells(shown.map.blocks) == cells(occupied.blocks)
+    assert cells(shown.free.blocks) == cells(free.blocks)
+    assert sorted(shown.map.blocks.crossed) == sorted(occupied.blocks.crossed)
+    assert sorted(shown.free.blocks.count) == sorted(free.blocks.count)
+
+
+def test_free_space_moves_with_the_keyframe_that_saw_it():
+    shown = carved_map(cloud(1, (10.25, 0.25)), place=MovedBy(0.0))
+    assert [cell for cell in cells(shown.free.blocks) if cell[1] == 0] == [(x, 0) for x in range(19)]
+    shown.draw(MovedBy(5.0), NEVER)
+    assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
+
+
+def test_many_keyframes_that_move_at_once_are_followed_a_few_with_each_scan():
+    shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)), place=MovedBy(0.0))
+    shown.draw(MovedBy(5.0), NEVER)
+    assert {y for _, y in cells(shown.free.blocks)} >= {0, 10}
+    for _ in range(2):
+        shown.draw(MovedBy(5.0), NEVER)
+    assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
+
+
+def crossed_wall(crossings):
+    """Return a map with a settled block at x = 5 m and keyframes that look through it along y = 0."""
+    through = [cloud(number, (20.25, 0.25)) for number in range(1, crossings + 1)]
+    shown = KeyframeMap(RESOLUTION, LIMIT, carver=CARVER)
+    shown.insert(np.array([[5.25, 0.25, -2.0, 50.0]]))
+    for keyframe in through:
+        shown.add(keyframe)
+        shown.draw(MovedBy(0.0), NEVER)
+    return shown
+
+
+def test_a_block_that_moving_keyframes_look_through_goes():
+    assert (10, 0) in cells(crossed_wall(6).map.blocks)
+    assert (10, 0) not in cells(crossed_wall(7).map.blocks)
+
+
+def test_it_is_there_again_when_they_turn_out_to_have_looked_beside_it():
+    shown = crossed_wall(7)
+    for _ in range(4):
+        shown.draw(MovedBy(5.0), NEVER)
+    assert (10, 0) in cells(shown.map.blocks)
+
+
+def test_it_is_gone_for_ever_when_they_are_settled():
+    shown = crossed_wall(7)
+    carved = shown.draw(MovedBy(0.0), settled_until=np.inf).carved
+    assert carved.removed == 1
+    assert cells(shown.map.blocks) == [(40, 0)]
+
+
+def test_a_block_that_is_heard_again_stays():
+    shown = crossed_wall(6)
+    shown.add(cloud(7, (5.25, 0.25)))
+    for number in (8, 9):
+        shown.add(cloud(number, (20.25, 0.25)))
+        shown.draw(MovedBy(0.0), NEVER)
+    assert (10, 0) in cells(shown.map.blocks)
+
+
+def test_what_is_inserted_in_between_keeps_the_keyframes_in_the_map():
+    shown = carved_map(cloud(1, (10.25, 0.25)), place=MovedBy(0.0))
+    shown.insert_cloud(np.array([[0.25, 9.25, -2.0, 50.0]]), np.array([2.0]), ORIGIN[np.newaxis])
+    assert cells(shown.map.blocks) == [(0, 18), (20, 0)]
+    assert {(0, 9), (9, 0)} <= set(cells(shown.free.blocks))
+
+
+def test_nothing_is_carved_without_a_carver():
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    shown.add(cloud(1, (10.25, 0.25)))
+    assert shown.draw(MovedBy(0.0), np.inf).carved is None
+    assert len(shown.free.blocks) == 0

@@ -1,0 +1,15 @@
+"""Water in which only noise and bubbles are heard leads to no fix; a part of `benchmarks.open_water`."""
+
+import pytest
+from benchmarks.open_water import bubbles, outcome
+
+from mlsm_manager.localisation.joint_parameters import Estimator
+
+SCANS = 100
+
+
+@pytest.mark.parametrize("estimator", Estimator)
+def test_noise_and_bubbles_correct_nothing(estimator):
+    found = outcome(bubbles, estimator, SCANS, seed=2)
+    assert (found.scans, found.fixes) == (SCANS, 0)
+    assert found.farthest < 1e-6

@@ -1,0 +1,100 @@
+"""What stands in report.html."""
+
+import base64
+import json
+import re
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from made_missions import START, blocks, mission, verdict
+
+from mlsm_manager.report.lights import Light, light_of, light_of_run
+from mlsm_manager.report.slider_data import slider_json
+
+MOST_BYTES = 15e6
+
+
+@pytest.mark.parametrize(
+    ("value", "limit", "more_is_better", "light"),
+    [
+        (1.0, 4.0, False, Light.GREEN), (3.5, 4.0, False, Light.AMBER), (4.5, 4.0, False, Light.RED),
+        (1.0, 0.5, True, Light.GREEN), (0.55, 0.5, True, Light.AMBER), (0.2, 0.5, True, Light.RED),
+        (np.nan, 4.0, False, Light.GREY),
+    ],
+)  # fmt: skip
+def test_a_check_near_its_limit_is_amber_and_beyond_it_red(value, limit, more_is_better, light):
+    assert light_of(verdict(value, limit, more_is_better=more_is_better)) is light
+
+
+@given(st.lists(st.sampled_from(list(Light)), max_size=5))
+def test_a_run_is_as_good_as_its_worst_check(lights):
+    expected = next((one for one in (Light.RED, Light.AMBER, Light.GREEN) if one in lights), Light.GREY)
+    assert light_of_run(lights) is expected
+
+
+def test_the_slider_begins_with_the_first_scan_and_counts_from_the_start_of_the_run():
+    scans = json.loads(slider_json(mission()))["scans"]
+    assert [scan["time"] for scan in scans[:2]] == [14.0, 29.0]
+    assert scans[0]["vehicle"] == [pytest.approx(19.14, abs=0.01), pytest.approx(5.81, abs=0.01)]
+
+
+@settings(max_examples=20)
+@given(arrays(np.float64, (30, 2), elements=st.floats(-300.0, 300.0)))
+def test_points_behind_the_slider_are_within_a_centimetre_of_the_scan(points):
+    made = mission(scans=1)
+    record = made.scans[0]
+    made.scans[0] = type(record)(record.time, points, 30, 0)
+    told = json.loads(slider_json(made))
+    scan = told["scans"][0]
+    packed = np.frombuffer(base64.b64decode(scan["points"]), "<i2").reshape(-1, 2)
+    unpacked = packed * told["unit"] + np.array(scan["vehicle"])
+    np.testing.assert_allclose(unpacked, points, atol=0.011)
+
+
+class TestPage:
+    """What people read. Needs plotly."""
+
+    @pytest.fixture(scope="class")
+    def page_of(self):
+        return pytest.importorskip("mlsm_manager.report.page").report_page
+
+    def test_text_from_outside_is_escaped(self, page_of):
+        page = page_of(mission(rejections=["</script><b>"]))
+        assert "<title>&lt;mission &amp; run&gt;</title>" in page
+        assert "</script><b>" not in page
+
+    def test_a_failed_check_is_said_at_the_top(self, page_of):
+        assert "Do not rely on the marked stretches" in page_of(mission(verdicts=[verdict(1.0), verdict(5.0)]))
+
+    def test_a_run_without_checks_is_not_called_fine(self, page_of):
+        page = page_of(mission())
+        assert "Nothing was checked." in page
+        assert "All checks are fine." not in page
+
+    def test_rejected_scans_are_listed_with_the_reason(self, page_of):
+        assert "<td>14</td><td>too few points</td>" in page_of(mission(rejections=["too few points"]))
+
+    def test_distances_from_the_truth_are_told_where_there_is_one(self, page_of):
+        page = page_of(mission(errors={"dead_reckoning": {"mean": 6.29, "sd": 3.0, "max": 12.8}}))
+        assert "<td>dead reckoning</td><td>6.29</td><td>3.00</td><td>12.80</td>" in page
+
+    def test_the_page_loads_nothing_from_elsewhere(self, page_of):
+        """The library names addresses in its own text; no element of the page fetches one."""
+        head, _, rest = page_of(mission()).partition("<script>")
+        body = rest.partition("</script>\n</head>")[2]
+        assert body
+        assert not re.findall(r"(?:src|href)\s*=\s*[\"']?\s*(?!data:)\w+:", head + body)
+
+    def test_a_map_of_300000_blocks_stays_below_15_megabytes(self, page_of):
+        assert len(page_of(mission(block_count=300_000, scans=300)).encode()) < MOST_BYTES
+
+    def test_a_map_without_blocks_makes_a_page(self, page_of):
+        assert "Map in 3-D" in page_of(mission(block_count=0))
+
+
+def test_stamps_of_the_fixture_are_those_of_a_real_clock():
+    assert mission().start == START
+    assert len(blocks(10)) == 10

@@ -1,0 +1,227 @@
+"""Messages of several sonars become the same beams."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from sonar_messages import (
+    SECOND,
+    STAMP_NS,
+    header,
+    laser_scan_of,
+    micron_line_of,
+    ping_360_of,
+    scan_line_of,
+    sonar_echo_of,
+)
+
+from node_support.errors import RefusedInput
+from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.messages.reader import BeamReader
+from sonar_processing.messages.type_table import BEAM_TYPES, LASER_SCAN, OWN
+
+ECHO, PING_360 = "ping360_sonar/SonarEcho", "bluerobotics_sonar_msgs/SonarPing360"
+MICRON = "micron_driver_ros/ScanLine"
+MADE = {
+    OWN: scan_line_of,
+    ECHO: sonar_echo_of,
+    PING_360: ping_360_of,
+    MICRON: micron_line_of,
+    LASER_SCAN: laser_scan_of,
+}
+SONARS_PAGE = (Path(__file__).resolve().parents[3] / "docs/sonars.md").read_text()
+NEEDED = {
+    OWN: "header angle intensities maxrange_meters range_resolution sensorAngle",
+    ECHO: "header angle intensities range number_of_samples speed_of_sound",
+    PING_360: "header angle profile_data range",
+    MICRON: "header angle bin_distance_step bins",
+    LASER_SCAN: "header angle_min angle_increment time_increment range_max ranges",
+}
+
+
+def reading(kind, message, **parameters):
+    return BeamReader(BeamMessageParameters(**parameters)).read(kind, message)
+
+
+def beam(kind, message, **parameters):
+    return reading(kind, message, **parameters).beams[0]
+
+
+def echoes_at(angles, **parameters):
+    """Return what is read of one SonarEcho after the other."""
+    reader = BeamReader(BeamMessageParameters(**parameters))
+    return [reader.read(ECHO, sonar_echo_of(angle)) for angle in angles]
+
+
+@pytest.mark.parametrize("name", [OWN, "avora_msgs/SonarScanLine"])
+def test_our_own_message_is_taken_as_it_is(name):
+    found = beam(name, scan_line_of())
+    assert (found.stamp_ns, found.frame_id, found.angle, found.sensor_angle) == (STAMP_NS, "sonar", 0.5, -0.125)
+    assert (found.intensities.tolist(), found.range_resolution) == ([1, 2, 255], 0.25)
+
+
+@pytest.mark.parametrize("maxrange", [0.0, -1.0, math.nan])
+def test_our_own_message_needs_a_range(maxrange):
+    with pytest.raises(RefusedInput, match="maxrange_meters"):
+        reading(OWN, scan_line_of(maxrange_meters=maxrange))
+
+
+def test_a_ping_360_of_the_ping360_sonar_package():
+    found = beam(ECHO, sonar_echo_of(0.5))
+    assert (found.frame_id, found.angle, found.range_resolution) == ("sonar_frame", 0.5, 5.0)
+    assert found.intensities.tolist() == [0, 10, 200, 3]
+
+
+def test_a_ping_360_of_the_bluerobotics_sonar_package():
+    found = beam(PING_360, ping_360_of(100))
+    assert (found.frame_id, found.range_resolution) == ("ping360", 0.5)
+    assert found.angle == pytest.approx(math.pi / 2)
+    assert beam(PING_360, ping_360_of(200)).angle == 0.0
+    assert beam(PING_360, ping_360_of(300)).angle == pytest.approx(-math.pi / 2)
+
+
+def test_a_micron_of_the_micron_driver_ros_package():
+    found = beam(MICRON, micron_line_of(-90.0))
+    assert (found.frame_id, found.range_resolution, found.intensities.tolist()) == ("Micron", 0.05, [1, 2, 3])
+    assert found.angle == pytest.approx(-math.pi / 2)
+
+
+@pytest.mark.parametrize("ros_2_name", ["ping360_sonar_msgs/msg/SonarEcho", "micron_driver_ros/msg/ScanLine"])
+def test_types_are_known_by_their_names_in_ros_2(ros_2_name):
+    made = sonar_echo_of if "Echo" in ros_2_name else micron_line_of
+    assert beam(ros_2_name, made(header=header(as_rosbags=True))).intensities.size
+
+
+@pytest.mark.parametrize(("kind", "seconds"), [(ECHO, 40 / 1480), (PING_360, 4 / 1500), (MICRON, 0.3 / 1500)])
+def test_a_stamp_taken_after_the_reply_goes_back_to_the_ping(kind, seconds):
+    assert beam(kind, MADE[kind]()).stamp_ns == pytest.approx(STAMP_NS - seconds * SECOND, abs=1)
+
+
+def test_a_laser_scan_becomes_one_beam_per_ray_with_one_echo():
+    found = reading(LASER_SCAN, laser_scan_of((1.0, math.inf, 3.0, math.nan)))
+    assert [one.angle for one in found.beams] == [-1.0, -0.5, 0.0, 0.5]
+    assert [one.stamp_ns - STAMP_NS for one in found.beams] == [0, SECOND // 10, 2 * SECOND // 10, 3 * SECOND // 10]
+    assert [one.ranges[one.intensities > 0].tolist() for one in found.beams] == [
+        [pytest.approx(1.05)], [], [pytest.approx(3.05)], [],
+    ]  # fmt: skip
+
+
+def test_a_laser_scan_is_taken_with_a_warning():
+    assert "time_increment" in reading(LASER_SCAN, laser_scan_of()).notes[1]
+
+
+@pytest.mark.parametrize("angles", [[0.0, 200.0], [399.0], [37.0, 38.0], [6.5], [0.0, 1.0, 2.0]])
+def test_gradians_where_radians_are_documented_are_told_by_their_values(angles):
+    found = echoes_at(angles)[-1]
+    assert found.beams[0].angle == pytest.approx(angles[-1] * math.pi / 200.0)
+    assert "gradians, told by their values" in " ".join(found.notes) or len(angles) > 1
+
+
+@given(st.lists(st.integers(-200, 199).filter(bool), min_size=1, max_size=60))
+def test_radians_stay_radians(steps):
+    angles = [step * 2.0 * math.pi / 400.0 for step in steps]
+    assert [one.beams[0].angle for one in echoes_at(angles)] == angles
+
+
+@given(st.integers(0, 399), st.integers(1, 10))
+def test_a_driver_of_gradians_is_understood_from_its_first_beam_on(first, step):
+    angles = [float((first + step * number) % 400) for number in range(60)]
+    expected = [angle * math.pi / 200.0 for angle in angles]
+    np.testing.assert_allclose([one.beams[0].angle for one in echoes_at(angles)], expected)
+
+
+def test_an_angle_of_0_does_not_tell_the_unit_and_needs_none():
+    found = echoes_at([0.0, 0.0, 2.0, 4.0])
+    assert [one.beams[0].angle for one in found[:2]] == [0.0, 0.0]
+    assert [len(one.notes) for one in found] == [0, 0, 1, 0]
+    assert not any(one.unit_changed for one in found)
+
+
+def test_a_single_broken_angle_does_not_change_the_unit():
+    angles = [0.1 * number for number in range(1, 9)]
+    found = echoes_at([*angles, 390.0, 0.9])
+    assert found[-1].beams[0].angle == 0.9
+    assert not any(one.unit_changed for one in found)
+
+
+def test_a_unit_that_turns_out_to_be_another_is_told():
+    found = echoes_at([390.5, *(0.01 * number for number in range(1, 4))])
+    assert [one.unit_changed for one in found] == [False, False, True, False]
+    assert "radians" in found[2].notes[0]
+
+
+def test_the_unit_can_be_set():
+    assert beam(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").angle == pytest.approx(3.0 * math.pi / 200.0)
+    assert beam(ECHO, sonar_echo_of(90.0), angle_unit="DEGREES").angle == pytest.approx(math.pi / 2)
+    assert beam(ECHO, sonar_echo_of(400.0), angle_unit="RADIANS").angle == 400.0
+
+
+def test_a_unit_that_was_set_is_not_said_to_be_told_by_values():
+    assert "told by" not in reading(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").notes[0]
+
+
+def test_the_direction_can_be_set():
+    assert beam(MICRON, micron_line_of(90.0), head_turns="CLOCKWISE").angle == pytest.approx(-math.pi / 2)
+    assert beam(MICRON, micron_line_of(90.0), head_turns="COUNTER_CLOCKWISE").angle == pytest.approx(math.pi / 2)
+
+
+def test_what_is_assumed_of_a_type_is_said_once():
+    reader = BeamReader(BeamMessageParameters())
+    assert "degrees" in reader.read(MICRON, micron_line_of()).notes[0]
+    assert reader.read(MICRON, micron_line_of()).notes == []
+    assert reader.read(OWN, scan_line_of()).notes == []
+
+
+def test_a_type_that_is_no_beam_is_refused_with_those_that_are():
+    with pytest.raises(RefusedInput, match=r"nav_msgs/Odometry.*ping360_sonar/SonarEcho") as refused:
+        reading("nav_msgs/Odometry", object())
+    assert refused.value.kind == "messages of unknown types"
+
+
+@pytest.mark.parametrize(("kind", "name"), [(kind, name) for kind in NEEDED for name in NEEDED[kind].split()])
+def test_a_message_without_a_field_is_refused_by_the_name_of_the_field(kind, name):
+    message = MADE[kind]()
+    delattr(message, name)
+    with pytest.raises(RefusedInput, match=name):
+        reading(kind, message)
+
+
+@pytest.mark.parametrize(
+    ("kind", "values"),
+    [
+        (ECHO, {"range": 0}),
+        (ECHO, {"intensities": b""}),
+        (ECHO, {"angle": math.nan}),
+        (PING_360, {"profile_data": []}),
+        (PING_360, {"range": math.inf}),
+        (PING_360, {"range": -1.0}),
+        (MICRON, {"bins": []}),
+        (MICRON, {"bins": None}),
+        (MICRON, {"bin_distance_step": math.nan}),
+        (OWN, {"header": header(frame_id="")}),
+        (MICRON, {"header": header(0)}),
+        (MICRON, {"header": header(2**31 * SECOND)}),
+        (MICRON, {"header": header(frame_id="/")}),
+        (LASER_SCAN, {"range_max": 0.0}),
+        (LASER_SCAN, {"range_max": math.nan}),
+        (LASER_SCAN, {"time_increment": math.inf}),
+        (LASER_SCAN, {"angle_increment": math.nan}),
+        (LASER_SCAN, {"ranges": []}),
+        (LASER_SCAN, {"ranges": np.ones(10000)}),
+    ],
+)
+def test_a_message_that_makes_no_beam_is_refused(kind, values):
+    with pytest.raises(RefusedInput):
+        reading(kind, MADE[kind](**values))
+
+
+@pytest.mark.parametrize("name", sorted(BEAM_TYPES))
+def test_the_page_of_sonars_says_of_every_type_what_the_table_does(name):
+    kind = BEAM_TYPES[name]
+    (row,) = [line for line in SONARS_PAGE.splitlines() if line.startswith("|") and f"`{name}`" in line]
+    way = "clockwise" if kind.clockwise else "counter-clockwise"
+    for words in (kind.unit.value.lower(), f"| {way} |", kind.zero, kind.strengths, kind.bins, kind.source):
+        assert words in row
