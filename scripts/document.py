@@ -10,6 +10,8 @@ from typing import Dict, Type
 from dead_reckoning.parameters import DeadReckoningParameters
 from imagenex_852_driver.emulator.parameters import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table
@@ -87,6 +89,8 @@ def generated() -> Dict[Path, str]:
     }
     texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
     texts[ROOT / "yaml/gazebo_sonar_default.yaml"] = gazebo_sonar_yaml()
+    for kind in OdometryKind:
+        texts[ROOT / f"yaml/odometry_{kind.value.lower()}.yaml"] = profile_yaml(kind)
     texts[ROOT / "docs/nodes.md"] = nodes_page()
     texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     return texts

@@ -44,7 +44,7 @@ def errors(twin: Recording, conditions: TwinParameters) -> Tuple:
         solver.add(scan)
     batch, times = solved(solver), twin.track.times
     known = live_path(twin.track, solver.estimates, solver.odometry, parameters.window.lookahead, times)
-    fitted = solved_path(twin.track, batch.node_times, batch.state.nodes, times)
+    fitted = solved_path(twin.track, solver.odometry, batch.node_times, batch.state.nodes, times)
     return tuple(position_error(times, path[:, :2], twin.truth) for path in (known, fitted))
 
 

@@ -23,12 +23,12 @@ from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.state import MOTION, POSE, RATE, STATES
+from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.state import DIRECTION, POSE_COLUMNS, SCALE
+from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
@@ -66,18 +66,19 @@ class JointMapper:
         self.matcher = matcher
         self.matching = False
         self._sonar_in_base = sonar_in_base
-        self._shown = self._matched = self._new_map(1.0, 0)
+        self._session: Optional[JointSession] = None
         self.clear()
 
-    def _new_map(self, resolution: float, expected_blocks: int) -> KeyframeMap:
-        settings = self.settings
-        return KeyframeMap(resolution, settings.limit, expected_blocks, settings.kernel, settings.carver)
+    def _new_maps(self) -> Tuple[KeyframeMap, KeyframeMap]:
+        """Return the map that is shown and the one that is matched with, which shows nobody what may still change."""
+        own = self.settings
+        shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.kernel, own.carver)
+        return shown, KeyframeMap(own.match_resolution, own.limit, 0, own.kernel, own.carver, most_followed=0)
 
     def clear(self) -> None:
         """Forget the map and the place in it."""
-        self._session: Optional[JointSession] = None
-        self._shown = self._new_map(self.settings.resolution, self.settings.expected_blocks)
-        self._matched = self._new_map(self.settings.match_resolution, 0)
+        self._session = None
+        self._shown, self._matched = self._new_maps()
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -173,9 +174,7 @@ class JointMapper:
             self._take(layers)
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
-        settings = self.settings
-        shown = self._new_map(settings.resolution, settings.expected_blocks)
-        matched = self._new_map(settings.match_resolution, 0)
+        shown, matched = self._new_maps()
         blocks = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
         shown.map.insert_blocks(blocks)
         matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
@@ -317,23 +316,34 @@ class JointMapper:
         self._start = None
 
     def _belief(self, estimate: LiveEstimate) -> Belief:
-        columns = np.array([0, 1, 2, SCALE, DIRECTION])
-        states = np.append(np.arange(STATES)[POSE], np.arange(STATES)[MOTION])
-        theta, covariance = np.zeros(STATES), self.errors.covariance()
-        theta[POSE], theta[MOTION] = estimate.T_map_base, estimate.node[[SCALE, DIRECTION]]
-        covariance[np.ix_(states, states)] = estimate.covariance[np.ix_(columns, columns)]
-        return Belief(estimate.time, theta, covariance)
+        """Return pose and odometry errors; of errors that the model does not estimate, what is known beforehand."""
+        drift = estimate.drift
+        slopes = np.zeros((STATES, estimate.node.size))
+        slopes[:POSE_COLUMNS, :POSE_COLUMNS] = np.eye(POSE_COLUMNS)
+        slopes[ERRORS] = drift.slopes
+        of_node = estimate.covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+        covariance = slopes @ of_node @ slopes.T
+        unknown = ~slopes.any(axis=1)
+        covariance[unknown, unknown] = np.diag(self.errors.covariance())[unknown]
+        return Belief(estimate.time, np.append(estimate.T_map_base, drift.values), covariance)
 
     def _result(self, scan: Scan, estimate: LiveEstimate, seconds: float) -> MatchResult:
         belief = self.belief
         times = np.linspace(min(scan.start, estimate.time - 1e-3), estimate.time, _PATH_POINTS)
         return MatchResult(
-            status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=scan.track.velocity_at(estimate.time),
-            covariance=belief.covariance[:6, :6], rate=belief.theta[RATE], motion=belief.theta[MOTION],
+            status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
+            covariance=_fix_covariance(estimate), rate=belief.theta[RATE], motion=belief.theta[MOTION],
             state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
             iterations=self.parameters.window.live_iterations, seconds=seconds, beam_times=times,
             beam_poses=self._session.path(times),
         )  # fmt: skip
+
+
+def _fix_covariance(estimate: LiveEstimate) -> np.ndarray:
+    """Return the covariance (6, 6) of pose and velocity; what both share is left out."""
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3], covariance[3:, 3:] = estimate.pose_covariance, estimate.velocity_covariance
+    return covariance
 
 
 def _correction(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:

@@ -52,7 +52,7 @@ class JointSession:
     def points(self, cloud: TimedPoints) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
         points = transformed(self.T_map_odom, cloud.points)
-        return drawn(self.solver.log, self.solver.state, points, cloud.times)
+        return drawn(self.solver.log, self.solver.odometry, self.solver.state, points, cloud.times)
 
     def origins(self, cloud: TimedPoints) -> np.ndarray:
         """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
@@ -61,7 +61,7 @@ class JointSession:
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
-        return corrected_path(self.solver.log, self.solver.state, times)
+        return corrected_path(self.solver.log, self.solver.odometry, self.solver.state, times)
 
     @property
     def start(self) -> float:

@@ -7,9 +7,10 @@ import numpy as np
 
 from mlsm_manager.multi_view.association import blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import add_comparisons
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
+from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
@@ -47,10 +48,10 @@ def solved(live: LiveSolver) -> BatchResult:
 
 
 class _Batch:
-    def __init__(self, log: RunLog, odometry: DvlFactors, parameters: MultiViewParameters, state: State) -> None:
+    def __init__(self, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, state: State) -> None:
         self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
         self._layout = Layout(0, log.scan_count, odometry.width)
-        self._poses = log.node_poses(np.arange(log.scan_count + 1))
+        self._motion = log.node_motion(np.arange(log.scan_count + 1))
         self._solution = None
 
     def step(self) -> float:
@@ -59,8 +60,8 @@ class _Batch:
         odometry, sonar, matching = self._odometry, self._parameters.sonar, self._parameters.matching
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
-        odometry.add_steps(equations, self._layout, self.state.nodes, self._log.node_times, self._poses)
-        points = place(self._log, self.state, self._log.rows(0, self._layout.last))
+        odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
+        points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
         pairs = pairs_between(points, points, blocks_of(points, matching.block_scans), matching.cut, matching)
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
         self._solution = solution_of(equations)
@@ -74,7 +75,9 @@ class _Batch:
         run = self._layout.run_start + np.arange(RUN_COLUMNS)
         nodes = np.arange(self._layout.last + 1)
         poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
-        return np.concatenate(poses), self._columns_of_inverse(run)[run]
+        places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
+        by_scale = scale_covariance(places, self._parameters.sonar.world_scale_deviation)
+        return np.concatenate(poses) + by_scale, self._columns_of_inverse(run)[run]
 
     def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
         columns = self._layout.pose_columns(nodes)

@@ -1,18 +1,18 @@
-"""What an odometry of DVL and compass says of the nodes: expected values, residuals and their derivatives.
+"""What an odometry of DVL and compass says of the nodes: expected values, residuals and their derivatives."""
 
-Another odometry is another class with the same members (`OdometryModel`).
-"""
+from typing import Dict
 
 import numpy as np
 
 from mlsm_manager.multi_view.normal_equations import NormalEquations
-from mlsm_manager.multi_view.parameters import DvlOdometry
-from mlsm_manager.multi_view.state import DIRECTION, POSE_COLUMNS, SCALE, YAW, Layout
+from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
+from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.odometry_terms import add_compass, add_walk, turned
+from mlsm_manager.multi_view.state import YAW, Layout
 
+DIRECTION, SCALE = 3, 4
 _ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not divide by zero
-_CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far below any effect
-_HELD_DEVIATION = 1e-6  # stands for a deviation of zero
-_FIXED_DEVIATION = 1e-4  # m, rad: a pose that defines the map, or that is frozen
 
 
 class DvlFactors:
@@ -23,88 +23,93 @@ class DvlFactors:
     def __init__(self, parameters: DvlOdometry) -> None:
         self._parameters = parameters
 
+    @property
+    def calibrated(self) -> Dict[str, int]:
+        """See OdometryModel."""
+        return {"odometry_scale": SCALE, "odometry_direction": DIRECTION}
+
+    @property
+    def distance_deviation(self) -> float:
+        """See OdometryModel."""
+        return self._parameters.scale_deviation
+
+    @property
+    def position_walk(self) -> float:
+        """See OdometryModel."""
+        return self._parameters.position_walk
+
     def first_node(self) -> np.ndarray:
-        """Return the unknowns (width,) expected at the first node, where the map's origin is the odometry's."""
+        """See OdometryModel."""
         return np.array([0.0, 0.0, 0.0, self._parameters.direction, self._parameters.scale])
 
     def first_deviations(self) -> np.ndarray:
-        """Return their standard deviations (width,)."""
-        own = self._parameters
-        fixed = _FIXED_DEVIATION * 10.0
-        walking = np.maximum([own.direction_deviation, own.scale_deviation], _HELD_DEVIATION)
+        """See OdometryModel."""
+        own, fixed = self._parameters, FIXED_DEVIATION * 10.0
+        walking = np.maximum([own.direction_deviation, own.scale_deviation], HELD_DEVIATION)
         return np.concatenate([[fixed, fixed, own.heading_deviation], walking])
 
-    def frozen_deviations(self, deviations: np.ndarray) -> np.ndarray:
-        """Return the deviations (width,) that hold a frozen node; `deviations` are those it was last known with."""
-        result = np.maximum(deviations, _HELD_DEVIATION)
-        result[:POSE_COLUMNS] = _FIXED_DEVIATION
+    def reference(self, motion: Motion) -> np.ndarray:
+        """See OdometryModel: the reported positions."""
+        return motion.positions
+
+    def gain(self, nodes: np.ndarray) -> np.ndarray:
+        """See OdometryModel."""
+        return (1.0 + nodes[..., SCALE]) * turned(nodes[..., DIRECTION])
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        """See OdometryModel."""
+        step = after.positions - before.positions
+        error = product(product(self.gain(nodes), turned(nodes[:, YAW])), step) - step
+        result = nodes.copy()
+        result[:, 0] += error.real
+        result[:, 1] += error.imag
         return result
 
-    def next_node(self, node: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return the node (width,) expected after `node`, where the odometry went from `before` to `after` (3,)."""
-        step = complex(*(after - before)[:2])
-        error = _turned(step, node[DIRECTION] + node[YAW], node[SCALE]) - step
-        return node + np.array([error.real, error.imag, 0.0, 0.0, 0.0])
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        """See OdometryModel."""
+        values, slopes = np.zeros(MOTION_STATES), np.zeros((MOTION_STATES, self.width))
+        values[3:] = node[[SCALE, DIRECTION]]
+        slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
+        return Drift(values, slopes)
 
-    def add_steps(
-        self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, times: np.ndarray, poses: np.ndarray
-    ) -> None:
-        """Add what ties the nodes together. nodes: (n, width), times: (n,) s and poses: (n, 3) T_odom_base of all."""
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        """See OdometryModel."""
         starts = layout.node_start(np.arange(layout.first, layout.last))
-        durations = np.diff(times)
-        self._add_positions(equations, starts, nodes, durations, np.diff(poses[:, :2], axis=0))
-        self._add_headings(equations, starts, nodes, durations)
-        walks = ((DIRECTION, self._parameters.direction_walk), (SCALE, 0.0))
-        for column, walk in walks:
-            pair = np.column_stack([starts + self.width + column, starts + column])
-            residual = np.diff(nodes[:, column])
-            variance = np.maximum(walk**2 * durations, _CONSTANT_DEVIATION**2)
-            equations.add(pair, np.tile([1.0, -1.0], (len(starts), 1)), residual, 1.0 / variance)
+        self._add_positions(equations, starts, nodes, motion)
+        add_compass(equations, starts, nodes, motion.durations, self._parameters)
+        walk = self._parameters.direction_walk**2 * motion.durations
+        add_walk(equations, starts, self.width, nodes[:, DIRECTION], DIRECTION, walk)
+        self._add_scale(equations, starts, nodes, motion.durations)
 
-    def _add_positions(
-        self,
-        equations: NormalEquations,
-        starts: np.ndarray,
-        nodes: np.ndarray,
-        durations: np.ndarray,
-        steps: np.ndarray,
+    def _add_scale(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
     ) -> None:
+        add_walk(equations, starts, self.width, nodes[:, SCALE], SCALE, np.zeros(len(starts)))
+
+    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         """Add the steps. Noise is one of the reported velocities, so the residuals are those per unit of scale.
 
         The derivative by the scale contains that; else the fit would shrink the world to make them smaller.
         """
-        step = steps[:, 0] + 1j * steps[:, 1]
+        step, one = np.diff(motion.positions), np.ones(len(starts))
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
-        turned = _turned(step, nodes[:-1, DIRECTION] + yaw, 0.0)
-        scaled = (1.0 + nodes[:-1, SCALE]) * turned
-        change = np.diff(nodes[:, 0]) + 1j * np.diff(nodes[:, 1])
-        residual, one = change - (scaled - step), np.ones(len(step))
-        weight = 1.0 / (self._parameters.position_walk**2 * durations + _ROUNDING_VARIANCE)
+        turned_step = product(turned(nodes[:-1, DIRECTION] + yaw), step)
+        scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
+        change = np.diff(as_complex(nodes))
+        residual = change - (scaled - step) - self._carried(nodes[:-1], motion.durations)
+        weight = 1.0 / (self._parameters.position_walk**2 * motion.durations + _ROUNDING_VARIANCE)
         for axis, part in ((0, np.real), (1, np.imag)):
-            places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW)
+            places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *self._carriers(axis))
             by_angle = -part(1j * scaled)
-            slopes = (one, -one, by_angle, -part(turned) - part(residual), by_angle / 2.0, by_angle / 2.0)
+            slopes = (one, -one, by_angle, -part(turned_step) - part(residual), by_angle / 2.0, by_angle / 2.0)
+            slopes += tuple(-motion.durations for _ in self._carriers(axis))
             columns = starts[:, np.newaxis] + np.array(places)
             equations.add(columns, np.column_stack(slopes), part(residual), weight)
 
-    def _add_headings(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
-    ) -> None:
-        own = self._parameters
-        kept = np.exp(-durations / own.heading_time)
-        variance = own.heading_deviation**2 * (1.0 - kept**2) + own.heading_walk**2 * durations
-        columns = np.column_stack([starts + self.width + YAW, starts + YAW])
-        jacobian = np.column_stack([np.ones(len(starts)), -kept])
-        equations.add(columns, jacobian, nodes[1:, YAW] - kept * nodes[:-1, YAW], 1.0 / variance)
+    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
+        """Return the moves (n,) x + i y [m] in map that the odometry cannot feel."""
+        return np.zeros(len(nodes), dtype=np.complex128)
 
-    def continued(self, node: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarray:
-        """Return T_map_base (n, 3) where the odometry is at `after` (n, 3) and the newest node (width,) at `before`."""
-        step = (after - before)[..., 0] + 1j * (after - before)[..., 1]
-        moved = _turned(step, node[..., DIRECTION] + node[..., YAW], node[..., SCALE])
-        x = before[..., 0] + node[..., 0] + moved.real
-        y = before[..., 1] + node[..., 1] + moved.imag
-        return np.stack([x, y, after[..., 2] + node[..., YAW]], axis=-1)
-
-
-def _turned(step: np.ndarray, angle: np.ndarray, scale: np.ndarray) -> np.ndarray:
-    return (1.0 + scale) * np.exp(1j * angle) * step
+    def _carriers(self, axis: int) -> tuple:
+        """Return the columns of the velocities that make those moves along an axis."""
+        return ()

@@ -6,6 +6,7 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.multi_view.association import BlockIndex, blocks_of
+from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.run_log import RunLog
@@ -36,7 +37,12 @@ class FrozenMap:
 
 
 def nearest_blocks(
-    log: RunLog, state: State, count: int, place_now: np.ndarray, parameters: MultiViewParameters
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    count: int,
+    place_now: np.ndarray,
+    parameters: MultiViewParameters,
 ) -> FrozenMap:
     """Return the blocks nearest to `place_now` (2,) among the first `count` blocks of the run."""
     scans = parameters.matching.block_scans
@@ -48,7 +54,7 @@ def nearest_blocks(
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
     )
-    points = place(log, state, rows)
+    points = place(log, odometry, state, rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
     return FrozenMap(points, blocks_of(points, scans), per_point, numbers, state.run.copy())
 

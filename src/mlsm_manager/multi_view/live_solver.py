@@ -5,16 +5,16 @@ from typing import Dict, List, Mapping, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
+from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.stacking import stacked, unstacked
-from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.state import RUN_COLUMNS, State
 from node_support.errors import RefusedInput
 
 _ESTIMATE = "estimate."
@@ -40,7 +40,7 @@ class LiveSolver:
         """
         self.parameters = parameters
         self.log = RunLog(sonar_in_base)
-        self.odometry = DvlFactors(parameters.odometry)
+        self.odometry = parameters.odometry
         self.estimates: List[LiveEstimate] = []
         self._nodes = GrowingArray(self.odometry.width)
         self._nodes.extend(self.odometry.first_node()[np.newaxis])
@@ -122,8 +122,9 @@ class LiveSolver:
 
     def _solved(self) -> LiveEstimate:
         """Return what is known when the log has one scan more than there are estimates."""
-        before, after = self.log.node_poses(np.array([-2, -1]))
-        self._nodes.extend(self.odometry.next_node(self._nodes.values[-1], before, after)[np.newaxis])
+        motion = self.log.node_motion(np.array([-2, -1]))
+        self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
+        self._search()
         window = LiveWindow(
             self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
             self._start, self._known,
@@ -135,3 +136,11 @@ class LiveSolver:
         estimate, covariances = window.estimate(), window.covariances_of_oldest()
         self._node_covariances.replace_from(window.oldest, covariances)
         return estimate
+
+    def _search(self) -> None:
+        """Put the newest node where its scan fits, if the motion is hardly known."""
+        if not self.estimates:
+            return
+        covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+        matching = self.parameters.matching
+        self._nodes.values[-1] = searched_node(self.log, self.odometry, self.state, covariance, matching)

@@ -7,11 +7,11 @@ import numpy as np
 from mlsm_manager.multi_view.agreement import agreement
 from mlsm_manager.multi_view.association import blocks_of, pairs_between
 from mlsm_manager.multi_view.comparisons import add_comparisons
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
+from mlsm_manager.multi_view.odometry_model import OdometryModel, frozen_deviations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
@@ -30,7 +30,7 @@ class LiveWindow:
     """
 
     def __init__(
-        self, log: RunLog, odometry: DvlFactors, parameters: MultiViewParameters, state: State,
+        self, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, state: State,
         estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
         known: Optional[KnownSurfaces],
     ) -> None:  # fmt: skip
@@ -40,12 +40,17 @@ class LiveWindow:
         self._scans_per_block = parameters.matching.block_scans
         self._recent = first // self._scans_per_block * self._scans_per_block
         self._frozen = nearest_blocks(
-            log, state, first // self._scans_per_block, log.node_poses(last)[:2] + state.nodes[last, :2], parameters
+            log,
+            odometry,
+            state,
+            first // self._scans_per_block,
+            log.node_poses(last)[:2] + state.nodes[last, :2],
+            parameters,
         )
         self._layout = Layout(first, last, odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._anchor = estimates[first - 1] if first else None
-        self._poses = log.node_poses(np.arange(first, last + 1))
+        self._motion = log.node_motion(np.arange(first, last + 1))
         self._start, self._known = start, known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
@@ -69,8 +74,8 @@ class LiveWindow:
         """Take one Gauss-Newton step with points up to `cut` [m] apart."""
         equations = NormalEquations(self._layout.size, len(self._held_covariance))
         self._add_beliefs(equations)
-        free, times = self._state.nodes[self._layout.first :], self._log.node_times[self._layout.first :]
-        self._odometry.add_steps(equations, self._layout, free, times, self._poses)
+        free = self._state.nodes[self._layout.first :]
+        self._odometry.add_steps(equations, self._layout, free, self._motion)
         self._comparisons = self._add_surfaces(equations, cut)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
@@ -100,12 +105,12 @@ class LiveWindow:
             return self._odometry.first_node(), deviations, run_mean(sonar), run_deviations(sonar)
         pose = self._state.nodes[self._layout.first, POSE]
         mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
-        deviations = self._odometry.frozen_deviations(self._anchor.node_deviations)
+        deviations = frozen_deviations(self._anchor.node_deviations)
         return mean, deviations, self._anchor.run, self._anchor.run_deviations
 
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
         matching = self._parameters.matching
-        recent = place(self._log, self._state, self._log.rows(self._recent, self._layout.last))
+        recent = place(self._log, self._odometry, self._state, self._log.rows(self._recent, self._layout.last))
         sources = recent.selected(recent.scans >= self._layout.first)
         frozen = self._frozen.moved_by_run(self._state.run)
         to_frozen = pairs_between(sources, frozen, self._frozen.indices, cut, matching)
@@ -139,7 +144,7 @@ class LiveWindow:
     def estimate(self) -> LiveEstimate:
         """Return what is known of the newest node."""
         newest = np.arange(self._layout.size - self._layout.width - RUN_COLUMNS, self._layout.size)
-        T_odom_base, node = self._poses[-1], self._state.nodes[-1].copy()
+        T_odom_base, node = self._motion.poses[-1], self._state.nodes[-1].copy()
         T_map_base = T_odom_base + node[POSE]
         share, distance = agreement(self._met, self._layout.last - 1, self._parameters.matching)
         return LiveEstimate(
@@ -147,6 +152,8 @@ class LiveWindow:
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
             covariance=self._solution.covariance(newest, self._held_covariance),
             own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
-            comparisons=self._comparisons,
+            world_scale_deviation=self._parameters.sonar.world_scale_deviation,
+            reported_velocity=self._log.odometry.velocity_at(self._motion.times[-1]),
+            drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
             agreement=share, distance=distance,
         )  # fmt: skip

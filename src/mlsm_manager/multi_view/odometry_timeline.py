@@ -1,9 +1,13 @@
-"""The odometry's poses over the whole run, as far as they are known."""
+"""The odometry over the whole run, as far as it is known."""
 
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.odometry_motion import Motion
+from node_support.geometry.planar import composed, inverse
+
+_WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
 
 
 class OdometryTimeline:
@@ -12,6 +16,14 @@ class OdometryTimeline:
     def __init__(self) -> None:
         self._times = GrowingArray()
         self._poses = GrowingArray(3)
+        self._ahead = GrowingArray(2)
+
+    @classmethod
+    def of(cls, track: Track) -> "OdometryTimeline":
+        """Return the timeline of a whole track."""
+        timeline = cls()
+        timeline.extend(track, np.inf)
+        return timeline
 
     def __len__(self) -> int:
         return len(self._times)
@@ -20,6 +32,7 @@ class OdometryTimeline:
         """Keep the oldest `count` poses."""
         self._times.shorten(count)
         self._poses.shorten(count)
+        self._ahead.shorten(count)
 
     @property
     def end(self) -> float:
@@ -32,14 +45,37 @@ class OdometryTimeline:
         last = int(np.searchsorted(track.times, until, side="right"))
         if last <= first:
             return
-        poses = track.poses[first:last].copy()
+        times, poses = track.times[first:last], track.poses[first:last].copy()
         if len(self._poses):
             jump = poses[0, 2] - self._poses.values[-1, 2]
             poses[:, 2] -= 2.0 * np.pi * np.round(jump / (2.0 * np.pi))
-        self._times.extend(track.times[first:last])
+        self._ahead.extend(self._gone_ahead(times, poses[:, 2]))
+        self._times.extend(times)
         self._poses.extend(poses)
+
+    def _gone_ahead(self, times: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """Return where the newest (m,) poses are on the path of `Motion.ahead`, by the trapezoidal rule."""
+        known = len(self._times) > 0
+        start = self._ahead.values[-1] if known else np.zeros(2)
+        times = np.append(self._times.values[-1] if known else times[0], times)
+        yaw = np.append(self._poses.values[-1, 2] if known else yaw[0], yaw)
+        heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
+        steps = (heading[1:] + heading[:-1]) / 2.0 * np.diff(times)[:, np.newaxis]
+        return start + np.cumsum(steps, axis=0)
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""
-        known, poses = self._times.values, self._poses.values
-        return np.stack([np.interp(times, known, poses[:, axis]) for axis in range(3)], axis=-1)
+        return _between(times, self._times.values, self._poses.values)
+
+    def velocity_at(self, time: float) -> np.ndarray:
+        """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
+        before, after = self.at(np.array([time - _WINDOW, time]))
+        return composed(inverse(before), after) / _WINDOW
+
+    def motion(self, times: np.ndarray) -> Motion:
+        """Return the motion at `times` (m,), as `at` does."""
+        return Motion(times, self.at(times), _between(times, self._times.values, self._ahead.values))
+
+
+def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.stack([np.interp(times, known, column) for column in values.T], axis=-1)

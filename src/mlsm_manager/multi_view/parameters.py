@@ -1,40 +1,11 @@
 """Parameters of the joint solver. Every default describes a sensor or a method and gives its reason, none a place."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
+from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.odometry_model import OdometryModel
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from node_support.parameters import ParameterSet, parameter
-
-
-@dataclass(frozen=True)
-class DvlOdometry(ParameterSet):
-    """How wrong an odometry of DVL and compass may be.
-
-    A DVL's mounting angle is known to some degrees and its scale to about 1 %; both hardly change during a run. What
-    adds up besides is the integrated noise of its velocities. A compass errs by about a degree, and differently where
-    iron is near: for some minutes at the speed of a small vehicle.
-    """
-
-    position_walk: float = parameter(
-        0.12, "random walk of the position: 0.025 m/s that last 12 s", unit="m/sqrt(s)", low=0.001, high=10.0
-    )
-    direction: float = parameter(0.0, "angle from reported to true motion", unit="rad", low=-3.2, high=3.2)
-    direction_deviation: float = parameter(
-        0.105, "standard deviation of `direction`: a mounting angle set by eye, 6 deg", unit="rad", low=0.0, high=3.2
-    )
-    direction_walk: float = parameter(
-        0.0014, "random walk of `direction`: 5 deg within an hour", unit="rad/sqrt(s)", low=0.0, high=1.0
-    )
-    scale: float = parameter(0.0, "true distance over reported distance, minus 1", low=-0.9, high=9.0)
-    scale_deviation: float = parameter(0.01, "standard deviation of `scale`: a DVL's data sheet", low=0.0, high=2.0)
-    heading_deviation: float = parameter(
-        0.01745, "standard deviation of the compass: 1 deg, a data sheet's", unit="rad", low=1e-5, high=3.2
-    )
-    heading_time: float = parameter(
-        300.0, "how long an error of the compass lasts: the time spent near the same iron", unit="s", low=1.0, high=1e6
-    )
-    heading_walk: float = parameter(
-        0.00035, "white noise of the turn rate, besides the compass error", unit="rad/sqrt(s)", low=1e-7, high=1.0
-    )
 
 
 @dataclass(frozen=True)
@@ -44,6 +15,13 @@ class SonarCalibration(ParameterSet):
     range_scale: float = parameter(0.0, "true range over reported range, minus 1", low=-0.5, high=1.0)
     range_scale_deviation: float = parameter(
         0.02, "its standard deviation: speed of sound between cold fresh and warm salt water", low=0.0, high=0.5
+    )
+    world_scale_deviation: float = parameter(
+        0.0,
+        "standard deviation of a scale of ranges and motions together that nothing in the run can tell; it is in the "
+        "told covariances only",
+        low=0.0,
+        high=0.5,
     )
     sonar_delay: float = parameter(0.0, "seconds by which a beam is later than its stamp", unit="s", low=-5.0, high=5.0)
     sonar_delay_deviation: float = parameter(
@@ -109,9 +87,9 @@ class SolverWindow(ParameterSet):
 
 @dataclass(frozen=True)
 class MultiViewParameters:
-    """All parameters of a run, in groups."""
+    """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters."""
 
-    odometry: DvlOdometry = DvlOdometry()
+    odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
     sonar: SonarCalibration = SonarCalibration()
     matching: SurfaceMatching = SurfaceMatching()
     window: SolverWindow = SolverWindow()

@@ -5,31 +5,98 @@ from typing import Sequence
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.multi_view.odometry_model import OdometryModel
+from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
+from mlsm_manager.multi_view.odometry_terms import turned
+from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.state import POSE, YAW
+
+
+class NodePath:
+    """The path between nodes: the model's reference path, turned and scaled, stretched from node to node."""
+
+    def __init__(
+        self, odometry: OdometryModel, timeline: OdometryTimeline, times: np.ndarray, nodes: np.ndarray
+    ) -> None:
+        """times: (n,) s of the nodes, n > 1. nodes: (n, width)."""
+        self._odometry, self._timeline, self._times, self._nodes = odometry, timeline, times, nodes
+        motion = timeline.motion(times)
+        self._places = as_complex(motion.poses[:, :2] + nodes[:, :2])
+        self._reference = odometry.reference(motion)
+        gain = odometry.gain(nodes)
+        self._gain, self._last_gain = (gain[:-1] + gain[1:]) / 2.0, gain[-1:]
+
+    def poses(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
+        """Return T_map_base (m, 3) at `times` (m,) [s] between nodes `legs` (m,) and the next ones, or about there."""
+        return self._poses_of(self._timeline.motion(times), legs)
+
+    def bows(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
+        """Return how far (m, 2) [m] in map the path at `times` (m,) lies beside the straight line from node to node."""
+        bow = self._bow_of(self._timeline.motion(times), legs, self.shares(times, legs))
+        return np.column_stack([bow.real, bow.imag])
+
+    def velocities(self, times: np.ndarray, legs: np.ndarray, half_window: float) -> np.ndarray:
+        """Return the mean velocities (m, 3) in map from `half_window` [s] before `times` (m,) to as long after."""
+        before, after = (self.poses(times + shift, legs) for shift in (-half_window, half_window))
+        return (after - before) / (2.0 * half_window)
+
+    def shares(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
+        """Return where `times` (m,) lie: 0 at nodes `legs` (m,), 1 at the next ones."""
+        return (times - self._times[legs]) / (self._times[legs + 1] - self._times[legs])
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return T_map_base (m, 3) at any `times` (m,) [s]; before the first node and after the last as it goes on."""
+        first, last = self._times[0], self._times[-1]
+        inside = np.clip(times, first, last)
+        legs = np.clip(np.searchsorted(self._times, inside, side="right") - 1, 0, len(self._times) - 2)
+        motion, near = self._timeline.motion(times), self._timeline.motion(inside)
+        poses = self._poses_of(near, legs)
+        after = times > last
+        gain = np.where(after, self._last_gain, self._gain[0])
+        beyond = product(gain, turned(self._nodes[np.where(after, -1, 0), YAW]))
+        beyond = product(beyond, self._odometry.reference(motion) - self._odometry.reference(near))
+        turn = motion.poses[:, 2] - near.poses[:, 2]
+        return poses + np.column_stack([beyond.real, beyond.imag, turn])
+
+    def _poses_of(self, motion: Motion, legs: np.ndarray) -> np.ndarray:
+        share = self.shares(motion.times, legs)
+        place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1]
+        place = place + self._bow_of(motion, legs, share)
+        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + self._yaw(legs, share)])
+
+    def _bow_of(self, motion: Motion, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
+        from_node = self._odometry.reference(motion) - self._reference[legs]
+        bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
+        return product(product(self._gain[legs], turned(self._yaw(legs, share))), bow)
+
+    def _yaw(self, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
+        return (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
 
 
 def live_path(
-    track: Track, estimates: Sequence[LiveEstimate], odometry: DvlFactors, latency: float, times: np.ndarray
+    track: Track, estimates: Sequence[LiveEstimate], odometry: OdometryModel, latency: float, times: np.ndarray
 ) -> np.ndarray:
     """Return T_map_base (m, 3) at `times` (m,) as it was known at each: the newest estimate, continued by odometry.
 
     An estimate is known `latency` seconds after its scan; before the first one the odometry is all there is.
     """
-    poses = track.at(times)
+    motion = OdometryTimeline.of(track).motion(times)
     if not estimates:
-        return poses
+        return motion.poses
     known_from = np.array([estimate.time for estimate in estimates]) + latency
     newest = np.searchsorted(known_from, times, side="right") - 1
     nodes = np.array([estimate.node for estimate in estimates])[newest]
-    before = np.array([estimate.T_odom_base for estimate in estimates])[newest]
-    return np.where((newest >= 0)[:, np.newaxis], odometry.continued(nodes, before, poses), poses)
+    before = OdometryTimeline.of(track).motion(np.array([estimate.time for estimate in estimates])[newest])
+    continued = motion.poses + odometry.advanced(nodes, before, motion)[:, POSE]
+    return np.where((newest >= 0)[:, np.newaxis], continued, motion.poses)
 
 
-def solved_path(track: Track, node_times: np.ndarray, nodes: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return T_map_base (m, 3) at `times` (m,): the odometry with the nodes' corrections, linearly between them.
+def solved_path(
+    track: Track, odometry: OdometryModel, node_times: np.ndarray, nodes: np.ndarray, times: np.ndarray
+) -> np.ndarray:
+    """Return T_map_base (m, 3) at `times` (m,): the path through the nodes.
 
-    node_times: (n,) s. nodes: (n, >= 3) corrections.
+    node_times: (n,) s. nodes: (n, width).
     """
-    correction = [np.interp(times, node_times, nodes[:, column]) for column in range(3)]
-    return track.at(times) + np.stack(correction, axis=-1)
+    return NodePath(odometry, OdometryTimeline.of(track), node_times, nodes).at(times)

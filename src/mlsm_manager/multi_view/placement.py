@@ -4,6 +4,8 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
+from mlsm_manager.multi_view.odometry_model import OdometryModel
+from mlsm_manager.multi_view.path import NodePath
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE, YAW, State
 from node_support.geometry.planar import rotated
@@ -15,9 +17,10 @@ _HALF_SECOND = 0.5  # s: the velocity of a point is averaged over one second, lo
 class PlacedPoints:
     """n points in the map.
 
-    scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, from base_link to them. normals: (n, 2).
-    slants: (n,) m. qualities: (n,). shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second.
-    by_run: (n, 2, 2) derivatives of the places by range scale and delay, last axis the unknown.
+    scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, by which the nodes' yaw turns them: from
+    base_link to them, and the bow of the path between the nodes. normals: (n, 2). slants: (n,) m. qualities: (n,).
+    shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second. by_run: (n, 2, 2) derivatives of the
+    places by range scale and delay, last axis the unknown.
     """
 
     scans: np.ndarray
@@ -42,24 +45,24 @@ class PlacedPoints:
         return PlacedPoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
-def place(log: RunLog, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the points in `rows` of the log; between two nodes the correction is interpolated linearly."""
+def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
+    """Return the points in `rows` of the log; NodePath says where the vehicle was between two nodes."""
     points, scans = log.points(rows), log.scans(rows)
     times = points.times + state.run[DELAY]
-    node_times = log.node_times
-    begin, length = node_times[scans], node_times[scans + 1] - node_times[scans]
-    shares = (times - begin) / length
-    before, after = state.nodes[scans, :3], state.nodes[scans + 1, :3]
-    poses = log.odometry.at(times) + (1.0 - shares)[:, np.newaxis] * before + shares[:, np.newaxis] * after
+    nodes = np.unique(np.concatenate([scans, scans + 1]))
+    legs = np.searchsorted(nodes, scans)
+    path = NodePath(odometry, log.odometry, log.node_times[nodes], state.nodes[nodes])
+    poses = path.poses(times, legs)
     sight = _unit(points.bearings + poses[:, YAW]) * points.ranges[:, np.newaxis]
     mounting = rotated(np.broadcast_to(log.sonar_in_base, sight.shape), poses[:, YAW])
     arms = mounting + (1.0 + state.run[RANGE_SCALE]) * sight
-    velocity = log.odometry.at(times + _HALF_SECOND) - log.odometry.at(times - _HALF_SECOND)
-    velocity = velocity + (after - before) / length[:, np.newaxis]
+    velocity = path.velocities(times, legs, _HALF_SECOND)
     by_delay = velocity[:, :2] + velocity[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
     return PlacedPoints(
-        scans=scans, places=poses[:, :2] + arms, arms=arms, normals=rotated(points.normals, poses[:, YAW]),
-        slants=points.slants, qualities=points.qualities, shares=shares, by_run=np.stack([sight, by_delay], axis=2),
+        scans=scans, places=poses[:, :2] + arms, arms=arms + path.bows(times, legs),
+        normals=rotated(points.normals, poses[:, YAW]),
+        slants=points.slants, qualities=points.qualities, shares=path.shares(times, legs),
+        by_run=np.stack([sight, by_delay], axis=2),
     )  # fmt: skip
 
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.odometry_motion import Motion
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.surface_points import SurfacePoints
 from node_support.errors import RefusedInput
@@ -80,6 +81,10 @@ class RunLog:
     def scans(self, rows: np.ndarray) -> np.ndarray:
         """Return the scan (n,) int of each point in `rows`."""
         return self._scans.values[rows].astype(np.int64)
+
+    def node_motion(self, nodes: np.ndarray) -> Motion:
+        """Return what the odometry reported up to `nodes` (n,)."""
+        return self.odometry.motion(self.node_times[nodes])
 
     def node_poses(self, nodes: np.ndarray) -> np.ndarray:
         """Return T_odom_base (n, 3) at `nodes` (n,)."""

@@ -11,7 +11,6 @@ import numpy as np
 X, Y, YAW = range(3)
 POSE = slice(0, 3)
 POSE_COLUMNS = 3
-DIRECTION, SCALE = 3, 4
 RANGE_SCALE, DELAY = range(2)
 RUN_COLUMNS = 2
 BEFORE_THE_RUN = -2

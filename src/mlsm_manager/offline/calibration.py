@@ -7,65 +7,70 @@ import numpy as np
 
 from mlsm_manager.multi_view.batch_solver import BatchResult
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.state import DELAY, DIRECTION, RANGE_SCALE, SCALE
+from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.parameters import describe
 from sonar_processing.beams.beam_correction import BeamCorrection
 
-NAMES = ("range_scale", "sonar_delay", "odometry_scale", "odometry_direction")
+_OF_RUN = {"range_scale": RANGE_SCALE, "sonar_delay": DELAY}
 
 
 @dataclass(frozen=True)
 class Calibration:
-    """values, deviations: (4,) as NAMES: true range over reported range minus 1; s by which beams are later than
-    their stamps; true distance over reported distance minus 1; rad from reported to true motion.
+    """names, values, deviations: (n,) what was found. range_scale: true range over reported range minus 1.
+
+    sonar_delay: s by which beams are later than their stamps. odometry_scale: true distance over reported distance
+    minus 1, odometry_direction: rad from reported to true motion, both where the odometry reports distances.
     """
 
+    names: Tuple[str, ...]
     values: np.ndarray
     deviations: np.ndarray
 
     @classmethod
     def of_live(cls, solver: LiveSolver) -> "Calibration":
         """Return what the newest estimate of a run knows; the solver must have taken a scan."""
-        newest = solver.estimates[-1]
-        deviations = newest.run_deviations[[RANGE_SCALE, DELAY]], newest.node_deviations[[SCALE, DIRECTION]]
-        return cls(
-            np.append(newest.run[[RANGE_SCALE, DELAY]], newest.node[[SCALE, DIRECTION]]), np.concatenate(deviations)
-        )
+        newest, columns = solver.estimates[-1], solver.odometry.calibrated
+        of_node, of_run = list(columns.values()), list(_OF_RUN.values())
+        deviations = np.append(_of_run(newest.run_deviations, solver), newest.node_deviations[of_node])
+        return cls((*_OF_RUN, *columns), np.append(newest.run[of_run], newest.node[of_node]), deviations)
 
     @classmethod
     def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
         """Return what the fit of a whole run found; scale and direction are those of the last node."""
-        of_run = np.sqrt(np.diag(batch.run_covariance))[[RANGE_SCALE, DELAY]]
-        of_odometry = cls.of_live(solver).deviations[2:]
-        values = np.append(batch.state.run[[RANGE_SCALE, DELAY]], batch.state.nodes[-1, [SCALE, DIRECTION]])
-        return cls(values, np.concatenate([of_run, of_odometry]))
+        live, of_run = cls.of_live(solver), list(_OF_RUN.values())
+        deviations = _of_run(np.sqrt(np.diag(batch.run_covariance)), solver)
+        values = np.append(batch.state.run[of_run], batch.state.nodes[-1, list(solver.odometry.calibrated.values())])
+        return cls(live.names, values, np.append(deviations, live.deviations[len(of_run) :]))
 
     @property
     def by_name(self) -> Dict[str, Tuple[float, float]]:
-        """Value and deviation of each of NAMES."""
-        return {name: (float(value), float(own)) for name, value, own in zip(NAMES, self.values, self.deviations)}
+        """Value and deviation of each of `names`."""
+        return {name: (float(value), float(own)) for name, value, own in zip(self.names, self.values, self.deviations)}
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return values and deviations by name, rounded for people."""
         return {
             name: {"value": round(float(value), 5), "deviation": round(float(deviation), 5)}
-            for name, value, deviation in zip(NAMES, self.values, self.deviations)
+            for name, value, deviation in zip(self.names, self.values, self.deviations)
         }
 
     def applied(self, parameters: ReplayParameters) -> ReplayParameters:
         """Return `parameters` with what was found as what is known before the next run, in the sonar's own terms."""
-        ranges, delay, scale, direction = (float(value) for value in self.values)
+        value = dict(zip(self.names, self.values.tolist()))
+        deviation = dict(zip(self.names, self.deviations.tolist()))
         before = parameters.part(BeamCorrection)
-        found = {
-            "range_scale": before.range_scale * (1.0 + ranges),
-            "sonar_delay": before.sonar_delay + delay,
-            "range_scale_deviation": float(self.deviations[0]),
-            "sonar_delay_deviation": float(self.deviations[1]),
-            "odometry_scale": scale,
-            "odometry_direction": direction,
-        }
+        value["range_scale"] = before.range_scale * (1.0 + value["range_scale"])
+        value["sonar_delay"] = before.sonar_delay + value["sonar_delay"]
+        found = {**value, **{f"{name}_deviation": deviation[name] for name in _OF_RUN}}
         return parameters.changed(_allowed(found))
+
+
+def _of_run(deviations: np.ndarray, solver: LiveSolver) -> np.ndarray:
+    """Return deviations (2,) as _OF_RUN; a range scale that the run could not tell is as uncertain as before."""
+    result = deviations[list(_OF_RUN.values())].copy()
+    result[0] = np.hypot(result[0], solver.parameters.sonar.world_scale_deviation)
+    return result
 
 
 def _allowed(values: Dict[str, float]) -> Dict[str, float]:

@@ -19,6 +19,7 @@ from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.mission_report import mission_of
+from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.replay import Replayed, replay
@@ -72,8 +73,10 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     for note in recording.notes:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
     options.out.mkdir(parents=True, exist_ok=True)
+    odometry = _odometry(recording, options)
+    parameters = with_odometry(options.parameters, odometry.kind, options.fixed)
     beams = [placed.beam for placed in recording.beams]
-    parameters = suited(options.parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
+    parameters = suited(parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
     recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)
@@ -91,6 +94,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     seconds = time.monotonic() - start
     summary = {
         **run.counts,
+        "odometry": {"profile": odometry.kind.value.lower(), "reason": odometry.reason},
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
@@ -103,6 +107,13 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     errors, title = errors_of(run, recording), " ".join(bag.name for bag in options.bags)
     _write_report(options.out, mission_of(title, recording, replayed, refined, run, found, errors, known.to_mapping()))
     return summary
+
+
+def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
+    """Return which odometry the recording is mapped with: the one that was said, or else the one that it looks like."""
+    if options.odometry is not None:
+        return OdometryFound(options.odometry, "it was said so")
+    return odometry_of(recording.track)
 
 
 def _write_report(folder: Path, mission: Mission) -> None:
@@ -185,7 +196,8 @@ def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session]
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
     lines = [
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
-        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time"
+        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time",
+        f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
     ]
     for name in (ODOMETRY, CORRECTED, REFINED):
         if name in summary:

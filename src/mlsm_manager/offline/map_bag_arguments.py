@@ -7,6 +7,7 @@ from typing import Any, Dict, List
 import yaml
 
 from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -42,6 +43,10 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         action="store_false",
         help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
     )
+    parser.add_argument(
+        "--odometry", choices=[kind.value.lower() for kind in OdometryKind],
+        help="what the vehicle knows of its motion; default: as the recording looks",
+    )  # fmt: skip
     parser.add_argument("--parameters", type=Path, help="yaml file, such as a live.yaml; --set overrides it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
@@ -59,6 +64,10 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
     options.fixed = frozenset(values)
+    if options.odometry is not None:
+        options.odometry = OdometryKind(options.odometry.upper())
+    elif "odometry" in values:
+        options.odometry = OdometryKind(ReplayParameters.from_mapping({"odometry": values["odometry"]}).odometry)
     options.parameters = ReplayParameters.from_mapping(values)
     options.request = request_of(options, options.parameters.part(ReadingParameters))
     if options.refine and options.parameters.estimator is not Estimator.JOINT:

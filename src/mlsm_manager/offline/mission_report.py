@@ -101,7 +101,7 @@ def _in_map(scan: Scan, replayed: Replayed, refined: Optional[Refined], run: Run
     solver = replayed.solver
     if solver is not None:
         state = solver.state if refined is None else refined.batch.state
-        return drawn(solver.log, state, scan.points, scan.times)[:, :2]
+        return drawn(solver.log, solver.odometry, state, scan.points, scan.times)[:, :2]
     best = list(run.poses.values())[-1]
     poses = np.column_stack([np.interp(scan.times, run.times, best[:, 0]), np.interp(scan.times, run.times, best[:, 1]),
                              np.interp(scan.times, run.times, np.unwrap(best[:, 2]))])  # fmt: skip

@@ -31,6 +31,6 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, resolution: 
     batch = solved(solver)
     surfaces = MultiLevelSurfaceMap(resolution)
     for scan in scans:
-        surfaces.insert(drawn(solver.log, batch.state, scan.points, scan.times))
-    poses = solved_path(track, batch.node_times, batch.state.nodes, track.times)
+        surfaces.insert(drawn(solver.log, solver.odometry, batch.state, scan.points, scan.times))
+    poses = solved_path(track, solver.odometry, batch.node_times, batch.state.nodes, track.times)
     return Refined(poses, surfaces.blocks, batch)

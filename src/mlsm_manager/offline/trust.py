@@ -1,14 +1,15 @@
 """Whether a run can be trusted, told without any truth: the checks of map_bag."""
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Optional, Tuple
 
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.offline.calibration import NAMES, Calibration
+from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.self_check.calibration_agreement import halves_agree
@@ -75,19 +76,25 @@ def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
     solver = replayed.solver
     estimates = solver.estimates
     ends = np.array([estimate.time for estimate in estimates])
-    odometry = solver.parameters.odometry
     path = replayed.corrected if refined is None else refined.poses
     deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
     verdicts = [
-        *against_odometry(
-            replayed.times, replayed.odometry, path,
-            scale_deviation=odometry.scale_deviation, position_walk=odometry.position_walk,
-        ),
+        *_against_odometry(replayed, path, solver.odometry),
         recent_agreement(ends, np.array([estimate.agreement for estimate in estimates])),
         told_deviation(deviations.times, deviations.radii),
-    ]  # fmt: skip
+    ]
     halves = _halves(replayed.scans, solver)
     return Trust(verdicts if halves is None else [*verdicts, halves], deviations)
+
+
+def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:
+    """Compare a path (m, 3) with the odometry's; nothing where that reports no distances."""
+    if np.isinf(odometry.distance_deviation):
+        return ()
+    return against_odometry(
+        replayed.times, replayed.odometry, path,
+        scale_deviation=odometry.distance_deviation, position_walk=odometry.position_walk,
+    )  # fmt: skip
 
 
 def _live_deviations(solver: LiveSolver) -> Deviations:
@@ -108,7 +115,7 @@ def _halves(scans: List[Scan], solver: LiveSolver) -> Optional[Verdict]:
             return None
         found.append(_calibrated(half, solver.parameters, solver.log.sonar_in_base))
     first, second = found
-    return halves_agree(NAMES, first.values, first.deviations, second.values, second.deviations)
+    return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
 
 
 def _calibrated(scans: List[Scan], parameters: MultiViewParameters, sonar_in_base: np.ndarray) -> Calibration:

@@ -1,7 +1,7 @@
 """A vehicle tours a walled harbour; its odometry errs in direction and its beams are late. The truth is known."""
 
 from dataclasses import dataclass
-from typing import List
+from typing import Callable, List, Optional
 
 import numpy as np
 
@@ -25,16 +25,29 @@ class Tour:
     odometry: Track
 
 
-def tour(count: int, direction: float = 0.0, delay: float = 0.0, noise: float = 0.1, seed: int = 0) -> Tour:
-    """Return a tour of `count` scans whose odometry goes `direction` [rad] beside the truth, with late beams."""
+def tour(
+    count: int, direction: float = 0.0, delay: float = 0.0, noise: float = 0.1, seed: int = 0,
+    path: Optional[Callable[[np.ndarray], np.ndarray]] = None,
+) -> Tour:  # fmt: skip
+    """Return a tour of `count` scans whose odometry goes `direction` [rad] beside the truth, with late beams.
+
+    path: gives the true poses (m, 3) at times (m,); by default a vehicle that weaves without regard to its heading.
+    """
     rng = np.random.RandomState(seed)
     times = np.arange(0.0, count * TURN + 5.0, 0.2)
-    truth = Track(times, _path(times))
+    truth = Track(times, (path or _path)(times))
     steps = rotated(np.diff(truth.poses[:, :2], axis=0), np.full(len(times) - 1, -direction))
     positions = np.vstack([np.zeros((1, 2)), np.cumsum(steps, axis=0)]) + truth.poses[0, :2]
     odometry = Track(times, np.column_stack([positions, truth.poses[:, 2]]))
     scans = [_scan(truth, odometry, number, delay, noise, rng) for number in range(count)]
     return Tour(scans, truth, odometry)
+
+
+def ahead(times: np.ndarray) -> np.ndarray:
+    """Return the poses (m, 3) of a vehicle that keeps going ahead, along the path of the others."""
+    poses = _path(times)
+    velocity = np.gradient(poses[:, :2], times, axis=0)
+    return np.column_stack([poses[:, :2], np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))])
 
 
 def _path(times: np.ndarray) -> np.ndarray:

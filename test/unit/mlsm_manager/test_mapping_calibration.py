@@ -4,11 +4,12 @@ import numpy as np
 import pytest
 import yaml
 
-from mlsm_manager.offline.calibration import NAMES, Calibration
+from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.live_file import live_text, replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 
-FOUND = Calibration(np.array([0.02, 0.5, 0.01, -0.07]), np.array([0.008, 0.05, 0.009, 0.03]))
+NAMES = ("range_scale", "sonar_delay", "odometry_scale", "odometry_direction")
+FOUND = Calibration(NAMES, np.array([0.02, 0.5, 0.01, -0.07]), np.array([0.008, 0.05, 0.009, 0.03]))
 
 
 def test_it_is_told_by_name_with_its_deviation():
@@ -27,6 +28,6 @@ def test_live_yaml_holds_it_on_top_of_what_was_set_before():
 
 
 def test_a_run_that_went_astray_is_told_within_what_parameters_allow():
-    astray = Calibration(np.array([9.0, -99.0, 0.0, 9.0]), np.full(4, 9.0))
+    astray = Calibration(NAMES, np.array([9.0, -99.0, 0.0, 9.0]), np.full(4, 9.0))
     after = astray.applied(ReplayParameters())
     assert (after.range_scale, after.sonar_delay, after.odometry_direction) == (2.0, -10.0, 3.2)

@@ -15,14 +15,20 @@ from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.frozen_map import fading, joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations, SparseSolution
+from mlsm_manager.multi_view.odometry_motion import Motion
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
-from mlsm_manager.multi_view.parameters import DvlOdometry, MultiViewParameters, SolverWindow, SurfaceMatching
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
 from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import RANGE_SCALE, Layout, State
 from mlsm_manager.multi_view.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 
 STEP = 1e-6
+DVL = DvlFactors(DvlOdometry())
+TIMES = np.array([0.0, 14.0, 28.0])
+POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
+MOTION = Motion(TIMES, POSES, np.column_stack([TIMES, 0.3 * TIMES]))
 
 
 @pytest.fixture(scope="module")
@@ -39,7 +45,7 @@ def some_state(log):
 
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
-    placed = place(log, some_state(log), log.rows(0, 3))
+    placed = place(log, DVL, some_state(log), log.rows(0, 3))
     pairs = pairs_between(placed, placed, blocks_of(placed, 5), 2.0, SurfaceMatching())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
@@ -61,11 +67,11 @@ def test_a_point_meets_the_nearest_point_of_all_other_scans_of_its_block():
 @pytest.mark.parametrize("unknown", range(2))
 def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown):
     rows, state = log.rows(0, 3), some_state(log)
-    placed = place(log, state, rows)
+    placed = place(log, DVL, state, rows)
     moved = state.copy()
     step = 0.01  # delays within one step of the odometry: its path is a polygon
     moved.run[unknown] += step
-    change = (place(log, moved, rows).places - placed.places) / step
+    change = (place(log, DVL, moved, rows).places - placed.places) / step
     np.testing.assert_allclose(change, placed.by_run[..., unknown], atol=0.5)
     np.testing.assert_allclose(np.median(np.abs(change - placed.by_run[..., unknown])), 0.0, atol=0.03)
 
@@ -75,12 +81,12 @@ def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
     state = some_state(log)
     pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
     rows = log.rows(0, 3)
-    placed = place(log, state, rows)
+    placed = place(log, DVL, state, rows)
     before, jacobian = linearised(pairs, placed, placed)
     moved = state.copy()
     moved.nodes[0, column] += STEP
-    after = place(log, moved, rows)
-    turned = place(log, state, rows)
+    after = place(log, DVL, moved, rows)
+    turned = place(log, DVL, state, rows)
     change = np.einsum(
         "na,na->n", after.places[pairs.rows] - turned.places[pairs.rows], placed.normals[pairs.neighbours]
     )
@@ -90,7 +96,7 @@ def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
 
 def test_a_world_that_is_larger_altogether_fits_as_well(log):
     """Ranges and odometry scaled alike leave the residual per unit of scale, and so the fit, as it is."""
-    placed = place(log, some_state(log), log.rows(0, 3))
+    placed = place(log, DVL, some_state(log), log.rows(0, 3))
     pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
     residual, jacobian = linearised(pairs, placed, placed)
     difference = placed.by_run[pairs.rows] - placed.by_run[pairs.neighbours]
@@ -100,26 +106,24 @@ def test_a_world_that_is_larger_altogether_fits_as_well(log):
 
 def test_odometry_that_went_as_expected_pulls_at_nothing():
     factors = DvlFactors(DvlOdometry(direction=0.2, scale=0.05))
-    poses = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
     nodes = [factors.first_node()]
-    for before, after in zip(poses[:-1], poses[1:]):
-        nodes.append(factors.next_node(nodes[-1], before, after))
+    for node in range(2):
+        after = factors.advanced(nodes[-1][np.newaxis], MOTION[node : node + 1], MOTION[node + 1 : node + 2])
+        nodes.append(after[0])
     equations = NormalEquations(Layout(0, 2, factors.width).size)
-    factors.add_steps(equations, Layout(0, 2, factors.width), np.array(nodes), np.array([0.0, 14.0, 28.0]), poses)
+    factors.add_steps(equations, Layout(0, 2, factors.width), np.array(nodes), MOTION)
     np.testing.assert_allclose(equations.gradient, 0.0, atol=1e-9)
 
 
 @pytest.mark.parametrize("column", range(4))
 def test_odometry_residuals_and_derivatives_agree(column):
-    factors = DvlFactors(DvlOdometry())
-    layout, times = Layout(0, 2, factors.width), np.array([0.0, 14.0, 28.0])
-    poses = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
+    factors, layout = DVL, Layout(0, 2, DVL.width)
     nodes = np.random.RandomState(2).normal(0.0, 0.05, (3, 5))
     nodes[:, 4] = 0.0  # about scale 0, residuals per unit of scale and residuals are the same
 
     def equations_at(values):
         found = NormalEquations(layout.size)
-        factors.add_steps(found, layout, values, times, poses)
+        factors.add_steps(found, layout, values, MOTION)
         return found
 
     moved = nodes.copy()
@@ -140,7 +144,7 @@ def test_a_scan_is_compared_with_the_nearest_blocks_only(log):
     few = replace(
         MultiViewParameters(), matching=SurfaceMatching(block_scans=1), window=SolverWindow(max_frozen_blocks=2)
     )
-    near = nearest_blocks(log, some_state(log), 3, np.array([12.0, 0.0]), few)
+    near = nearest_blocks(log, DVL, some_state(log), 3, np.array([12.0, 0.0]), few)
     assert 1 <= len(near.numbers) <= 2
     assert set(near.points.scans) == set(near.numbers)
     assert len(near.importance) == len(near.points)

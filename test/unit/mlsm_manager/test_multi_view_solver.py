@@ -8,10 +8,12 @@ from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
+from mlsm_manager.multi_view.dvl_factors import DIRECTION, DvlFactors
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.parameters import DvlOdometry, MultiViewParameters, SolverWindow
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow
 from mlsm_manager.multi_view.path import live_path, solved_path
-from mlsm_manager.multi_view.state import DELAY, DIRECTION
+from mlsm_manager.multi_view.state import DELAY
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed
 
@@ -65,7 +67,7 @@ def test_direction_and_delay_are_found(live, batch):
 def test_batch_is_closer_to_the_truth_than_live(made, live, batch):
     times = np.arange(1.0, live.log.node_times[-1], 2.0)
     known = live_path(made.odometry, live.estimates, live.odometry, 1.0, times)
-    fitted = solved_path(made.odometry, batch.node_times, batch.state.nodes, times)
+    fitted = solved_path(made.odometry, live.odometry, batch.node_times, batch.state.nodes, times)
     assert distances(fitted, made.truth, times).mean() < 0.3
     assert distances(fitted, made.truth, times).mean() < distances(known, made.truth, times).mean()
 
@@ -161,7 +163,7 @@ def test_scans_agree_with_the_map_they_made_and_not_with_another(made, live):
     scan = made.scans[10]
     strange = replace(scan, points=scan.points + np.array([1.9, 1.9, 0.0, 0.0]))
     solver = followed(made.scans[:10])
-    sure = replace(solver.parameters, odometry=DvlOdometry(position_walk=0.001, direction_deviation=0.001))
+    sure = replace(solver.parameters, odometry=DvlFactors(DvlOdometry(position_walk=0.001, direction_deviation=0.001)))
     solver = followed(tour(10).scans, sure)
     assert solver.add(strange).agreement < 0.5
 

@@ -1,0 +1,84 @@
+"""Named sets of parameters for vehicles that know more or less of their own motion, each value with its reason."""
+
+from typing import Any, Dict, NamedTuple, Sequence
+
+import yaml
+
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+
+
+class Setting(NamedTuple):
+    """A value of a parameter of mlsm_core, and why it is that."""
+
+    key: str
+    value: Any
+    reason: str
+
+
+_COMPASS = (
+    Setting("heading_deviation", 0.0175, "1 degree: a compass's data sheet, iron near it included"),
+    Setting("turn_rate_deviation", 7e-5, "the drift of its gyro between two fixes of the compass is far below that"),
+)
+_JOINT = Setting("estimator", Estimator.JOINT.value, "the newest scans find their poses together")
+_NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
+_UNREPORTED = (
+    Setting("scale_deviation", 0.0, "no distances are reported"),
+    Setting("direction_deviation", 0.0, "no directions of motion are reported"),
+    Setting("speed_deviation", 0.15, "m/s: by as much a small vehicle changes its speed while it works"),
+    Setting("rate_time", 40.0, "s: as long such a change lasts, a turn or a manoeuvre"),
+    Setting("start_speed_deviation", 0.3, "m/s: the usual speed of a small vehicle; set 0.02 for a standing start"),
+    Setting("travel_walk", 0.005, "m/s per root second: the speed of travel may change by 0.1 m/s in 7 minutes"),
+    Setting("slip_deviation", 0.07, "m/s: vehicles go ahead; they slip in turns and in a slow current"),
+    Setting("slip_time", 20.0, "s: a turn"),
+    _NEIGHBOURS,
+)
+
+PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
+    OdometryKind.DVL: (
+        _JOINT,
+        Setting("scale_deviation", 0.01, "a DVL's data sheet, speed of sound included"),
+        Setting("direction_deviation", 0.1, "rad: the angle at which it is mounted, set by eye to 6 degrees"),
+        Setting("speed_deviation", 0.025, "m/s: noise of its velocities"),
+        Setting("rate_time", 12.0, "s: as long that noise lasts"),
+        Setting("motion_time", 10000.0, "s: scale and mounting hardly change during a mission"),
+        *_COMPASS,
+    ),
+    OdometryKind.THRUSTERS: (
+        _JOINT,
+        Setting("scale_deviation", 0.3, "the speed at a thrust is known to a third"),
+        Setting("direction_deviation", 0.1, "rad: thrusters push ahead to some degrees"),
+        Setting("speed_deviation", 0.02, "m/s: what a command leaves open"),
+        Setting("rate_time", 60.0, "s: as long that lasts"),
+        Setting("motion_time", 3600.0, "s: the scale changes with the battery and with what hangs on the vehicle"),
+        Setting("current_deviation", 0.05, "m/s: a current in sheltered water"),
+        Setting("current_walk", 0.002, "m/s per root second: the current may change by 0.05 m/s in ten minutes"),
+        _NEIGHBOURS,
+        *_COMPASS,
+    ),
+    OdometryKind.HEADING: (_JOINT, *_UNREPORTED, *_COMPASS),
+    OdometryKind.NONE: (
+        _JOINT,
+        *_UNREPORTED,
+        Setting("heading_deviation", 0.0, "no compass"),
+        Setting("turn_rate_deviation", 0.05, "rad/s: 3 degrees per second, a small vehicle's usual turn"),
+        Setting("turn_rate_time", 10.0, "s: as long such a turn lasts"),
+    ),
+}
+
+
+def profile_values(kind: OdometryKind) -> Dict[str, Any]:
+    """Return the parameters of mlsm_core that a profile sets."""
+    return {"odometry": kind.value, **{setting.key: setting.value for setting in PROFILES[kind]}}
+
+
+def profile_yaml(kind: OdometryKind) -> str:
+    """Return the text of a profile's yaml file, for the launch files' argument `odometry`."""
+    lines = [
+        f"# Written by scripts/document. The launch files load it with odometry:={kind.value.lower()}.",
+        "mlsm_core:",
+    ]
+    lines.append(f"  odometry: {kind.value}")
+    for setting in PROFILES[kind]:
+        lines += [f"  # {setting.reason}", f"  {setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
+    return "\n".join(lines) + "\n"

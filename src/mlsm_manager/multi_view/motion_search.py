@@ -1,0 +1,65 @@
+"""Looks for the newest node where the solver's own steps do not reach, because the motion is hardly known."""
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.multi_view.odometry_model import OdometryModel
+from mlsm_manager.multi_view.parameters import SurfaceMatching
+from mlsm_manager.multi_view.placement import PlacedPoints, place
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.transition import Transition
+
+_REACH = 3.0  # standard deviations of the step within which is searched
+_KNOWN = 2.0  # so many within the cut, and the solver's own steps do
+_MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
+_CELL = 1.0  # m: about twice the deviation of an echo, so that no place falls between two cells
+_COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
+_MOST_POINTS = 150  # of the newest scan; neighbours on a wall say the same
+_NATS = 0.1  # that a point on a surface is worth: neighbours share errors
+
+
+def searched_node(
+    log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, matching: SurfaceMatching
+) -> np.ndarray:
+    """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
+
+    covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
+    far from the expected one must fit better by what the motion's covariance asks (correlative search, Olson 2009).
+    """
+    newest = state.nodes[-1]
+    transition = Transition.of(odometry, state.nodes[-2:], log.node_motion(np.array([-2, -1])))
+    step = transition.step_covariance(covariance)
+    if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut:
+        return newest
+    last = log.scan_count
+    before, own = log.rows(max(0, last - 1 - _COMPARED_SCANS), last - 1), log.rows(last - 1, last)
+    if not len(before) or not len(own):
+        return newest
+    sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
+    shifts = _cells(step[:2, :2])
+    fits = _fits(sources, place(log, odometry, state, before), shifts, matching)
+    costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
+    best = shifts[np.argmax(_NATS * fits - costs)]
+    return newest + step[:, :2] @ np.linalg.solve(step[:2, :2], best)
+
+
+def _cells(covariance: np.ndarray) -> np.ndarray:
+    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none."""
+    reach = _REACH * np.sqrt(np.diag(covariance))
+    cell = max(_CELL, float(reach.max()) / _MOST_CELLS)
+    x, y = (cell * np.arange(-np.floor(one / cell), np.floor(one / cell) + 1.0) for one in reach)
+    shifts = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
+    distance = np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(covariance))
+    return np.concatenate([np.zeros((1, 2)), shifts[distance <= _REACH**2]])
+
+
+def _fits(sources: PlacedPoints, targets: PlacedPoints, shifts: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
+    """Return how many points (k,) lie on surfaces after shifts (k, 2) of the scan's end; nearly counts in part."""
+    moved = sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
+    distance, index = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=matching.cut)
+    found = np.isfinite(distance)
+    index = np.where(found, index, 0).reshape(moved.shape[:2])
+    cosine = np.einsum("na,kna->kn", sources.normals, targets.normals[index])
+    near = np.exp(-0.5 * np.where(found, distance / _CELL, np.inf) ** 2).reshape(cosine.shape)
+    return (near * sources.qualities * (cosine > matching.min_cosine)).sum(axis=1)

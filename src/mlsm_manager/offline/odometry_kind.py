@@ -1,0 +1,41 @@
+"""Which odometry a recording holds, told from what it reports."""
+
+from typing import Collection, NamedTuple
+
+import numpy as np
+
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+
+_STANDS = (
+    0.05  # m: a reported position that stays within this never changed; rounding, and lever arms of a tilting base
+)
+_TURNS = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more
+
+
+class OdometryFound(NamedTuple):
+    """kind: of the odometry. reason: one line that says why."""
+
+    kind: OdometryKind
+    reason: str
+
+
+def odometry_of(track: Track) -> OdometryFound:
+    """Return what a recording's T_odom_base tells of the vehicle's motion."""
+    extent = np.ptp(track.poses[:, :2], axis=0).max()
+    turned = np.ptp(track.poses[:, 2])
+    if extent > _STANDS:
+        reason = f"positions change by up to {extent:.1f} m; say --odometry thrusters if no DVL measured them"
+        return OdometryFound(OdometryKind.DVL, reason)
+    if turned > _TURNS:
+        degrees = np.degrees(turned)
+        return OdometryFound(OdometryKind.HEADING, f"the position never changes, the heading by {degrees:.0f} degrees")
+    reason = "neither position nor heading changes, so the vehicle stands still; if it moved, say --odometry none"
+    return OdometryFound(OdometryKind.DVL, reason)
+
+
+def with_odometry(parameters: ReplayParameters, kind: OdometryKind, fixed: Collection[str]) -> ReplayParameters:
+    """Return `parameters` with the profile of an odometry, but for those that are `fixed`."""
+    return parameters.changed({key: value for key, value in profile_values(kind).items() if key not in fixed})

@@ -1,0 +1,76 @@
+"""The search for a scan whose vehicle moved farther than the solver's own steps reach."""
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, ahead, tour
+
+from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.motion_search import searched_node
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry, HeadingOdometry
+from mlsm_manager.multi_view.parameters import SurfaceMatching
+from mlsm_manager.multi_view.path import NodePath
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.transition import Transition
+
+FAR = np.array([3.0, -5.0])
+HEADING = HeadingFactors(HeadingOdometry())
+
+
+@pytest.fixture(scope="module")
+def log():
+    made = RunLog(SONAR_IN_BASE)
+    for scan in tour(6, path=ahead).scans:
+        made.append(scan, 1.0)
+    return made
+
+
+def state_with(log, model, shift):
+    """Return the true state, but for the newest node, which is `shift` (2,) [m] off."""
+    nodes = np.zeros((log.scan_count + 1, model.width))
+    nodes[-1, :2] = shift
+    return State(nodes, np.zeros(2))
+
+
+def test_a_scan_is_found_metres_from_where_it_was_expected(log):
+    covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
+    found = searched_node(log, HEADING, state_with(log, HEADING, FAR), covariance, SurfaceMatching())
+    assert np.hypot(*found[:2]) < 1.5
+    assert np.hypot(*found[3:5]) > 0.05  # a node that is moved has another velocity
+
+
+def test_a_scan_that_is_where_it_was_expected_stays(log):
+    covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
+    found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, SurfaceMatching())
+    assert np.hypot(*found[:2]) < 1.5
+
+
+def test_a_motion_that_is_known_is_not_searched(log):
+    dvl = DvlFactors(DvlOdometry())
+    state = state_with(log, dvl, FAR)
+    covariance = np.diag([0.01, 0.01, 0.01, 0.01, 0.01]) ** 2
+    assert searched_node(log, dvl, state, covariance, SurfaceMatching()) is not None
+    np.testing.assert_array_equal(searched_node(log, dvl, state, covariance, SurfaceMatching())[:2], FAR)
+
+
+def test_a_speed_that_is_unknown_makes_a_step_unknown(log):
+    motion, nodes = log.node_motion(np.array([1, 2])), np.zeros((2, HEADING.width))
+    transition = Transition.of(HEADING, nodes, motion)
+    at_rest = transition.step_covariance(np.zeros((6, 6)))
+    moving = transition.step_covariance(np.diag([9.0, 9.0, 9.0, 0.3, 0.0, 0.3]) ** 2)
+    seconds = motion.times[1] - motion.times[0]
+    added = np.sqrt(np.trace(moving[:2, :2] - at_rest[:2, :2]))
+    assert 0.7 * 0.3 * seconds < added < 0.3 * seconds
+
+
+def test_the_path_of_a_heading_bends_between_nodes_as_the_heading_did(log):
+    """A vehicle that goes ahead at a known speed is where the integral of its heading is, all the way."""
+    times = log.node_times[:3]
+    ahead_of_nodes = log.odometry.motion(times).ahead
+    nodes = np.zeros((3, HEADING.width))
+    nodes[:, :2] = 0.2 * ahead_of_nodes - log.odometry.at(times)[:, :2]
+    nodes[:, 3] = 0.2
+    between = np.linspace(times[0], times[-1], 40)
+    path = NodePath(HEADING, log.odometry, times, nodes).at(between)
+    np.testing.assert_allclose(path[:, :2], 0.2 * log.odometry.motion(between).ahead, atol=1e-9)

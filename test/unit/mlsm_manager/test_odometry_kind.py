@@ -1,0 +1,56 @@
+"""Which odometry a recording holds, and the profiles."""
+
+import numpy as np
+import pytest
+import yaml
+
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import PROFILES, profile_values, profile_yaml
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.live_file import replay_values
+from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+
+TIMES = np.linspace(0.0, 100.0, 50)
+
+
+def track(x=0.0, y=0.0, yaw=0.0):
+    return Track(TIMES, np.column_stack([np.full(50, x), np.full(50, y), np.full(50, yaw)]))
+
+
+@pytest.mark.parametrize(
+    ("reported", "kind"),
+    [
+        (track(x=TIMES), OdometryKind.DVL),
+        (track(x=TIMES, yaw=TIMES / 50.0), OdometryKind.DVL),
+        (track(x=3.0, yaw=np.sin(TIMES)), OdometryKind.HEADING),
+        (track(x=1e-3 * np.sin(TIMES), yaw=np.sin(TIMES)), OdometryKind.HEADING),
+        (track(x=3.0, y=1.0, yaw=0.4), OdometryKind.DVL),
+    ],
+)
+def test_what_changes_tells_the_odometry(reported, kind):
+    assert odometry_of(reported).kind is kind
+
+
+@pytest.mark.parametrize("kind", list(OdometryKind))
+def test_every_profile_is_allowed_live_and_on_recordings(kind):
+    live = yaml.safe_load(profile_yaml(kind))
+    assert MlsmCoreParameters.from_mapping(live["mlsm_core"]).odometry is kind
+    assert with_odometry(ReplayParameters(), kind, ()) == ReplayParameters.from_mapping(replay_values(live))
+
+
+@pytest.mark.parametrize("kind", list(OdometryKind))
+def test_every_value_of_a_profile_has_a_reason(kind):
+    assert all(setting.reason for setting in PROFILES[kind])
+
+
+def test_the_defaults_on_recordings_are_the_profile_of_a_dvl():
+    assert with_odometry(ReplayParameters(), OdometryKind.DVL, ()) == ReplayParameters()
+
+
+def test_what_a_person_set_is_not_changed_by_a_profile():
+    mine = ReplayParameters(slip_deviation=0.4)
+    chosen = with_odometry(mine, OdometryKind.HEADING, {"slip_deviation"})
+    assert chosen.slip_deviation == 0.4
+    assert chosen.speed_deviation == profile_values(OdometryKind.HEADING)["speed_deviation"]

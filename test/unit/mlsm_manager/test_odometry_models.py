@@ -1,0 +1,173 @@
+"""Odometry models: derivatives, what they expect, and that they use of the odometry only what they say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, ahead, tour
+
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.multi_view.estimate import scale_covariance
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.normal_equations import NormalEquations
+from mlsm_manager.multi_view.odometry_motion import Motion
+from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.state import Layout
+from node_support.geometry.planar import composed, inverse, transformed
+
+STEP = 1e-6
+TIMES = np.array([0.0, 14.0, 28.0])
+POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
+MOTION = Motion(TIMES, POSES, np.array([[0.0, 0.0], [13.5, 2.0], [26.0, 8.0]]))
+KINDS = list(OdometryKind)
+
+
+def parameters(kind, **changes):
+    profile = MlsmCoreParameters().changed({**profile_values(kind), **changes})
+    return profile.solver_parameters(profile.part(OdometryErrors), 0.0)
+
+
+def model_of(kind, **changes):
+    return parameters(kind, **changes).odometry
+
+
+def followed(scans, kind, **changes):
+    solver = LiveSolver(parameters(kind, **changes), SONAR_IN_BASE)
+    for scan in scans:
+        solver.add(scan)
+    return solver
+
+
+def some_nodes(model, seed=2):
+    nodes = np.random.RandomState(seed).normal(0.0, 0.05, (3, model.width))
+    if "odometry_scale" in model.calibrated:
+        nodes[:, model.calibrated["odometry_scale"]] = 0.0  # there residuals are the same as those per unit of scale
+    return nodes
+
+
+def equations_of(model, nodes):
+    layout = Layout(0, 2, model.width)
+    equations = NormalEquations(layout.size)
+    model.add_steps(equations, layout, nodes, MOTION)
+    return equations
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_motion_that_went_as_expected_pulls_at_nothing(kind):
+    model = model_of(kind)
+    nodes = [np.random.RandomState(4).normal(0.0, 0.1, model.width)]
+    nodes[0][2] = 0.0  # a compass error is expected to fade
+    for node in range(2):
+        nodes.append(model.advanced(nodes[-1][np.newaxis], MOTION[node : node + 1], MOTION[node + 1 : node + 2])[0])
+    np.testing.assert_allclose(equations_of(model, np.array(nodes)).gradient, 0.0, atol=2e-2)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_residuals_and_derivatives_agree(kind):
+    model = model_of(kind)
+    nodes = some_nodes(model)
+    gradient = equations_of(model, nodes).gradient
+    for column in range(model.width):
+        if column == model.calibrated.get("odometry_scale"):
+            continue
+        up, down = nodes.copy(), nodes.copy()
+        up[1, column] += STEP
+        down[1, column] -= STEP
+        cost = (equations_of(model, up).cost - equations_of(model, down).cost) / STEP / 4.0
+        assert cost == pytest.approx(gradient[model.width + column], rel=1e-3, abs=1e-3)
+
+
+def test_what_the_world_s_scale_leaves_open_grows_from_the_map_s_origin():
+    poses = np.array([[0.0, 0.0, 1.0], [30.0, 40.0, 2.0]])
+    covariances = scale_covariance(poses, 0.02)
+    np.testing.assert_allclose(covariances[0], 0.0)
+    assert np.sqrt(np.trace(covariances[1])) == pytest.approx(0.02 * 50.0)
+
+
+@pytest.mark.parametrize("kind", [OdometryKind.HEADING, OdometryKind.NONE])
+def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
+    model = model_of(kind)
+    nodes, positions = some_nodes(model), np.array([[5.0, 1.0], [-3.0, 9.0], [0.0, 4.0]])
+    elsewhere = nodes.copy()
+    elsewhere[:, :2] += POSES[:, :2] - positions
+    other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead)
+    there = NormalEquations(Layout(0, 2, model.width).size)
+    model.add_steps(there, Layout(0, 2, model.width), elsewhere, other)
+    np.testing.assert_allclose(there.gradient, equations_of(model, nodes).gradient, rtol=1e-9, atol=1e-9)
+
+
+def test_ahead_is_where_a_vehicle_would_be_that_always_went_ahead():
+    times = np.linspace(0.0, 10.0, 1001)
+    yaw = 0.3 * times
+    timeline = OdometryTimeline.of(Track(times, np.column_stack([0.0 * times, 0.0 * times, yaw])))
+    expected = np.column_stack([np.sin(yaw), 1.0 - np.cos(yaw)]) / 0.3
+    np.testing.assert_allclose(timeline.motion(times).ahead, expected, atol=1e-4)
+
+
+def test_a_timeline_that_grows_piece_by_piece_goes_on_ahead():
+    times = np.linspace(0.0, 10.0, 101)
+    track = Track(times, np.column_stack([0.0 * times, 0.0 * times, np.sin(times)]))
+    pieces = OdometryTimeline()
+    for end in (3.0, 3.05, 7.2, 10.0):
+        pieces.extend(track, end)
+    np.testing.assert_allclose(pieces.motion(times).ahead, OdometryTimeline.of(track).motion(times).ahead, atol=1e-12)
+
+
+@pytest.fixture(scope="module")
+def made():
+    return tour(20, path=ahead)
+
+
+def errors_of(solver, made):
+    ends = np.array([estimate.time for estimate in solver.estimates])
+    truth = made.truth.at(ends) - made.truth.at(0.0) * [1.0, 1.0, 0.0]
+    path = np.array([estimate.T_map_base for estimate in solver.estimates])
+    return path - solver.log.node_poses(np.array([0])) * [1.0, 1.0, 0.0] - truth
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_each_model_follows_a_vehicle_in_a_harbour(kind, made):
+    error = errors_of(followed(made.scans, kind), made)
+    assert np.hypot(*error[8:, :2].T).max() < 1.5
+
+
+def test_a_velocity_that_nobody_reported_is_found_with_its_deviation(made):
+    solver = followed(made.scans, OdometryKind.HEADING)
+    for estimate in solver.estimates[10:]:
+        true = made.truth.velocity_at(estimate.time, 4.0)
+        deviation = np.sqrt(np.diag(estimate.velocity_covariance)[:2])
+        assert (np.abs(estimate.velocity[:2] - true[:2]) < 4.0 * deviation + 0.1).all()
+        assert (deviation < 0.2).all()
+
+
+def scaled(scan, factor):
+    """Return a scan whose odometry reports distances that are `factor` times the true ones."""
+    track = scan.track
+    shrunk = Track(track.times, track.poses * [factor, factor, 1.0])
+    move = composed(shrunk.at(scan.times), inverse(track.at(scan.times)))
+    return replace(scan, points=transformed(move, scan.points), track=shrunk)
+
+
+def test_thrusters_find_a_scale_that_is_30_percent_off(made):
+    solver = followed([scaled(scan, 1.0 / 1.3) for scan in made.scans], OdometryKind.THRUSTERS)
+    newest = solver.estimates[-1]
+    column = solver.odometry.calibrated["odometry_scale"]
+    assert newest.node[column] == pytest.approx(0.3, abs=0.06)
+
+
+def silent(scan):
+    return replace(scan, points=np.empty((0, 4)), times=np.empty(0), moving=np.empty(0, dtype=bool))
+
+
+def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
+    scans = [silent(scan) if 8 <= number < 17 else scan for number, scan in enumerate(made.scans)]
+    solver = followed(scans, OdometryKind.HEADING)
+    radii = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
+    distance = np.hypot(*errors_of(solver, made)[:, :2].T)
+    assert (np.diff(radii[8:17]) > 0.0).all()
+    assert radii[16] > 3.0 * radii[7]
+    assert distance[16] < 3.0 * radii[16]
