@@ -47,7 +47,10 @@ class SurfaceMatching(ParameterSet):
     cut: float = parameter(2.2, "points farther apart are not compared", unit="m", low=0.1, high=50.0)
     wide_cut: float = parameter(4.0, "the cut that a new scan starts with", unit="m", low=0.1, high=50.0)
     weight: float = parameter(
-        0.03, "weight of one comparison: neighbours share errors, and a point meets many scans", low=1e-4, high=1.0
+        0.1,
+        "weight of the comparison of two echoes: neighbours share errors, and an echo meets many scans",
+        low=1e-4,
+        high=1.0,
     )
     min_cosine: float = parameter(
         0.75, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99

@@ -17,6 +17,7 @@ _STEP_QUANTILE = 0.25  # of the angles between beams with echoes: some of these 
 _NEAR = 0.75  # share of the reach within which a neighbour counts fully; from there to the reach it fades out
 _FEWEST = (4.0, 5.0)  # neighbours, the point included: from no line at all to a line
 _FLATNESS = (0.35, 0.25)  # variance across over variance along: from a heap to a line
+_ECHO_LENGTH = (3.0, 2.0)  # m: from points of a beam that tell of two surfaces to points of one echo
 _NOTHING = 1e-9  # m: keeps points on top of each other, or of the sonar, from dividing by zero
 _GRAZING = (0.02, 0.1)  # cosine of incidence: from no telling which side of a surface was heard to certainty
 
@@ -60,6 +61,7 @@ class SurfacePoints:
         normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
         slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
         qualities = qualities * ramp(np.abs(outward) / np.maximum(ranges, _NOTHING), *_GRAZING)
+        qualities = qualities / np.sqrt(points_per_echo(scan.times, ranges))
         known = qualities > 0.0
         return cls(*(array[known] for array in (scan.times, ranges, bearings, normals, slants, qualities)))
 
@@ -73,6 +75,25 @@ def reaches(times: np.ndarray, bearings: np.ndarray, ranges: np.ndarray) -> np.n
     steps = np.abs(wrapped(np.diff(bearings[first])))
     angle = _REACH_STEPS * np.quantile(steps, _STEP_QUANTILE) if len(steps) else 0.0
     return np.maximum(LEAST_REACH, np.clip(angle, *_REACH_ANGLES) * ranges)
+
+
+def points_per_echo(times: np.ndarray, ranges: np.ndarray) -> np.ndarray:
+    """Return how many points (n,) tell the same as each one: those of its beam at about its range, itself included.
+
+    times: (n,) s, one per beam. ranges: (n,) m.
+    """
+    order = np.lexsort([ranges, times])
+    times, ranges = times[order], ranges[order]
+    count = np.ones(len(order))
+    for lag in range(1, len(order)):
+        share = np.where(times[lag:] == times[:-lag], ramp(ranges[lag:] - ranges[:-lag], *_ECHO_LENGTH), 0.0)
+        if not share.any():
+            break
+        count[lag:] += share
+        count[:-lag] += share
+    result = np.empty(len(order))
+    result[order] = count
+    return result
 
 
 def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

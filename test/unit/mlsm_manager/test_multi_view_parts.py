@@ -22,7 +22,7 @@ from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow
 from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import RANGE_SCALE, Layout, State
-from mlsm_manager.multi_view.surface_points import SurfacePoints, reaches, surface_normals
+from mlsm_manager.multi_view.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 
 STEP = 1e-6
 DVL = DvlFactors(DvlOdometry())
@@ -213,6 +213,22 @@ def test_a_beam_that_heard_nothing_does_not_change_the_reach():
     heard = np.delete(np.arange(40), [5, 6, 21])
     whole = reaches(np.arange(40.0), bearings, np.full(40, 30.0))
     np.testing.assert_allclose(reaches(heard * 1.0, bearings[heard], np.full(37, 30.0)), whole[heard])
+
+
+def test_points_all_along_one_echo_share_its_weight():
+    times, ranges = np.array([2.0, 1.0, 2.0, 2.0, 1.0, 2.0]), np.array([11.0, 5.0, 10.0, 12.0, 40.0, 30.0])
+    np.testing.assert_array_equal(points_per_echo(times, ranges), [3.0, 1.0, 3.0, 3.0, 1.0, 1.0])
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.floats(0.0, 50.0)), max_size=20), st.randoms())
+def test_points_per_echo_do_not_depend_on_their_order(points, random):
+    shuffled = points[:]
+    random.shuffle(shuffled)
+    counts = [
+        dict(zip(some, points_per_echo(*np.array(some, dtype=float).reshape(-1, 2).T))) for some in (points, shuffled)
+    ]
+    assert counts[0].keys() == counts[1].keys()
+    np.testing.assert_allclose([counts[0][point] for point in points], [counts[1][point] for point in points])
 
 
 def test_a_heap_of_points_is_no_surface():

@@ -1,0 +1,114 @@
+"""Prints how far the joint solver's paths are from the truth, and how honest it is, with heads of different sharpness.
+
+PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.heads [--worlds basin harbour] [--draws N]
+
+Each tour is simulated once per head. Its odometry is then drawn N times, with errors as those of a DVL and a compass.
+"""
+
+import argparse
+from typing import List, Tuple
+
+import numpy as np
+import yaml
+
+from benchmarks.matching_scans import KINDS, RAYS, SonarKind
+from benchmarks.tour_scans import BEAMS_AT_ONCE, ROOT, START_NS
+from benchmarks.twins.odometry import reported
+from benchmarks.twins.parameters import TwinParameters
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.multi_view.batch_solver import solved
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.offline.echo_length import echo_sigma
+from mlsm_manager.offline.echo_shape import EchoShape, suited
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.geometry.planar import matrices
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_simulator.simulation.simulation_setup import Settings, Setup, make_setup
+from sonar_simulator.vehicle.robot_description import RobotDescription
+
+_STEP = 0.1  # s between poses of the odometry
+
+
+def recordings(world: str, kind: SonarKind, draws: int) -> List[Tuple[Recording, Track]]:
+    """Return recordings of one simulated tour, each with another odometry, and the true path of each."""
+    setup, times, poses, beams = _setup(world, kind), [], [], []
+    for moment in setup.simulation.moments(20.0, BEAMS_AT_ONCE):
+        time, pose = START_NS * 1e-9 + moment.time, moment.truth.T_world_base
+        if not times or time > times[-1]:
+            times.append(time)
+            poses.append([pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])])
+        if moment.ping is not None:
+            stamp_ns = round(1e9 * time)
+            beams.append(
+                Beam(stamp_ns, "sonar", moment.ping.angle, moment.ping.strengths, setup.sonar.range_resolution)
+            )
+    path, steps = Track(np.array(times), np.array(poses)), np.arange(times[0], times[-1], _STEP)
+    truth = Track(steps, path.at(steps))
+    return [(_drawn(truth, beams, setup.T_base_sonar, seed), truth) for seed in range(draws)]
+
+
+def _setup(world: str, kind: SonarKind) -> Setup:
+    values = yaml.safe_load((ROOT / "yaml/sonar_simulator_demo.yaml").read_text())
+    rows, columns = RAYS[kind.rays]
+    values.update(
+        laser_cone={"spread": kind.spread}, sonar={"ray_rows": rows, "ray_columns": columns},
+        world=f"worlds/{world}.sdf", script=f"yaml/{world}_tour.yaml", odometry={"scale_error": 0.0},
+    )  # fmt: skip
+    robot = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
+    return make_setup(Settings.from_mapping(values), ROOT, robot, lambda warning: None)
+
+
+def _drawn(truth: Track, beams: List[Beam], T_base_sonar: np.ndarray, seed: int) -> Recording:
+    """Return the recording with odometry errors drawn from what the solver expects of a DVL and a compass."""
+    rng, expected = np.random.RandomState(seed), DvlOdometry()
+    errors = TwinParameters(
+        direction=rng.normal(0.0, expected.direction_deviation), scale=rng.normal(0.0, expected.scale_deviation)
+    )
+    made = reported(truth, errors, rng)
+    odometry = Track(made.times, made.poses + np.append(truth.poses[0, :2], 0.0))
+    places = matrices(odometry.at(np.array([beam.stamp_ns for beam in beams]) * 1e-9)) @ T_base_sonar
+    return Recording([PlacedBeam(beam, place, True) for beam, place in zip(beams, places)], 0, odometry, None)
+
+
+def figures(recording: Recording, truth: Track) -> np.ndarray:
+    """Return (2, 3) of the live and of the batch solver: mean error [m], NEES per state, median deviation [m]."""
+    sigma = echo_sigma([placed.beam for placed in recording.beams])
+    parameters = suited(ReplayParameters(), EchoShape.PEAK, (), sigma)
+    solver = LiveSolver(MultiViewParameters(), recording.sonar_in_base)
+    for scan, _ in scans_of(recording, parameters.echoes()):
+        solver.add(scan)
+    batch, times = solved(solver), solver.log.node_times[1:]
+    live = np.array([estimate.T_map_base for estimate in solver.estimates])
+    fitted = recording.track.at(times) + batch.state.nodes[1:, :3]
+    covariances = np.array([estimate.pose_covariance for estimate in solver.estimates]), batch.pose_covariances[1:]
+    return np.array([_judged(path, truth.at(times), own) for path, own in zip((live, fitted), covariances)])
+
+
+def _judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> Tuple[float, float, float]:
+    error, covariances = (path - truth)[:, :2], covariances[:, :2, :2]
+    squared = np.einsum("na,na->n", error, np.linalg.solve(covariances, error[..., np.newaxis])[..., 0])
+    deviation = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
+    return float(np.hypot(*error.T).mean()), float(squared.mean() / 2.0), float(np.median(deviation))
+
+
+def main() -> None:
+    """Print one line per world and head."""
+    parser = argparse.ArgumentParser(prog="benchmarks.heads", description=__doc__)
+    parser.add_argument("--worlds", nargs="+", default=["basin", "harbour"], choices=["basin", "harbour"])
+    parser.add_argument("--draws", type=int, default=4, help="odometries per tour (default: %(default)s)")
+    arguments = parser.parse_args()
+    for world in arguments.worlds:
+        for kind in KINDS:
+            live, batch = np.mean([figures(*made) for made in recordings(world, kind, arguments.draws)], axis=0)
+            print(f"{world}, {kind}: " + "; ".join(
+                f"{name} {error:.2f} m, NEES per state {nees:.2f}, deviation {deviation:.2f} m"
+                for name, (error, nees, deviation) in (("live", live), ("batch", batch))
+            ), flush=True)  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()

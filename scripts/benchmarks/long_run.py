@@ -1,0 +1,97 @@
+"""Prints what a scan costs the joint solver after 100 scans and after many, on a tour that never ends.
+
+PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.long_run [SCANS]
+"""
+
+import argparse
+import resource
+import time
+from typing import Iterator
+
+import numpy as np
+
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from node_support.geometry.planar import inverse, rotated, transformed
+
+SCANS = 10_000
+BEAMS = 60
+_TURN = 14.0
+_MEASURED_AT = (100, 300, 1000, 3000, 10_000)
+_AVERAGED = 50
+_ODOMETRY_STEP = 0.5
+_AFTER = 2.0
+_NOISE = 0.1
+_DRIFT = 0.02
+_QUAYS = ((1.0, 0.0, 30.0), (-1.0, 0.0, 28.0), (0.0, 1.0, 20.0), (0.0, -1.0, 18.0))
+"""Walls around the origin: normal x, normal y, distance [m]."""
+
+
+def true_path(times: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) of a vehicle that goes round and round."""
+    phase = times / 60.0
+    return np.column_stack([12.0 * np.cos(phase), 7.0 * np.sin(2.0 * phase), 1.2 * np.sin(times / 13.0)])
+
+
+def odometry_path(times: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) by an odometry that goes a little beside the true direction."""
+    poses = true_path(times)
+    return np.column_stack([rotated(poses[:, :2], np.full(len(times), _DRIFT)), poses[:, 2]])
+
+
+def tour_scans(count: int, seed: int = 0) -> Iterator[Scan]:
+    """Yield scans of a rectangular harbour, oldest first."""
+    rng = np.random.RandomState(seed)
+    for number in range(count):
+        yield _scan(number, rng)
+
+
+def _scan(number: int, rng: np.random.RandomState) -> Scan:
+    stamps = (number + (np.arange(BEAMS) + 1.0) / BEAMS) * _TURN
+    bearings = np.arange(BEAMS) * 2.0 * np.pi / BEAMS
+    poses = true_path(stamps)
+    ranges = _ranges(poses, bearings) + rng.normal(0.0, _NOISE, BEAMS)
+    seen = ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
+    track_times = np.arange(stamps[0] - 2.0 * _TURN, stamps[-1] + _AFTER, _ODOMETRY_STEP)
+    points = np.column_stack([transformed(odometry_path(stamps), seen), np.zeros(BEAMS), np.full(BEAMS, 100.0)])
+    track = Track(track_times, odometry_path(track_times))
+    return Scan(points, stamps, np.ones(BEAMS, dtype=bool), track, float(stamps[-1]))
+
+
+def _ranges(poses: np.ndarray, bearings: np.ndarray) -> np.ndarray:
+    ray = np.column_stack([np.cos(bearings + poses[:, 2]), np.sin(bearings + poses[:, 2])])
+    walls = np.array(_QUAYS)
+    left = walls[:, 2] - poses[:, :2] @ walls[:, :2].T
+    closing = ray @ walls[:, :2].T
+    with np.errstate(divide="ignore"):
+        return np.where(closing > 0.0, left / closing, np.inf).min(axis=1)
+
+
+def main() -> None:
+    """Print time per scan, memory and error each time a number of scans is reached."""
+    parser = argparse.ArgumentParser(prog="benchmarks.long_run", description=__doc__)
+    parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
+    scans = parser.parse_args().scans
+    solver, seconds = LiveSolver(MultiViewParameters(), np.zeros(2)), []
+    for number, scan in enumerate(tour_scans(scans), start=1):
+        start = time.process_time()
+        estimate = solver.add(scan)
+        seconds.append(time.process_time() - start)
+        if number in _MEASURED_AT or number == scans:
+            spent = 1e3 * float(np.median(seconds[-_AVERAGED:]))
+            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
+            error = position_error(number, estimate.T_map_base)
+            print(f"{number} scans: {spent:.0f} ms a scan, {memory:.0f} MB, {error:.2f} m from the truth", flush=True)
+
+
+def position_error(number: int, T_map_base: np.ndarray) -> float:
+    """Return how far [m] a pose (3,) is from the truth after so many scans; the map begins at the odometry's start."""
+    start, end = np.zeros(1), np.array([number * _TURN])
+    truth = transformed(inverse(true_path(start))[0], true_path(end)[:, :2])
+    found = transformed(inverse(odometry_path(start))[0], T_map_base[np.newaxis, :2])
+    return float(np.hypot(*(found - truth)[0]))
+
+
+if __name__ == "__main__":
+    main()
