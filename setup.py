@@ -1,13 +1,30 @@
-"""Installed by catkin (catkin_python_setup); not meant to be run by hand."""
+"""For catkin, and for `pip install .` without ROS."""
 
+import re
 from pathlib import Path
 
-from catkin_pkg.python_setup import generate_distutils_setup
 from setuptools import find_packages, setup
 
+HERE = Path(__file__).resolve().parent
+NAME = "underwater_map_construction"
+# What the simulator needs beside the modules; node_support/package_folder.py finds it.
+SHARED = ("package.xml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*")
+
+
+def shared_files():
+    """Return (folder, files) for everything that goes to share/."""
+    found = {}
+    for pattern in SHARED:
+        for path in sorted(HERE.glob(pattern)):
+            folder = Path("share", NAME, path.parent.relative_to(HERE))
+            found.setdefault(str(folder), []).append(str(path.relative_to(HERE)))
+    return sorted(found.items())
+
+
 setup(
-    **generate_distutils_setup(
-        packages=find_packages(str(Path(__file__).resolve().parent / "src")),
-        package_dir={"": "src"},
-    )
+    name=NAME,
+    version=re.search("<version>(.*)</version>", (HERE / "package.xml").read_text())[1],
+    packages=find_packages(str(HERE / "src")),
+    package_dir={"": "src"},
+    data_files=shared_files(),
 )

@@ -16,6 +16,8 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
+from ping360_driver.emulator.parameters import EmulatorParameters as Ping360EmulatorParameters
+from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemoverParameters
 from sonar_processing.filters.threshold import ThresholderParameters
@@ -65,6 +67,8 @@ LIVE_NODES: Dict[str, LiveNode] = {
     "line_detector": LiveNode(LineDetectorParameters, "LineDetector"),
     "mlsm_core": LiveNode(MlsmCoreParameters, "MlsmCore"),
     "outlier_remover": LiveNode(OutlierRemoverParameters, "OutlierRemover"),
+    "ping360_driver": LiveNode(Ping360DriverParameters, "Ping360"),
+    "ping360_emulator": LiveNode(Ping360EmulatorParameters, "Ping360Emulator"),
     "sonar_control": LiveNode(SonarControlParameters, "SonarControl"),
     "sonar_image": LiveNode(SonarImageParameters, "SonarImage"),
     "sonar_to_cloud": LiveNode(SonarToCloudParameters, "SonarToCloud"),

@@ -106,8 +106,9 @@ class Watch:
     def is_settled(self) -> bool:
         """Whether the script is done and every scan has arrived in the map."""
         scans = self.number("sonar_to_cloud", "scans")
-        placed = self.number("sonar_to_cloud", "beams placed")
-        all_beams = placed > 0 and placed == self.number("sonar_simulator", "beams out")
+        # A busy machine may lose a beam, which then never arrives.
+        ended = sum(self.number("sonar_to_cloud", counter) for counter in ("beams placed", "beams without transform"))
+        all_beams = ended > 0 and ended == self.number("sonar_simulator", "beams out")
         return self.progress >= 1.0 and all_beams and self.number("mlsm_core", "clouds in") == scans
 
 

@@ -41,6 +41,7 @@ def steps() -> List[Step]:
     """Return all steps, quick ones first."""
     unit_report, recordings_report = RESULTS / "unit.xml", RESULTS / "recordings.xml"
     installation_report, stopping_report = RESULTS / "installation.xml", RESULTS / "stopping.xml"
+    plain = RESULTS / "without_ros.xml"
     pytest = ["python3", "-m", "pytest"]
     found = [
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
@@ -50,6 +51,7 @@ def steps() -> List[Step]:
         Step("recordings", [*pytest, "test/recordings", f"--junitxml={recordings_report}"], recordings_report),
         *oldest_versions(),
         Step("installation", [*pytest, "test/installation", f"--junitxml={installation_report}"], installation_report),
+        Step("without ROS", [*pytest, "test/without_ros", f"--junitxml={plain}"], plain, ENVIRONMENT_TIMEOUT),
         Step("stopping", [*pytest, "test/stopping", f"--junitxml={stopping_report}"], stopping_report),
     ]
     for test in sorted((ROOT / "test/rostest").glob("*.test")):

@@ -51,7 +51,7 @@ class Fuzzer:
     def send(self, number: int) -> None:
         """Send message number `number`, sane or damaged."""
         kind = self._random.choice(list(DEFINITIONS))
-        message = self._message(kind, number)
+        message = self.message(kind, number)
         try:
             typed = self._classes.deserialised(message)
             for beam in self._reader.read(kind, typed).beams:
@@ -72,7 +72,8 @@ class Fuzzer:
         if turn is not None:
             planar_laser_scan(PolarScan.of(turn), self._parameters)
 
-    def _message(self, kind: str, number: int) -> Any:
+    def message(self, kind: str, number: int) -> Any:
+        """Return a message of a kind, sane or damaged, as a subscriber to AnyMsg gets it."""
         made = sane_message(kind, number)
         if self._random.random() < 0.6:
             self._spoil(made)

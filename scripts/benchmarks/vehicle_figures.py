@@ -17,7 +17,7 @@ import rospy
 from rosgraph_msgs.msg import Clock
 
 from benchmarks.table import Row
-from sonar_simulator.ros.bag_tool import main as simulate_bag
+from sonar_simulator.simulation.bag_tool import main as simulate_bag
 
 ROOT = Path(__file__).resolve().parents[2]
 LIVE_SECONDS = 8.0

@@ -79,6 +79,18 @@ NODES: Dict[str, NodeDescription] = {
         "See [the emulated head](imagenex_852_driver.md#the-emulated-head).",
         (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
     ),
+    "ping360_driver": NodeDescription(
+        "Driver of the Blue Robotics Ping360 sonar, over serial and UDP. See [the driver](ping360_driver.md).",
+        (
+            _DRIVER_JOINTS_IN,
+            _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"),
+        ),
+    ),
+    "ping360_emulator": NodeDescription(
+        "An emulated Ping360 on a pseudo-terminal or a UDP port, with faults at random or on request. "
+        "See [the emulated head](ping360_driver.md#the-emulated-head).",
+        (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
+    ),
     "sonar_to_cloud": NodeDescription(
         "Assembles beams into scans (thesis 6.5.2). A beam waits until tf can place it at its own stamp. "
         "See [sonar_processing](sonar_processing.md#sonar_to_cloud).",

@@ -10,12 +10,15 @@ import numpy as np
 import rospy
 import rostest
 from benchmarks.foreign_messages import message_classes, sane_message
+from benchmarks.fuzz_beams import Fuzzer
 from graph import Diagnostics, Inbox, rows, wait_for_publisher_links
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import String
 
 STEPS = 200
+RAYS = 400
+DAMAGED = 500
 WALL = 12.0
 ECHO, MICRON = "ping360_sonar/SonarEcho", "micron_driver_ros/ScanLine"
 
@@ -79,9 +82,11 @@ class ForeignBeams(unittest.TestCase):
         """The driver publishes its beams, too."""
         kind = message_classes(ECHO)[ECHO]
         other = rospy.Publisher("/ping360/data", kind, queue_size=1)
-        scan = LaserScan(angle_min=-3.14, angle_increment=0.0314, range_max=50.0, ranges=[WALL] * 200)
+        scan = LaserScan(angle_min=-3.14, angle_increment=6.28 / RAYS, range_max=50.0, ranges=[WALL] * RAYS)
         scan.header.frame_id, scan.header.stamp = "sonar", rospy.Time.now()
+        before = int(self.diagnostics.values("sonar_to_cloud")["beams placed"])
         self.publish(LaserScan, [scan])
+        self.diagnostics.wait_for("sonar_to_cloud", "beams placed", before + RAYS)
         self.wait_for_log("/ping360/data (ping360_sonar/SonarEcho)")
         other.unregister()
 
@@ -92,7 +97,28 @@ class ForeignBeams(unittest.TestCase):
         self.wait_for_a_turn(MICRON)
         self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
 
-    def test_6_laser_scans_come_of_every_turn(self) -> None:
+    def test_6_damaged_messages_end_nothing(self) -> None:
+        """Each is counted, and the node goes on."""
+        before = int(self.diagnostics.values("sonar_to_cloud")["messages in"])
+        fuzzer, sent = Fuzzer(seed=3), message_classes(ECHO)[ECHO]
+
+        class Damaged(sent):
+            """What a driver sends whose memory is corrupt."""
+
+            def serialize(self, buff: Any) -> None:
+                buff.write(self.damaged)
+
+        def damaged(number: int) -> Damaged:
+            message = Damaged()
+            message.damaged = fuzzer.message(ECHO, number)._buff
+            return message
+
+        self.publish(Damaged, (damaged(number) for number in range(DAMAGED)))
+        self.diagnostics.wait_for("sonar_to_cloud", "messages in", before + DAMAGED)
+        self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
+        self.wait_for_a_turn(ECHO)
+
+    def test_7_laser_scans_come_of_every_turn(self) -> None:
         """One stamp, no time between the rays, angles that increase."""
         scan = self.lasers.messages[0]
         self.assertEqual(scan.time_increment, 0.0)

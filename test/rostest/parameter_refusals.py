@@ -35,6 +35,8 @@ BAD_STARTS: List[Tuple[str, str]] = [
     ("sonar_processing", "chain:=5"),
     ("thresholder", "otsu_multiplier:=.nan"),
     ("imagenex_852_driver", "max_range:=7"),
+    ("ping360_driver", "max_range:=0.5"),
+    ("ping360_driver", "port:=udp://nowhere"),
 ]
 
 

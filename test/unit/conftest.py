@@ -7,6 +7,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
 # Last, so that none of the rostests' modules hides another module.
 sys.path.append(str(ROOT / "test" / "rostest"))
+# What the tests of several drivers share.
+sys.path.append(str(ROOT / "test" / "unit" / "sonar_driver"))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)
 # For a second run of all tests with other versions, see scripts/oldest.

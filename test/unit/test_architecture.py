@@ -18,10 +18,11 @@ ALLOWED = {
     "dead_reckoning": {"node_support"},
     "sonar_driver": {"node_support"},
     "imagenex_852_driver": {"node_support", "sonar_driver"},
+    "ping360_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
     "recordings": {"imagenex_852_driver", "node_support", "sonar_processing"},
     "mlsm_manager": {"node_support", "recordings", "sonar_processing"},
-    "sonar_simulator": {"node_support", "sonar_processing"},
+    "sonar_simulator": {"node_support", "recordings", "sonar_processing"},
 }
 ROS_NAMES = {
     "rospy", "roslib", "rosgraph", "rosbag", "genpy", "message_filters", "dynamic_reconfigure", "diagnostic_updater",

@@ -100,5 +100,5 @@ def test_every_pip_key_of_the_package_is_in_the_requirements():
     keys = {element.text for element in package if (element.text or "").endswith("-pip")}
     wanted = {key.replace("python3-", "").replace("-pip", "").replace("collada", "pycollada") for key in keys}
     required = {re.split("[<>=]", line)[0] for line in (ROOT / "scripts" / "requirements.txt").read_text().splitlines()}
-    assert wanted == {"trimesh", "pycollada"}
+    assert wanted == {"bluerobotics-ping", "trimesh", "pycollada"}
     assert wanted | {"embreex"} <= required

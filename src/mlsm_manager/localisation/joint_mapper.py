@@ -17,9 +17,10 @@ from mlsm_manager.localisation.mapper import (
     MapSettings,
     ScanUpdate,
 )
+from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
@@ -33,10 +34,13 @@ from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
+from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 # Points of the path within a scan: about one per second of a slow head's revolution.
 _PATH_POINTS = 17
+# Scans of a run that are stored with each save: some hours, and some tens of megabytes.
+_MOST_STORED = 500
 _ORIGIN = np.zeros(3)
 # Scans that are checked for their agreement with the map: about the window of the solver.
 _CHECKED_SCANS = 20
@@ -45,9 +49,10 @@ _CHECKED_SCANS = 20
 class JointMapper:
     """Follows the vehicle with all scans at once: the newest may still move, the older ones are the map.
 
-    No scan is rejected: one that says little moves little, and its covariance grows. While `matching` is off scans and
-    clouds are placed by the odometry as corrected so far. What is in the map when a run begins, or begins again after
-    a relocalisation, is a surface that its scans are compared with.
+    No scan of a run is rejected: one that says little moves little, and its covariance grows. While `matching` is off
+    scans and clouds are placed by the odometry as corrected so far. What is in the map when a run begins, or begins
+    again after a relocalisation, is a surface that its scans are compared with. A run in a stored map begins only with
+    a scan that the matcher finds near the place where the vehicle is expected.
     """
 
     def __init__(
@@ -79,6 +84,8 @@ class JointMapper:
         """Keep the map but forget where the vehicle is, because time jumped."""
         self._end_session()
         self.belief: Optional[Belief] = None
+        self._expected: Optional[Belief] = None
+        self._found_at = -np.inf
         self.correction = _ORIGIN
         self._start: Optional[np.ndarray] = None
         self._history = CorrectionHistory()
@@ -138,12 +145,34 @@ class JointMapper:
         tiles = self._shown.map.take_changed_tiles()
         return tiles, self._shown.map.in_tiles(tiles)
 
-    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
-        """Take stored maps in the place of the present ones, and forget the place.
+    @property
+    def keyframes(self) -> Mapping[str, np.ndarray]:
+        """What `restore` needs to go on with the present run, as arrays; none without a run or after a long one."""
+        session, shown = self._session, self._shown
+        if session is None or len(session.scans) > _MOST_STORED:
+            return {}
+        run = StoredRun(
+            session.T_map_odom, session.scans, session.solver.stored(), shown.moving, shown.covered,
+            self._matched.covered,
+        )  # fmt: skip
+        return run.arrays()
+
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
+        """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
 
         A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
         other resolutions than those of the settings.
         """
+        self._take(layers)
+        run = StoredRun.of_arrays(keyframes)
+        if run is None:
+            return
+        try:
+            self._resume_run(run)
+        except (RefusedInput, KeyError, ValueError):
+            self._take(layers)
+
+    def _take(self, layers: Mapping[Layer, Blocks]) -> None:
         settings = self.settings
         shown = self._new_map(settings.resolution, settings.expected_blocks)
         matched = self._new_map(settings.match_resolution, 0)
@@ -155,18 +184,49 @@ class JointMapper:
         self.forget_place()
         self._shown, self._matched = shown, matched
 
+    def _resume_run(self, run: StoredRun) -> None:
+        """Go on with a stored run in the maps that were stored with it."""
+        session = JointSession.resumed(self.parameters, self._sonar_in_base, run.T_map_odom, run.scans, run.solver)
+        run.shown.uncover(self._shown.map)
+        run.matched.uncover(self._matched.map)
+        for scan in run.scans:
+            if scan.reference_time > session.settled_until:
+                self._matched.add(TimedPoints.of_scan(scan))
+        for cloud in run.clouds:
+            self._shown.add(cloud)
+        self._session = session
+        self._shown.draw(session, session.settled_until)
+        self._matched.draw(session, session.settled_until)
+        self._know(run.scans[-1], session.solver.estimates[-1])
+
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
         """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
         self.correction = np.array(correction, dtype=np.float64)
-        self._start = np.sqrt(np.diag(belief.covariance)[POSE])
+        self._expected = belief
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan together with those of the scans before it, and draw the map anew."""
-        return self._solve(scan) if self.matching else self._place(scan)
+        if not self.matching:
+            return self._place(scan)
+        return self._solve(scan) if self._expected is None else self._resume(scan, self._expected)
+
+    def _resume(self, scan: Scan, expected: Belief) -> ScanUpdate:
+        """Go on with a scan that fits to the map about where it is expected; any other is rejected."""
+        theta = np.concatenate([composed(self.correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
+        prior = prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
+        result = self.matcher.match(scan, self._matched.map, prior)
+        if not result.accepted:
+            return ScanUpdate(scan, result, False, self.belief)
+        if self._session is None:
+            return self.adopt(scan, result)
+        self._expected = None
+        return self._solve(scan)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Begin a new run at a pose that was found elsewhere, in the map as it is."""
         self._end_session()
+        self._expected = None
+        self._found_at = scan.start
         self.correction = result.correction(scan)
         self._start = np.sqrt(np.diag(result.covariance)[POSE])
         theta = np.concatenate([result.pose, np.zeros(STATES - POSE_COLUMNS)])
@@ -176,9 +236,14 @@ class JointMapper:
         return ScanUpdate(scan, result, True, self.belief)
 
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
-        """Put a cloud into the map that is shown, or let it wait for the scan of its time."""
+        """Put a cloud into the map that is shown, or let it wait for the scan of its time.
+
+        One from before the place was found is left out: nobody knows how far the odometry strayed until then.
+        """
         if not self.matching:
             return self._show(cloud, self.correction, self._history.positions(cloud.times))
+        if cloud.end <= self._found_at:
+            return CloudUpdate(NOTHING_INSERTED, False, len(cloud))
         if self._session is not None and cloud.end <= self._session.start:
             return self._show(cloud, self._session.T_map_odom, None)
         if self._session is None or cloud.end > self._session.solver.log.node_times[-1]:
@@ -219,11 +284,14 @@ class JointMapper:
         self._session = session
         self._matched.add(TimedPoints.of_scan(scan))
         self._matched.draw(session, session.settled_until)
-        self.correction = _correction(estimate.T_map_base, scan)
-        self.belief = self._belief(estimate)
+        self._know(scan, estimate)
         if not estimate.comparisons:
             return ScanUpdate(scan, None, True, self.belief)
         return ScanUpdate(scan, self._result(scan, estimate, perf_counter() - start), True, self.belief)
+
+    def _know(self, scan: Scan, estimate: LiveEstimate) -> None:
+        self.correction = _correction(estimate.T_map_base, scan)
+        self.belief = self._belief(estimate)
 
     def _place(self, scan: Scan) -> ScanUpdate:
         self._end_session()

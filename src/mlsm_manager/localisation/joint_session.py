@@ -1,6 +1,7 @@
 """One run of the joint solver in the map."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import List, Mapping, Sequence
 
 import numpy as np
 
@@ -9,20 +10,40 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.drawing import corrected_path, drawn
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import DELAY
 from node_support.geometry.planar import composed, transformed
 
 
 @dataclass
 class JointSession:
-    """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small."""
+    """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
+
+    scans: all that it took, as they came.
+    """
 
     solver: LiveSolver
     T_map_odom: np.ndarray
+    scans: List[Scan] = field(default_factory=list)
 
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan; see LiveSolver.add."""
-        return self.solver.add(self._moved(scan))
+        estimate = self.solver.add(_moved(scan, self.T_map_odom))
+        self.scans.append(scan)
+        return estimate
+
+    @classmethod
+    def resumed(
+        cls,
+        parameters: MultiViewParameters,
+        sonar_in_base: np.ndarray,
+        T_map_odom: np.ndarray,
+        scans: Sequence[Scan],
+        stored: Mapping[str, np.ndarray],
+    ) -> "JointSession":
+        """Return a run that goes on after `scans`; see LiveSolver.resumed."""
+        moved = [_moved(scan, T_map_odom) for scan in scans]
+        return cls(LiveSolver.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans))
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""
@@ -53,9 +74,10 @@ class JointSession:
         times = self.solver.log.node_times
         return float(times[max(0, len(times) - 1 - self.solver.parameters.window.free_nodes)])
 
-    def _moved(self, scan: Scan) -> Scan:
-        track = _moved_track(scan.track, self.T_map_odom)
-        return replace(scan, points=transformed(self.T_map_odom, scan.points), track=track)
+
+def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:
+    track = _moved_track(scan.track, T_map_odom)
+    return replace(scan, points=transformed(T_map_odom, scan.points), track=track)
 
 
 def _moved_track(track: Track, T_map_odom: np.ndarray) -> Track:

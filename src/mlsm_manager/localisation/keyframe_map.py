@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Optional
+from typing import Deque, List, Optional
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
 from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
-from mlsm_manager.surface_map.overlay import Overlay
+from mlsm_manager.surface_map.overlay import Covered, Overlay
 
 
 @dataclass(frozen=True)
@@ -48,9 +48,14 @@ class KeyframeMap:
         return MultiLevelSurfaceMap(self.map.resolution, self.map.limit)
 
     @property
-    def keyframes(self) -> int:
-        """Number of keyframes that may still move."""
-        return len(self._moving)
+    def moving(self) -> List[TimedPoints]:
+        """The keyframes that may still move, oldest first."""
+        return list(self._moving)
+
+    @property
+    def covered(self) -> Covered:
+        """What the map holds without them, in the cells that they changed."""
+        return self._overlay.covered
 
     def insert(self, points: np.ndarray) -> InsertReport:
         """Insert points (n, 4) in map whose places will not change."""

@@ -149,7 +149,7 @@ class Localiser:
             self.notice_time(scan.reference_time)
             self._changes += 1
             self._newest, self._newest_came = scan, self._clock()
-            update = self._found(scan) if self.is_lost else self.mapper.take_echoes(scan)
+            update = self._searched(scan) if self.is_lost else self.mapper.take_echoes(scan)
             self._search.learn(update.accepted)
             if update.belief is not None:
                 self._live.believe(update.belief)
@@ -195,6 +195,7 @@ class Localiser:
         with self._lock:
             self.mapper.forget_place()
             self._live.clear()
+            self._search.jump()
             self._newest = None
         return until - time
 
@@ -223,6 +224,11 @@ class Localiser:
                 self._live.believe(update.belief)
         return update
 
+    def _searched(self, scan: Scan) -> ScanUpdate:
+        """Search the whole map for a scan, and then where the vehicle was expected: few echoes may look like chance."""
+        update = self._found(scan)
+        return update if update.accepted or not self._search.may_be_near else self.mapper.take_echoes(scan)
+
     def _found(self, scan: Scan) -> ScanUpdate:
         """Search the whole map for a scan; where it is found it goes into the map."""
         result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
@@ -236,22 +242,26 @@ class Localiser:
         return self._search.is_lost and self.mapper.matching
 
     def stored(self, frame: str, calibration: Mapping[str, Any], made: float, run: str) -> StoredMap:
-        """Return a copy of the map and of the place in it, to be written; see StoredMap."""
+        """Return a copy of the map and of the place in it, to be written; see StoredMap.
+
+        Keyframes are only stored with the name of a run of the graph, in which a node can go on with them.
+        """
         with self._lock:
             belief, layers = self.mapper.belief, dict(self.mapper.layers)
+            keyframes = self.mapper.keyframes if run else {}
             correction = self.mapper.correction.copy()
-        arrays = {} if belief is None else StoredPlace(correction, belief).arrays()
+        arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
         return StoredMap(frame, layers, calibration, made, arrays, run)
 
     def restore(self, stored: StoredMap, same_odometry: bool) -> None:
         """Take a stored map in the place of the present one.
 
         With the odometry under which it was stored the vehicle is expected where the stored correction puts it, and is
-        searched everywhere when three scans do not match there; otherwise it is searched everywhere from the start.
+        searched everywhere too when three scans do not match there; otherwise it is searched everywhere from the start.
         Raises ValueError, and keeps the present map, for other resolutions than those of the parameters.
         """
         with self._lock:
-            self.mapper.restore(stored.layers)
+            self.mapper.restore(stored.layers, stored.arrays if same_odometry else {})
             self._changes += 1
             self._live.clear()
             self._newest = None

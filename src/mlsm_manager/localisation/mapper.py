@@ -136,7 +136,12 @@ class Mapper:
         tiles = self.shown.take_changed_tiles()
         return tiles, self.shown.in_tiles(tiles)
 
-    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
+    @property
+    def keyframes(self) -> Mapping[str, np.ndarray]:
+        """None: a pose never changes once its scan is in the map."""
+        return {}
+
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
         """Take stored maps in the place of the present ones, and forget the place.
 
         A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for

@@ -54,28 +54,41 @@ class PlaceSearch:
     """Decides, scan by scan after a map was loaded, whether the place is known, expected or lost."""
 
     def __init__(self) -> None:
-        self._left: Optional[int] = None
+        self.forget()
 
     def forget(self) -> None:
         """Take the place as known."""
-        self._left = None
+        self._left: Optional[int] = None
+        self._is_expected = False
 
     def expect(self) -> None:
         """Take the place as near to where it is expected."""
         self._left = _MOST_REJECTED
+        self._is_expected = True
 
     def lose(self) -> None:
         """Take the place as anywhere in the map."""
         self._left = 0
+        self._is_expected = False
+
+    def jump(self) -> None:
+        """Learn that time jumped: what was expected does not hold any more."""
+        if self._left is not None:
+            self.lose()
 
     @property
     def is_lost(self) -> bool:
         """Whether the whole map must be searched."""
         return self._left == 0
 
+    @property
+    def may_be_near(self) -> bool:
+        """Whether the vehicle may still be where it is expected, also when the whole map is searched."""
+        return self._is_expected
+
     def learn(self, accepted: bool) -> None:
         """Learn whether a scan was matched."""
         if accepted:
-            self._left = None
+            self.forget()
         elif self._left:
             self._left -= 1

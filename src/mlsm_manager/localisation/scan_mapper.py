@@ -60,8 +60,15 @@ class ScanMapper(Protocol):
     def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
         """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
 
-    def restore(self, layers: Mapping[Layer, Blocks]) -> None:
-        """Take stored maps in the place of the present ones; raises ValueError for other resolutions."""
+    @property
+    def keyframes(self) -> Mapping[str, np.ndarray]:
+        """What else must be stored to go on with scans whose poses may still change, as arrays by name."""
+
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
+        """Take stored maps in the place of the present ones; raises ValueError for other resolutions.
+
+        keyframes: as stored, where the odometry is still the same; empty else.
+        """
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
         """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""

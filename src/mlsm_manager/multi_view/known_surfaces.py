@@ -17,6 +17,7 @@ class KnownSurfaces:
 
     def __init__(self, places: np.ndarray) -> None:
         """places: (n, 2) m, x y of the blocks' means in map."""
+        self.places = places
         normals, qualities = surface_normals(places, np.full(len(places), LEAST_REACH))
         known = qualities > 0.0
         self._tree = cKDTree(places[known]) if known.any() else None

@@ -1,6 +1,6 @@
 """Follows the vehicle scan by scan: the newest nodes are free, what is older stays where it was found."""
 
-from typing import List, Optional
+from typing import Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -13,9 +13,11 @@ from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.stacking import stacked, unstacked
 from mlsm_manager.multi_view.state import RUN_COLUMNS, State
 from node_support.errors import RefusedInput
 
+_ESTIMATE = "estimate."
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 
 
@@ -45,6 +47,46 @@ class LiveSolver:
         self._node_covariances = GrowingArray(3, 3)
         self._run = run_mean(parameters.sonar)
         self._start, self._known = start, known
+
+    def stored(self) -> Dict[str, np.ndarray]:
+        """Return all but the scans that `resumed` needs, as arrays by name."""
+        return {
+            "nodes": self._nodes.values,
+            "node_covariances": self._node_covariances.values,
+            "run_unknowns": self._run,
+            "start": np.empty(0) if self._start is None else self._start,
+            "known": np.empty((0, 2)) if self._known is None else self._known.places,
+            **stacked(self.estimates, _ESTIMATE),
+        }
+
+    @classmethod
+    def resumed(
+        cls,
+        parameters: MultiViewParameters,
+        sonar_in_base: np.ndarray,
+        scans: Sequence[Scan],
+        stored: Mapping[str, np.ndarray],
+    ) -> "LiveSolver":
+        """Return a solver that goes on after `scans` as the one did that took them and was `stored` then.
+
+        Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
+        """
+        start, known = stored["start"], stored["known"]
+        solver = cls(
+            parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None
+        )
+        for scan in scans:
+            solver.log.append(scan, parameters.window.lookahead)
+        nodes, covariances = stored["nodes"], stored["node_covariances"]
+        if nodes.shape != (len(scans) + 1, solver.odometry.width) or covariances.shape[1:] != (3, 3):
+            raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {len(scans)} scans")
+        solver._nodes.replace_from(0, nodes)
+        solver._node_covariances.replace_from(0, covariances)
+        solver._run[:] = stored["run_unknowns"]
+        solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
+        if len(solver.estimates) != len(scans):
+            raise ValueError(f"{len(solver.estimates)} estimates for {len(scans)} scans")
+        return solver
 
     @property
     def state(self) -> State:

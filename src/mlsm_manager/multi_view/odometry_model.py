@@ -1,6 +1,7 @@
 """The interface of odometry models: what is unknown of the motion between nodes, and what ties the nodes together."""
 
-from typing import Dict, NamedTuple, Protocol
+from dataclasses import dataclass
+from typing import Dict, Protocol
 
 import numpy as np
 
@@ -13,7 +14,8 @@ HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 MOTION_STATES = 5
 
 
-class Drift(NamedTuple):
+@dataclass(frozen=True)
+class Drift:
     """How a motion goes on after a node, as matching.problem.state describes it: the errors of the odometry.
 
     values: (5,) rate x y [m/s] and yaw [rad/s] in base_link, scale, direction. slopes: (5, width) their derivatives by

@@ -19,7 +19,6 @@ from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.live_file import write_live
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.mission_report import mission_of
-from mlsm_manager.offline.north_east_down import suspicions
 from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
@@ -38,9 +37,12 @@ from mlsm_manager.offline.run_files import (
 )
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.report.mission import Mission
+from mlsm_manager.self_check.north_east_down import suspicions
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
+from recordings.inspection.report import report
+from recordings.inspection.survey import survey
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 # The frame that live.yaml's nodes call their map by default.
@@ -51,6 +53,9 @@ def run_map_bag() -> None:
     """Run map_bag with the command line; ends with one line and status 1 when something is wrong with the input."""
     try:
         options = map_bag_arguments(sys.argv[1:])
+        if options.inspect:
+            print("\n\n".join(report(survey(bag, options.request), options.request) for bag in options.bags))
+            return
         summary = map_bag(options)
     except (ParameterError, RecordingError) as error:
         sys.exit(f"map_bag: {error}")

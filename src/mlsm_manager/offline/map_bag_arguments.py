@@ -2,7 +2,7 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List
 
 import yaml
 
@@ -13,12 +13,12 @@ from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
-from recordings.reading.arguments import add_reading_arguments, request_of
+from recordings.reading.arguments import add_reading_arguments, request_of, set_values
 from recordings.reading.parameters import ReadingParameters
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
-    """Return bags, out, scheduler, refine, frames, parameters and request; exits on a bad command line.
+    """Return bags, out, inspect, scheduler, refine, frames, parameters and request; exits on a bad command line.
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
@@ -31,7 +31,8 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
     )
-    parser.add_argument("--out", type=Path, required=True, help="folder to write to; created if missing")
+    parser.add_argument("--out", type=Path, help="folder to write to; created if missing")
+    parser.add_argument("--inspect", action="store_true", help="say what a bag holds, and write nothing")
     parser.add_argument(
         "--matcher", choices=[name.value for name in MatcherName], help="match scan by scan, with this matcher"
     )
@@ -52,10 +53,12 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.refine and len(options.bags) > 1:
         parser.error("--refine smooths one recording, not several")
+    if options.out is None and not options.inspect:
+        parser.error("the following arguments are required: --out")
     if options.vehicle and len(options.bags) > 1:
         parser.error("--vehicle belongs to one recording, not to several")
     values = _from_file(options.parameters) if options.parameters else {}
-    values.update(_pair(text, parser) for text in options.set)
+    values.update(set_values(parser, options.set))
     if options.matcher:
         values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
     if not options.calibrate:
@@ -80,13 +83,3 @@ def _from_file(path: Path) -> Dict[str, Any]:
     if not isinstance(values, dict):
         raise ParameterError(f"{path}: must hold lines of KEY: VALUE")
     return replay_values(values)
-
-
-def _pair(text: str, parser: argparse.ArgumentParser) -> Tuple[str, Any]:
-    key, separator, value = text.partition("=")
-    if not (key and separator):
-        parser.error(f"--set {text}: must be KEY=VALUE")
-    try:
-        return key, yaml.safe_load(value)
-    except yaml.YAMLError:
-        return key, value

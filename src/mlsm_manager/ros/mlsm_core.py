@@ -18,6 +18,7 @@ from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import MapServices
 from mlsm_manager.ros.map_transform import MapTransform
 from mlsm_manager.ros.odometry_track import OdometryTrack
+from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import matrices
@@ -44,6 +45,7 @@ class MlsmCore:
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
         self._mounted = False
+        self._z_down = ZDownSigns()
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
@@ -120,12 +122,21 @@ class MlsmCore:
         if scan is None:
             return
         self._mount(cloud.stamp_ns)
+        self._look_for_z_down(scan)
         taken = self._localiser.take_scan(scan)
         for update in taken.clouds:
             self._report_cloud(update, cloud.stamp_ns)
         report_scan(self.health, taken.scan, self._localiser.matching)
         report_verdicts(self.health, self._localiser.verdicts())
         self._publish_fix(taken.scan, cloud.stamp_ns)
+
+    def _look_for_z_down(self, scan: Scan) -> None:
+        self._z_down.take_heights(self._odometry.matrix(scan.reference_time)[2:3, 3])
+        self._z_down.take_scan(scan)
+        signs = self._z_down.lines()
+        if signs:
+            advice = "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true)"
+            self.health.problem("scans with signs of z down", f"{'; '.join(signs)}: {advice}")
 
     def _mount(self, stamp_ns: int) -> None:
         """Tell the localiser where the sonar is on the vehicle, once tf knows it."""
@@ -193,6 +204,7 @@ class MlsmCore:
         seconds = self._localiser.notice_time(time)
         if seconds:
             self._odometry.clear()
+            self._z_down = ZDownSigns()
             detail = f"by {seconds:.1f} s; the map stays, the position in it starts at odom's again"
             self.health.problem("jumps back in time", detail)
 

@@ -1,10 +1,30 @@
 """Blocks that lie on a map for a while and can be taken off again."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks, concatenated_blocks
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+
+@dataclass(frozen=True)
+class Covered:
+    """What a map holds below an overlay.
+
+    cells: (n, 2) int64 that the overlay changes. rows: (m, 11), crossed: (m,) of the blocks in them, see Blocks.
+    """
+
+    cells: np.ndarray
+    rows: np.ndarray
+    crossed: np.ndarray
+
+    def uncover(self, surface_map: MultiLevelSurfaceMap) -> None:
+        """Give these cells of a map what they held before."""
+        _, rows, _ = surface_map.find(self.cells)
+        surface_map.remove(rows)
+        surface_map.insert_blocks(Blocks(self.rows, surface_map.resolution, self.crossed))
 
 
 class Overlay:
@@ -19,14 +39,9 @@ class Overlay:
         self._held = Blocks(np.empty((0, ROW_WIDTH)), self._map.resolution)
 
     @property
-    def cells(self) -> np.ndarray:
-        """(n, 2) int64 the cells that are changed."""
-        return cells_of_keys(self._cells)
-
-    @property
-    def held(self) -> Blocks:
+    def covered(self) -> Covered:
         """What the changed cells held before."""
-        return self._held
+        return Covered(cells_of_keys(self._cells), self._held.rows, self._held.crossed)
 
     def lay(self, blocks: Blocks) -> None:
         """Insert blocks into the map."""
@@ -40,9 +55,7 @@ class Overlay:
 
     def take_off(self) -> None:
         """Give all changed cells what they held before."""
-        _, rows, _ = self._map.find(self.cells)
-        self._map.remove(rows)
-        self._map.insert_blocks(self._held)
+        self.covered.uncover(self._map)
         self._forget()
 
     def _remember(self, cells: np.ndarray) -> None:

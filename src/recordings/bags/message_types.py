@@ -17,7 +17,11 @@ float32 range_resolution
 uint8 gain
 float32 sensorAngle
 """
-_BEAM_TYPES = (BEAM_TYPE, "avora_msgs/msg/SonarScanLine")
+_OWN_TYPES = {
+    BEAM_TYPE: _BEAM_DEFINITION,
+    "avora_msgs/msg/SonarScanLine": _BEAM_DEFINITION,
+    "tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transforms\n",
+}
 
 
 def defined_in(definition: str, name: str) -> Typestore:
@@ -30,17 +34,18 @@ def defined_in(definition: str, name: str) -> Typestore:
 @lru_cache(maxsize=None)
 def ros1_types() -> Typestore:
     """Return the types of ROS 1 (Noetic) and ours."""
-    return _with_beams(Stores.ROS1_NOETIC)
+    return _with_ours(Stores.ROS1_NOETIC)
 
 
 @lru_cache(maxsize=None)
 def ros2_types() -> Typestore:
     """Return the types of ROS 2 and ours, for bags of distributions before Iron, which hold no definitions."""
-    return _with_beams(Stores.ROS2_HUMBLE)
+    return _with_ours(Stores.ROS2_HUMBLE)
 
 
-def _with_beams(distribution: Stores) -> Typestore:
+def _with_ours(distribution: Stores) -> Typestore:
     store = get_typestore(distribution)
-    for name in _BEAM_TYPES:
-        store.register(get_types_from_msg(_BEAM_DEFINITION, name))
+    for name, definition in _OWN_TYPES.items():
+        if name not in store.types:
+            store.register(get_types_from_msg(definition, name))
     return store

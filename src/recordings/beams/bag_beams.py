@@ -50,6 +50,10 @@ def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> Fou
         except RefusedInput:
             refused += 1
             continue
+        if reading.unit_changed:
+            refused += len(found.beams)
+            found.beams.clear()
+            found.moving.clear()
         found.beams.extend(reading.beams)
         found.moving.extend([moving_state.is_moving(still)] * len(reading.beams))
         found.notes.extend(reading.notes)

@@ -5,6 +5,7 @@ from sonar_driver.emulator.emulated_head import EmulatedHead, Transmission
 from sonar_driver.emulator.faults import Fault, FaultInjector, FaultRates
 from sonar_driver.emulator.head_server import HeadServer, ServedLine
 from sonar_driver.emulator.pty_line import PtyLine
+from sonar_driver.emulator.udp_line import UdpLine
 
 __all__ = [
     "EchoSource",
@@ -18,4 +19,5 @@ __all__ = [
     "PtyLine",
     "ServedLine",
     "Transmission",
+    "UdpLine",
 ]

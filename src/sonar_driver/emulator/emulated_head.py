@@ -20,13 +20,14 @@ class Transmission(NamedTuple):
 class EmulatedHead(ABC):
     """A head in software: bytes and times in, bytes and times out, without its own clock or port.
 
-    Until the time `absent_until`, whoever serves it removes the port. At the time `next_event` it does something by
-    itself, and `advance` is to be called.
+    From the time `absent_from` until `absent_until`, whoever serves it removes the port. At the time `next_event` it
+    does something by itself, and `advance` is to be called.
     """
 
     def __init__(self, faults: Optional[FaultInjector] = None, baud_rate: float = float("inf")) -> None:
-        """`baud_rate` is infinite on a line whose speed does not matter."""
+        """`baud_rate` is infinite where bytes take no time and a message is sent as a whole, on a network."""
         self.faults = faults or FaultInjector()
+        self.absent_from = float("-inf")
         self.absent_until = float("-inf")
         self.next_event = float("inf")
         self._baud_rate = baud_rate
@@ -45,12 +46,16 @@ class EmulatedHead(ABC):
     def _garbled(self, frame: bytes) -> bytes:
         """Return the frame with bytes changed, so that a driver can detect it."""
 
-    def _struck_dumb(self, fault: Fault, time: float) -> bool:
-        """Return whether the head says nothing from `time` on, because of `fault` or of an earlier one."""
+    def _struck_dumb(self, fault: Fault, time: float, still_unread: float = 0.0) -> bool:
+        """Return whether the head says nothing from `time` on, because of `fault` or of an earlier one.
+
+        still_unread: how long the port stays, so that who listens can read what was sent before.
+        """
         if fault is Fault.SILENCE:
             self._silent_until = time + self.faults.rates.silence_duration
         if fault is Fault.DISAPPEARANCE:
-            self.absent_until = time + self.faults.rates.absence_duration
+            self._silent_until = self.absent_from = time + still_unread
+            self.absent_until = self.absent_from + self.faults.rates.absence_duration
         return time < self._silent_until or fault is Fault.DISAPPEARANCE
 
     def _transmissions(self, fault: Fault, frame: bytes, begin: float) -> List[Transmission]:
@@ -69,9 +74,10 @@ class EmulatedHead(ABC):
 
     def _paced(self, data: bytes, begin: float) -> List[Transmission]:
         begin = max(begin, self._line_free)
+        size = _PIECE if self._baud_rate < float("inf") else max(1, len(data))
         pieces = []
-        for start in range(0, len(data), _PIECE):
-            piece = data[start : start + _PIECE]
+        for start in range(0, len(data), size):
+            piece = data[start : start + size]
             pieces.append(Transmission(begin + transmission_time(start + len(piece), self._baud_rate), piece))
         if pieces:
             self._line_free = pieces[-1].time

@@ -19,6 +19,7 @@ class Fault(Enum):
     LATE = "late"
     DOUBLED = "doubled"
     OVERRUN = "overrun"
+    REFUSED = "refused"
     SILENCE = "silence"
     DISAPPEARANCE = "disappearance"
 

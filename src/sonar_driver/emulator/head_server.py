@@ -111,7 +111,8 @@ class HeadServer:
             self._outgoing.extend(self.head.receive(self._line.read(), time.monotonic()))
 
     def _show_or_hide(self) -> None:
-        hidden = time.monotonic() < self._back_at()
+        now = time.monotonic()
+        hidden = self._gone_at() <= now < self._back_at()
         if hidden == self._present:
             with self._changed:
                 if hidden:
@@ -119,6 +120,9 @@ class HeadServer:
                 else:
                     self._appear()
                 self._changed.notify_all()
+
+    def _gone_at(self) -> float:
+        return self.head.absent_from if self._hidden_until <= time.monotonic() else float("-inf")
 
     def _back_at(self) -> float:
         return max(self._hidden_until, self.head.absent_until)
@@ -131,7 +135,8 @@ class HeadServer:
         if not self._present:
             moment = self._back_at()
         else:
-            moment = min(self.head.next_event, self._outgoing[0].time if self._outgoing else float("inf"))
+            gone_at = self._gone_at() if now < self._back_at() else float("inf")
+            moment = min(gone_at, self.head.next_event, self._outgoing[0].time if self._outgoing else float("inf"))
         return max(0.0, moment - now) if moment < float("inf") else None
 
     def _appear(self) -> None:

@@ -5,9 +5,11 @@ import grp
 import os
 import termios
 from contextlib import contextmanager
-from typing import Iterator, Protocol
+from typing import Iterator, Protocol, Tuple
 
 import serial
+
+from sonar_driver.line.udp_port import UdpPort
 
 # Seconds. A read returns after this time at the latest, so that a request to stop is noticed.
 READ_TIMEOUT = 0.05
@@ -15,6 +17,8 @@ WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is
 
 _REMOTE = ("socket://", "rfc2217://", "loop://")
 _USUAL_GROUP = "dialout"
+_DATAGRAMS = "udp://"
+_PORT_NUMBERS = 1 << 16
 
 
 class Port(Protocol):
@@ -29,6 +33,9 @@ class Port(Protocol):
 
     def write(self, data: bytes) -> int:
         """Send all of `data`."""
+
+    def send_break(self) -> None:
+        """Hold the line at rest for longer than a byte takes, where there is a line."""
 
     def close(self) -> None:
         """Give the port back."""
@@ -55,10 +62,12 @@ class PortNameError(PortError):
 
 
 def open_port(name: str, baud_rate: int) -> Port:
-    """Open a device or pyserial URL with 8N1; a local device is opened exclusively.
+    """Open a device or pyserial URL with 8N1, or udp://HOST:PORT; a local device is opened exclusively.
 
     Raises PortUnavailableError, PortBusyError, PortPermissionError or PortNameError.
     """
+    if is_datagram_port(name):
+        return _open_udp_port(name)
     local = not name.startswith(_REMOTE)
     # pyserial's remote ports refuse a write timeout.
     options = {"exclusive": True, "write_timeout": WRITE_TIMEOUT} if local else {}
@@ -68,6 +77,27 @@ def open_port(name: str, baud_rate: int) -> Port:
         raise _explained(name, error) from error
     except ValueError as error:
         raise PortNameError(f"port {name}: {error}") from error
+
+
+def is_datagram_port(name: str) -> bool:
+    """Return whether a port has no line: no speed, and nothing to break."""
+    return name.startswith(_DATAGRAMS)
+
+
+def datagram_address(name: str) -> Tuple[str, int]:
+    """Return host and number of udp://HOST:PORT; raises PortNameError."""
+    host, _, number = name[len(_DATAGRAMS) :].rpartition(":")
+    if not host or not number.isdecimal() or not 0 < int(number) < _PORT_NUMBERS:
+        raise PortNameError(f"port {name}: must be udp://HOST:PORT with a PORT from 1 to {_PORT_NUMBERS - 1}")
+    return host, int(number)
+
+
+def _open_udp_port(name: str) -> UdpPort:
+    address = datagram_address(name)
+    try:
+        return UdpPort(*address, READ_TIMEOUT)
+    except OSError as error:
+        raise PortUnavailableError(f"port {name} cannot be opened: {error.strerror or error}") from error
 
 
 @contextmanager

@@ -27,7 +27,7 @@ class MountingParameters(ParameterSet):
     )  # fmt: skip
     mount_z: float = parameter(0.0, "sonar above it", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False)
     mount_yaw: float = parameter(
-        0.0, "where angle 0 of the head points, counter-clockwise from the vehicle's bow", unit="rad",
+        0.0, "where +x of the sonar points, counter-clockwise from the vehicle's bow", unit="rad",
         low=-2.0 * math.pi, high=2.0 * math.pi, tunable=False,
     )  # fmt: skip
     upside_down: bool = parameter(

@@ -3,7 +3,7 @@
 import math
 from collections import deque
 from enum import Enum
-from typing import Deque
+from typing import Deque, Optional
 
 _VOTES = 25  # Beams that are looked back on: more than the seven that gradians spend below 2 pi in a turn
 _ROUNDING = 1e-3  # Of a float32 that holds an angle
@@ -34,14 +34,14 @@ class RadiansOrGradians:
 
     def __init__(self) -> None:
         self._votes: Deque[bool] = deque(maxlen=_VOTES)
-        self.unit = AngleUnit.RADIANS
+        self.unit: Optional[AngleUnit] = None
+        """None before any angle said something."""
 
-    def take(self, angle: float) -> AngleUnit:
-        """Take one more angle and return the unit; one that is 0 or not finite says nothing."""
+    def take(self, angle: float) -> None:
+        """Take one more angle; one that is 0 or not finite says nothing."""
         if math.isfinite(angle) and angle != 0.0:
             self._votes.append(angle == round(angle) or abs(angle) > 2.0 * math.pi + _ROUNDING)
             for_gradians = sum(self._votes)
             if 2 * for_gradians != len(self._votes):
                 is_gradians = 2 * for_gradians > len(self._votes)
                 self.unit = AngleUnit.GRADIANS if is_gradians else AngleUnit.RADIANS
-        return self.unit

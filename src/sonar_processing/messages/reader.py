@@ -1,7 +1,7 @@
 """Turns messages of any known type into beams."""
 
 from dataclasses import dataclass, field, replace
-from typing import Any, Dict, List, Set
+from typing import Any, Dict, List, Optional, Set
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_stamp
@@ -40,16 +40,18 @@ class BeamReader:
     def read(self, type_name: str, message: Any) -> Reading:
         """Return the beams of a message of the type package/Type; raises RefusedInput for one that cannot be used."""
         kind = beam_type(type_name)
-        try:
-            found = kind.read(message)
-        except (AttributeError, TypeError, ValueError, OverflowError) as error:
-            if isinstance(error, RefusedInput):
-                raise
-            raise RefusedInput(_REFUSED, f"{type_name} not as expected: {error}") from error
-        if not found:
-            raise RefusedInput(_REFUSED, f"{type_name} without rays")
-        before = self._units.get(type_name)
-        unit = self._units[type_name] = self._unit(kind, found)
+        found = _fields(kind, type_name, message)
+        unit, before = self._unit(kind, found), self._units.get(type_name)
+        # Angles that do not tell the unit are 0, which is the same in all of them.
+        beams = self._beams(found, kind, unit or kind.unit)
+        if unit is None:
+            return Reading(beams, refused=len(found) - len(beams))
+        self._units[type_name] = unit
+        changed = before not in (None, unit)
+        return Reading(beams, self._notes(kind, type_name, unit, changed), changed, len(found) - len(beams))
+
+    def _beams(self, found: List[BeamFields], kind: BeamType, unit: AngleUnit) -> List[Beam]:
+        """Return those that can be used; raises RefusedInput where none can."""
         beams, problem = [], None
         for one in found:
             try:
@@ -58,16 +60,18 @@ class BeamReader:
                 problem = refused
         if problem is not None and not beams:
             raise problem
-        changed = before not in (None, unit)
-        return Reading(beams, self._notes(kind, type_name, unit, changed), changed, len(found) - len(beams))
+        return beams
 
-    def _unit(self, kind: BeamType, found: List[BeamFields]) -> AngleUnit:
+    def _unit(self, kind: BeamType, found: List[BeamFields]) -> Optional[AngleUnit]:
+        """Return the unit of the angles, None before they have told it."""
         if self._parameters.angle_unit is not AngleUnitChoice.TYPE:
             return AngleUnit(self._parameters.angle_unit.value)
         if not kind.may_be_gradians:
             return kind.unit
         guess = self._guesses.setdefault(kind.name, RadiansOrGradians())
-        return [guess.take(one.angle) for one in found][-1]
+        for one in found:
+            guess.take(one.angle)
+        return guess.unit
 
     def _beam(self, found: BeamFields, kind: BeamType, unit: AngleUnit) -> Beam:
         check_stamp(found.stamp_ns)
@@ -77,12 +81,17 @@ class BeamReader:
         beam = Beam(
             stamp_ns=found.stamp_ns,
             frame_id=frame_id,
-            angle=(-1.0 if self._is_clockwise(kind) else 1.0) * unit.to_radians(found.angle),
+            angle=self._angle(found.angle, kind, unit),
             intensities=found.intensities,
             range_resolution=found.range_resolution,
             sensor_angle=found.sensor_angle,
         )
         return replace(beam, stamp_ns=beam.stamp_ns - found.travel_time_ns) if kind.stamped_after_reply else beam
+
+    def _angle(self, angle: float, kind: BeamType, unit: AngleUnit) -> float:
+        """Return the angle from +x about +z of the frame, rad."""
+        turned = unit.to_radians(angle) - kind.unit.to_radians(kind.ahead)
+        return -turned if self._is_clockwise(kind) else turned
 
     def _is_clockwise(self, kind: BeamType) -> bool:
         if self._parameters.head_turns is HeadTurns.TYPE:
@@ -93,13 +102,26 @@ class BeamReader:
         if kind.name == OWN or (type_name in self._described and not changed):
             return []
         self._described.add(type_name)
-        told = ", told by their values" if kind.may_be_gradians and unit is not kind.unit else ""
+        is_told = self._parameters.angle_unit is AngleUnitChoice.TYPE and unit is not kind.unit
+        told = ", told by their values" if is_told else ""
         way = "clockwise" if self._is_clockwise(kind) else "counter-clockwise"
         text = (
             f"beams of {type_name}: angles in {unit.value.lower()}{told} (angle_unit sets the unit), growing {way} "
             "seen from the tip of +z of their frame (head_turns sets the direction); see docs/sonars.md"
         )
         return [text] + ([f"{type_name}: {kind.advice}"] if kind.advice else [])
+
+
+def _fields(kind: BeamType, type_name: str, message: Any) -> List[BeamFields]:
+    try:
+        found = kind.read(message)
+    except RefusedInput:
+        raise
+    except (AttributeError, TypeError, ValueError, OverflowError) as error:
+        raise RefusedInput(_REFUSED, f"{type_name} not as expected: {error}") from error
+    if not found:
+        raise RefusedInput(_REFUSED, f"{type_name} without rays")
+    return found
 
 
 def beam_type(type_name: str) -> BeamType:

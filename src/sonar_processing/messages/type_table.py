@@ -14,8 +14,9 @@ class BeamType:
 
     names: package/Type, in ROS 1 and ROS 2. read: takes its fields. unit: of the angle as documented. may_be_gradians:
     some drivers send gradians nevertheless. clockwise: whether angles grow clockwise seen from the tip of +z of the
-    message's frame, as the package's own scan or cloud has it. zero: where angle 0 points. stamped_after_reply: the
-    stamp was taken when the reply had come. strengths, bins and source: words for docs/sonars.md.
+    message's frame, as the package's own scan or cloud has it. ahead: the angle that points along +x of the frame, in
+    `unit`. stamped_after_reply: the stamp was taken when the reply had come. zero, strengths, bins and source: words
+    for docs/sonars.md.
     """
 
     names: Tuple[str, ...]
@@ -27,6 +28,7 @@ class BeamType:
     source: str
     may_be_gradians: bool = False
     clockwise: bool = False
+    ahead: float = 0.0
     stamped_after_reply: bool = True
     advice: str = ""
 
@@ -53,9 +55,9 @@ _TYPES: Tuple[BeamType, ...] = (
     ),
     BeamType(
         ("bluerobotics_sonar_msgs/SonarPing360",), fields.sonar_ping_360, AngleUnit.GRADIANS,
-        zero="+x of the frame, as in `ping360_imager`; where that is on the head is not documented",
-        strengths="0 to 255", bins="`range` / length of `profile_data`",
-        source="`SonarPing360.msg`, `ping360.py` and `ping360_imager.py` in itskalvik/bluerobotics_sonar",
+        zero="astern: the angle is the head's own, of which Ping Viewer draws 200 gradians ahead",
+        strengths="0 to 255", bins="`range` / length of `profile_data`", clockwise=True, ahead=200.0,
+        source="`SonarPing360.msg` and `ping360.py` in itskalvik/bluerobotics_sonar; `polarplot.cpp` of Ping Viewer",
     ),
     BeamType(
         ("micron_driver_ros/ScanLine",), fields.scan_line, AngleUnit.DEGREES,

@@ -26,11 +26,14 @@ class BeamSubscriber:
         parameters: BeamMessageParameters,
         health: Health,
         on_new_unit: Callable[[], None] = lambda: None,
+        on_message: Callable[[int], None] = lambda _: None,
     ) -> None:
-        """`on_new_unit` is called when the angles of the beams so far turn out to be in another unit."""
+        """`on_new_unit` is called when the angles of the beams so far turn out to be in another unit, `on_message` with
+        the number of beams of a message before they come.
+        """
         self._take = guarded(health, take)
         self._health = health
-        self._on_new_unit = on_new_unit
+        self._on_new_unit, self._on_message = on_new_unit, on_message
         self._reader = BeamReader(parameters)
         self._classes = MessageClasses()
         self._subscriber = rospy.Subscriber(
@@ -53,6 +56,7 @@ class BeamSubscriber:
         reading = self._reader.read(kind, self._classes.deserialised(message))
         self._tell(kind, reading)
         self._health.count("beams in", len(reading.beams))
+        self._on_message(len(reading.beams))
         for beam in reading.beams:
             self._take(beam)
 

@@ -16,8 +16,10 @@ from underwater_map_construction import msg
 
 WALL_COLOR = ColorRGBA(r=1.0, g=0.25, b=0.75, a=1.0)
 CIRCLE_COLOR = ColorRGBA(r=0.2, g=1.0, b=0.45, a=0.8)
-_LINE_WIDTH = 0.25  # m: seen in rviz beside the cells of a map
-_TEXT_HEIGHT = 2.5  # m: legible where a scan fills the window
+# Heights of texts in a scan's longest distance, legible where the scan fills the window; m, where it is a marina's.
+_TEXTS_IN_SCAN, _GREATEST_TEXT = 16.0, 2.5
+_LINE_WIDTH = 0.1  # of the height of a text: seen in rviz beside the cells of a map
+_TEXT_WIDTH = 3.5  # of its height: "12.3 m"
 _LEAST_HEIGHT = 0.5  # m: a circle is drawn as a flat disc, since its height is unknown
 
 
@@ -36,16 +38,22 @@ def circles_message(cloud: IntensityCloud, circles: Sequence[Circle]) -> msg.Cir
 
 
 def wall_markers(message: msg.Walls) -> MarkerArray:
-    """Return a line on each wall, from end to end, and its distance from the sonar; older markers go."""
+    """Return a line on each wall, from end to end, and its distance from the sonar; older markers go.
+
+    A distance whose text would lie on an earlier one is left out.
+    """
     markers = [_cleared(message.header)]
+    height, labelled = _text_height(message.walls), []
     for number, wall in enumerate(message.walls):
         line = _marker(message.header, "walls", number, Marker.LINE_STRIP, WALL_COLOR)
         line.points = [wall.start, wall.end]
-        line.scale = Vector3(_LINE_WIDTH, 0.0, 0.0)
+        line.scale = Vector3(_LINE_WIDTH * height, 0.0, 0.0)
         markers.append(line)
-        if math.isfinite(wall.sonar_distance):
-            middle = Point(*((_array(wall.start) + _array(wall.end)) / 2.0))
-            markers.append(_text(message.header, "wall distances", number, middle, f"{wall.sonar_distance:.1f} m"))
+        middle = (_array(wall.start) + _array(wall.end)) / 2.0
+        is_free = all(np.linalg.norm(middle - other) > _TEXT_WIDTH * height for other in labelled)
+        if math.isfinite(wall.sonar_distance) and is_free:
+            labelled.append(middle)
+            markers.append(_distance(message.header, number, middle, height, wall.sonar_distance))
     return MarkerArray(markers=markers)
 
 
@@ -102,9 +110,16 @@ def _marker(head: Header, namespace: str, number: int, kind: int, color: ColorRG
     return marker
 
 
-def _text(head: Header, namespace: str, number: int, place: Point, text: str) -> Marker:
-    marker = _marker(head, namespace, number, Marker.TEXT_VIEW_FACING, WALL_COLOR)
-    marker.pose.position = Point(place.x, place.y, place.z + _TEXT_HEIGHT)
-    marker.scale = Vector3(0.0, 0.0, _TEXT_HEIGHT)
-    marker.text = text
+def _distance(head: Header, number: int, place: np.ndarray, height: float, distance: float) -> Marker:
+    marker = _marker(head, "wall distances", number, Marker.TEXT_VIEW_FACING, WALL_COLOR)
+    marker.pose.position = Point(place[0], place[1], place[2] + height)
+    marker.scale = Vector3(0.0, 0.0, height)
+    marker.text = f"{distance:.1f} m"
     return marker
+
+
+def _text_height(walls: Sequence[msg.Wall]) -> float:
+    """Return the height of texts, m: the same share of a tank and of a marina."""
+    lengths = [float(np.linalg.norm(_array(wall.end) - _array(wall.start))) for wall in walls]
+    distances = [wall.sonar_distance for wall in walls if math.isfinite(wall.sonar_distance)]
+    return min(max([*lengths, *distances], default=0.0) / _TEXTS_IN_SCAN, _GREATEST_TEXT)

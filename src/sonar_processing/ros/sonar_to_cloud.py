@@ -55,7 +55,7 @@ class SonarToCloud:
         )
         self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)
-        BeamSubscriber(self._take_beam, parameters, self.health, self._forget_scan)
+        BeamSubscriber(self._take_beam, parameters, self.health, self._filter.forget, self._filter.make_room)
 
     def _use_parameters(self, parameters: SonarToCloudParameters) -> None:
         self._assembler = ScanAssembler(parameters)

@@ -28,9 +28,10 @@ class _WaitingBeam(NamedTuple):
 class TransformFilter(message_filters.SimpleFilter):
     """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
-    At most `QUEUE_SIZE` beams wait. A beam is dropped and counted when the queue is full, when it is older than one
-    that was delivered, or when tf can place a later beam of its frame but not this one. A stamp more than
-    `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are forgotten.
+    At most `QUEUE_SIZE` beams wait, or what `make_room` was told. A beam is dropped and counted when the queue is full,
+    when it is older than one that was delivered, or when tf can place a later beam of its frame but not this one. A
+    stamp more than `JUMP_BACK` seconds older than its predecessor means that time jumped: the waiting beams are
+    forgotten.
     """
 
     def __init__(
@@ -44,6 +45,7 @@ class TransformFilter(message_filters.SimpleFilter):
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s. `mount`: places frames that tf lacks."""
         super().__init__()
         self._mount = mount
+        self._most = QUEUE_SIZE
         self._target_frame = target_frame
         self._health = health
         self._on_time_jump = guarded(health, on_time_jump)
@@ -64,11 +66,22 @@ class TransformFilter(message_filters.SimpleFilter):
         with self._condition:
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
-            if len(self._queue) >= QUEUE_SIZE:
+            if len(self._queue) >= self._most:
                 oldest = self._queue.popleft().beam
-                self._drop(oldest, self._obstacle(oldest) or f"{QUEUE_SIZE} newer beams wait, the machine is too slow")
+                self._drop(oldest, self._obstacle(oldest) or f"{self._most} newer beams wait, the machine is too slow")
             self._newest_ns = beam.stamp_ns
             self._queue.append(_WaitingBeam(beam, is_moving))
+            self._condition.notify()
+
+    def make_room(self, beams: int) -> None:
+        """Let so many beams wait that come at once: those of a whole turn in one message."""
+        self._most = max(QUEUE_SIZE, 2 * beams)
+
+    def forget(self) -> None:
+        """Forget the waiting beams and the unfinished scan, because they were read wrongly."""
+        with self._condition:
+            self._queue.clear()
+            self._jumped = True
             self._condition.notify()
 
     def _take_older(self, beam: Beam) -> None:

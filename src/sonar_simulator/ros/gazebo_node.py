@@ -2,19 +2,19 @@
 
 from typing import Optional
 
+import genpy
 import rospy
 
 from node_support import topics
 from node_support.ros.joint_angle import JointAngle
 from node_support.ros.node import guarded, make_health
 from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.ros.conversions import header
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.gazebo.beams import GazeboBeams, RayScan
 from sonar_simulator.gazebo.parameters import GROUPS, GazeboSonarParameters, HeadMode
 from sonar_simulator.ros.gazebo_messages import ray_scan
-from sonar_simulator.ros.simulator_messages import scan_line
+from sonar_simulator.ros.simulator_messages import MESSAGES
 from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 from underwater_map_construction.msg import SonarScanLine
@@ -75,6 +75,6 @@ class GazeboSonar:
         self._publish(ping, scan)
 
     def _publish(self, ping: Ping, scan: RayScan) -> None:
-        stamped = header(scan.stamp_ns, self._parameters.frame_id)
-        self._publisher.publish(scan_line(ping, self._tilt.for_beam(), stamped, self._beams.max_range))
+        stamp, frame = genpy.Time(*divmod(scan.stamp_ns, 10**9)), self._parameters.frame_id
+        self._publisher.publish(MESSAGES.scan_line(ping, self._tilt.for_beam(), stamp, frame, self._beams.max_range))
         self.health.count("beams out")

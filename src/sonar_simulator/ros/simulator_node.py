@@ -3,22 +3,21 @@
 import itertools
 import math
 import threading
-from pathlib import Path
 from typing import Iterator
 
 import numpy as np
-import rospkg
 import rospy
 from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64
 
 from node_support import topics
 from node_support.pace import Pace
+from node_support.package_folder import package_folder
 from node_support.parameters import ParameterError
 from node_support.ros.node import guarded, make_health
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
 from sonar_simulator.simulation.simulation import Drive, Moment
-from sonar_simulator.simulation.simulation_setup import PACKAGE, Settings, make_setup
+from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
@@ -34,7 +33,7 @@ class Simulator:
         self.health = make_health("sonar_simulator")
         self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
-        folder = Path(rospkg.RosPack().get_path(PACKAGE))
+        folder = package_folder()
         self._parameters = settings.simulator
         self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
         self._publisher = SimulatorPublisher(

@@ -6,8 +6,9 @@ from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker
 
 from node_support import topics
-from sonar_simulator.ros.simulator_messages import TOPICS, WORLD_FRAME, moment_messages, placing_messages
+from sonar_simulator.ros.simulator_messages import CLASSES, MESSAGES
 from sonar_simulator.ros.world_marker import world_marker
+from sonar_simulator.simulation.moment_messages import TOPICS, WORLD_FRAME
 from sonar_simulator.simulation.simulation import Drive, Instruments, Moment
 from sonar_simulator.world.world import World
 
@@ -47,7 +48,7 @@ class SimulatorPublisher:
     def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
         """Publish what places a waiting sonar: the time, and the vehicle and its servo at a moment."""
         self.publish_clock(stamp)
-        for topic, message in placing_messages(moment, stamp, self._instruments):
+        for topic, message in MESSAGES.placing(moment, stamp, self._instruments):
             self._publishers[topic].publish(message)
 
     def publish_world(self, world: World) -> None:
@@ -61,11 +62,11 @@ class SimulatorPublisher:
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
         """Publish everything that belongs to a moment."""
         self.publish_clock(stamp)
-        for topic, message in moment_messages(moment, stamp, self._max_range, self._instruments):
+        for topic, message in MESSAGES.at(moment, stamp, self._max_range, self._instruments):
             self._publishers[topic].publish(message)
             if topic == topics.VELOCITY and self._commands is not None:
                 self._commands.publish(message)
 
 
-def _publisher(topic: str, kind: type) -> rospy.Publisher:
-    return rospy.Publisher(topic, kind, queue_size=_QUEUE_SIZE, tcp_nodelay=True)
+def _publisher(topic: str, kind: str) -> rospy.Publisher:
+    return rospy.Publisher(topic, CLASSES[kind], queue_size=_QUEUE_SIZE, tcp_nodelay=True)

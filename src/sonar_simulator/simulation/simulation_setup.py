@@ -21,7 +21,6 @@ from sonar_simulator.world.errors import WorldError
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 
-PACKAGE = "underwater_map_construction"
 BASE_FRAME = "base_link"
 SONAR_FRAME = "sonar"
 

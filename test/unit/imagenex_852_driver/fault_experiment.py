@@ -4,10 +4,14 @@ Command line: python3 fault_experiment.py [COMMANDS RATE]; 10,000 commands, a th
 otherwise. RATE is the share of each of the eight faults.
 """
 
+import os
 import sys
 from dataclasses import dataclass
 from typing import List
 
+sys.path.append(os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "sonar_driver"))
+
+from numbered_pings import NumberedEchoes, RecordingInjector
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
 from imagenex_852_driver.emulator import Emulated852, FaultRates852
@@ -15,46 +19,12 @@ from imagenex_852_driver.line.connection import ConnectionParameters
 from imagenex_852_driver.line.device import SonarDevice
 from imagenex_852_driver.line.stats import DeviceStats
 from imagenex_852_driver.protocol.settings import HeadSettings
-from sonar_driver.emulator import EchoSource, Fault, FaultInjector
+from sonar_driver.emulator import Fault
 from sonar_driver.line.scanner import Scanner
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
-WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE)
 # Beyond the longest wait for a reply.
 LATENESS = 0.12
-
-
-class NumberedEchoes(EchoSource):
-    """Writes the number of the ping into the first echoes."""
-
-    def __init__(self):
-        self.count = 0
-
-    def echoes(self, ping):
-        self.count += 1
-        return (self.count - 1).to_bytes(4, "big") + bytes(ping.bin_count - 4)
-
-
-class RecordingInjector(FaultInjector):
-    """Remembers the fault of every ping, and stops the driver after a number of commands."""
-
-    def __init__(self, rates, seed, commands, stop):
-        super().__init__(rates, seed)
-        self.of_pings: List[Fault] = []
-        self._left = commands
-        self._stop = stop
-
-    def next(self):
-        self._left -= 1
-        if self._left < 0:
-            self._stop.set()
-            self.counts[Fault.DROPPED] += 1
-            self.of_pings.append(Fault.DROPPED)
-            return Fault.DROPPED
-        fault = super().next()
-        if fault not in WITHOUT_PING:
-            self.of_pings.append(fault)
-        return fault
 
 
 @dataclass(frozen=True)
@@ -82,7 +52,7 @@ def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.1) ->
     faults = RecordingInjector(fault_rates(rate, reply_margin), seed, commands, stop)
     connection = ConnectionParameters(reply_margin=reply_margin, late_window=2 * LATENESS, byte_gap=reply_margin / 2)
     timing = connection.timing()
-    line = VirtualLine(Emulated852(NumberedEchoes(), faults, timing), timing, time)
+    line = VirtualLine(Emulated852(NumberedEchoes(), faults, timing), timing.baud_rate, time)
     device = SonarDevice(connection, stop, time.elapsed, time.elapsed, line.open)
     delivered: List[int] = []
     scanner = Scanner(

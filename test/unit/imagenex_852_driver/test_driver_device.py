@@ -177,7 +177,7 @@ def test_replies_before_sound_can_have_returned_are_dropped_and_counted_on_their
     time = VirtualTime()
     connection = ConnectionParameters(speed_of_sound=1400.0)
     head = Emulated852(timing=ConnectionParameters(speed_of_sound=2000.0).timing())
-    line = VirtualLine(head, connection.timing(), time)
+    line = VirtualLine(head, connection.baud_rate, time)
     device = SonarDevice(connection, VirtualStop(time), time.elapsed, time.elapsed, line.open)
     device.open()
     assert [device.ping(SwitchCommand(max_range=50)) for _ in range(5)] == [None] * 5

@@ -66,7 +66,7 @@ def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
     place = MovedBy(0.3 * last)
     shown.settle(place)
     assert_same(shown.map.blocks, made_at_once(*inserted, *(place.points(keyframe) for keyframe in keyframes)))
-    assert shown.keyframes == 0
+    assert shown.moving == []
 
 
 def test_a_keyframe_that_moves_leaves_nothing_behind():
@@ -82,7 +82,7 @@ def test_a_settled_keyframe_stays_where_it_was_drawn():
     for number in (1, 2):
         shown.add(cloud(number))
     shown.draw(MovedBy(0.0), settled_until=1.0)
-    assert shown.keyframes == 1
+    assert len(shown.moving) == 1
     shown.draw(MovedBy(50.0), settled_until=1.0)
     assert_same(shown.map.blocks, made_at_once(cloud(1).points, MovedBy(50.0).points(cloud(2))))
 

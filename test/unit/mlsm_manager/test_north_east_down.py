@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.offline.north_east_down import suspicions
+from mlsm_manager.self_check.north_east_down import ZDownSigns, suspicions
 from node_support.geometry.planar import transformed
 
 TURN = 0.4
@@ -43,3 +43,20 @@ def test_a_few_turns_are_not_enough_to_say():
 @pytest.mark.parametrize(("heights", "count"), [([0.0, 3.0, 5.0], 1), ([0.0, -3.0, -5.0], 0), ([-5.0, 0.0, -5.0], 1)])
 def test_a_vehicle_that_climbs_far_above_its_start_is_a_suspicion(heights, count):
     assert len(suspicions(np.array(heights), [])) == count
+
+
+@pytest.mark.parametrize(("heights", "count"), [([-5.0, 0.0], 0), ([-5.0, 1.5], 0), ([0.0, 2.5], 1), ([3.0, 4.0], 1)])
+def test_a_live_vehicle_is_compared_with_the_surface(heights, count):
+    signs = ZDownSigns()
+    for height in heights:
+        signs.take_heights(np.array([height]))
+    assert len(signs.lines()) == count
+
+
+def test_a_live_vehicle_is_suspected_once_enough_turns_speak_against_it():
+    signs = ZDownSigns()
+    known = []
+    for scan in _scans(8, -TURN):
+        signs.take_scan(scan)
+        known.append(len(signs.lines()))
+    assert known == [0, 0, 0, 0, 0, 1, 1, 1]

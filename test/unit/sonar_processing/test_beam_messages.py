@@ -1,6 +1,7 @@
 """Messages of several sonars become the same beams."""
 
 import math
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -31,6 +32,7 @@ MADE = {
     MICRON: micron_line_of,
     LASER_SCAN: laser_scan_of,
 }
+SONARS_PAGE = (Path(__file__).resolve().parents[3] / "docs/sonars.md").read_text()
 NEEDED = {
     OWN: "header angle intensities maxrange_meters range_resolution sensorAngle",
     ECHO: "header angle intensities range number_of_samples speed_of_sound",
@@ -77,6 +79,8 @@ def test_a_ping_360_of_the_bluerobotics_sonar_package():
     found = beam(PING_360, ping_360_of(100))
     assert (found.frame_id, found.range_resolution) == ("ping360", 0.5)
     assert found.angle == pytest.approx(math.pi / 2)
+    assert beam(PING_360, ping_360_of(200)).angle == 0.0
+    assert beam(PING_360, ping_360_of(300)).angle == pytest.approx(-math.pi / 2)
 
 
 def test_a_micron_of_the_micron_driver_ros_package():
@@ -129,6 +133,13 @@ def test_a_driver_of_gradians_is_understood_from_its_first_beam_on(first, step):
     np.testing.assert_allclose([one.beams[0].angle for one in echoes_at(angles)], expected)
 
 
+def test_an_angle_of_0_does_not_tell_the_unit_and_needs_none():
+    found = echoes_at([0.0, 0.0, 2.0, 4.0])
+    assert [one.beams[0].angle for one in found[:2]] == [0.0, 0.0]
+    assert [len(one.notes) for one in found] == [0, 0, 1, 0]
+    assert not any(one.unit_changed for one in found)
+
+
 def test_a_single_broken_angle_does_not_change_the_unit():
     angles = [0.1 * number for number in range(1, 9)]
     found = echoes_at([*angles, 390.0, 0.9])
@@ -146,6 +157,10 @@ def test_the_unit_can_be_set():
     assert beam(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").angle == pytest.approx(3.0 * math.pi / 200.0)
     assert beam(ECHO, sonar_echo_of(90.0), angle_unit="DEGREES").angle == pytest.approx(math.pi / 2)
     assert beam(ECHO, sonar_echo_of(400.0), angle_unit="RADIANS").angle == 400.0
+
+
+def test_a_unit_that_was_set_is_not_said_to_be_told_by_values():
+    assert "told by" not in reading(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").notes[0]
 
 
 def test_the_direction_can_be_set():
@@ -203,7 +218,10 @@ def test_a_message_that_makes_no_beam_is_refused(kind, values):
         reading(kind, MADE[kind](**values))
 
 
-def test_every_type_says_what_is_documented_of_it():
-    for name, kind in BEAM_TYPES.items():
-        assert name in kind.names
-        assert all([kind.zero, kind.strengths, kind.bins, kind.source])
+@pytest.mark.parametrize("name", sorted(BEAM_TYPES))
+def test_the_page_of_sonars_says_of_every_type_what_the_table_does(name):
+    kind = BEAM_TYPES[name]
+    (row,) = [line for line in SONARS_PAGE.splitlines() if line.startswith("|") and f"`{name}`" in line]
+    way = "clockwise" if kind.clockwise else "counter-clockwise"
+    for words in (kind.unit.value.lower(), f"| {way} |", kind.zero, kind.strengths, kind.bins, kind.source):
+        assert words in row

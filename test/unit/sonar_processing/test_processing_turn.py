@@ -76,3 +76,20 @@ def test_the_usual_step_is_not_that_of_the_gaps():
     for number in [0, 1, 2, 5, 6, 7, 8, 20]:
         turn.add(number * STEP)
     assert turn.usual_step == pytest.approx(STEP)
+
+
+def test_a_change_of_the_step_within_a_turn_costs_no_turn_after_it():
+    angles = np.concatenate([np.arange(0, 540, 3), np.arange(540, 1800, 6)])
+    assert _lengths(np.radians(angles)) == [120, 90, 60, 60, 60]
+
+
+def test_a_sector_after_whole_turns_gives_its_sweeps():
+    swing = np.concatenate([np.arange(60, 120), np.arange(118, 60, -1)])
+    lengths = _lengths(STEP * np.concatenate([np.arange(240), np.tile(swing / 2.0, 3)]))
+    assert lengths[:2] == [120, 120]
+    assert lengths[-3:] == [59, 59, 59]
+
+
+def test_a_change_of_range_forgets_only_the_turn_in_which_it_happens():
+    beams = [{"angle": STEP * number, "strengths": (1,) * (3 if number < 150 else 5)} for number in range(400)]
+    assert [len(turn) for turn in _turns(beams)] == [120, 120, 120]

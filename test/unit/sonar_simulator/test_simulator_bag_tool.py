@@ -6,7 +6,7 @@ import pytest
 import rosbag
 import yaml
 
-from sonar_simulator.ros.bag_tool import main
+from sonar_simulator.simulation.bag_tool import main
 from sonar_simulator.vehicle.script_file import load_script
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -135,7 +135,7 @@ def test_a_bag_that_could_not_be_finished_leaves_the_older_one(tmp_path, script,
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sonar_simulator.ros.bag_writer.BagWriter.add", stop)
+    monkeypatch.setattr("sonar_simulator.simulation.simulated_bag.SimulatedBag.add", stop)
     assert _write(tmp_path, script)[0] == 130
     assert "nothing was written" in capsys.readouterr().err
     assert out.read_bytes() == before

@@ -1,20 +1,16 @@
-"""Writes the bag of a whole simulation, without a ROS master."""
+"""Writes the bag of a whole simulation."""
 
 import math
 from pathlib import Path
-from typing import Callable
+from typing import Any, Callable
 
-import rosbag
-import rospy
+import numpy as np
 import yaml
-from geometry_msgs.msg import Pose
-from std_msgs.msg import String
-from tf2_msgs.msg import TFMessage
 
 from node_support import topics
 from node_support.files import whole_file
-from node_support.ros.conversions import pose_from_matrix
-from sonar_simulator.ros.simulator_messages import moment_messages, transform_message
+from recordings.bags.bag_writer import BagWriter
+from sonar_simulator.simulation.moment_messages import MomentMessages
 from sonar_simulator.simulation.simulation import Moment
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup
 from sonar_simulator.vehicle.robot_description import RobotDescription
@@ -26,49 +22,52 @@ _RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
 _SETTINGS_TOPIC = "/sonar_simulator/settings"
 
 
-class _Stamp(rospy.Time):
-    """A time that compares fast: rosbag sorts every message into an index of all earlier messages."""
-
-    __slots__ = ()
-
-    def __lt__(self, other: rospy.Time) -> bool:
-        return (self.secs, self.nsecs) < (other.secs, other.nsecs)
-
-
-class BagWriter:
+class SimulatedBag:
     """Writes moments into a bag, at the times and on the topics that the simulator node would use."""
 
-    def __init__(self, bag: rosbag.Bag, setup: Setup) -> None:
+    def __init__(self, bag: BagWriter, setup: Setup, settings: Settings) -> None:
         self._bag = bag
         self._setup = setup
+        self._settings = settings
+        self._messages = MomentMessages(bag.make, np.asarray)
         self._tilt = math.nan
-        self._pose = Pose()
+        self._mount = np.eye(4)
 
-    def begin(self, robot: RobotDescription, settings: Settings) -> None:
+    def begin(self, robot: RobotDescription) -> None:
         """Write what applies to the whole bag: the fixed transforms and the parameters."""
-        start = _stamp(0.0)
+        stamp_ns, stamp = self._stamp(0.0)
         transforms = [
-            transform_message(pose_from_matrix(joint.T_parent_child), start, joint.parent, joint.child)
+            self._messages.transform(joint.T_parent_child, stamp, joint.parent, joint.child)
             for joint in robot.fixed_joints
         ]
-        self._write(topics.STATIC_TRANSFORMS, TFMessage(transforms=transforms), start)
-        self._write(_SETTINGS_TOPIC, String(data=_told(settings)), start)
+        self._write(topics.STATIC_TRANSFORMS, self._messages.transforms(transforms), stamp_ns)
+        told = self._bag.make("std_msgs/String")
+        told.data = _told(self._settings)
+        self._write(_SETTINGS_TOPIC, told, stamp_ns)
 
     def add(self, moment: Moment) -> None:
         """Write everything that belongs to a moment; its transforms are one message."""
-        stamp = _stamp(moment.time)
-        for topic, message in moment_messages(moment, stamp, self._setup.sonar.max_range):
-            if topic == topics.TRANSFORMS:
-                message.transforms.append(transform_message(self._mount(moment.tilt), stamp, BASE_FRAME, SONAR_FRAME))
-            self._write(_RENAMED.get(topic, topic), message, stamp)
+        stamp_ns, stamp = self._stamp(moment.time)
+        instruments = self._settings.simulator.instruments
+        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments)
+        if messages[0][0] != topics.TRANSFORMS:
+            messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
+        mount = self._messages.transform(self._mount_at(moment.tilt), stamp, BASE_FRAME, SONAR_FRAME)
+        messages[0][1].transforms.append(mount)
+        for topic, message in messages:
+            self._write(_RENAMED.get(topic, topic), message, stamp_ns)
 
-    def _mount(self, tilt: float) -> Pose:
+    def _mount_at(self, tilt: float) -> np.ndarray:
         if tilt != self._tilt:
-            self._tilt, self._pose = tilt, pose_from_matrix(tilted(self._setup.T_base_sonar, tilt))
-        return self._pose
+            self._tilt, self._mount = tilt, tilted(self._setup.T_base_sonar, tilt)
+        return self._mount
 
-    def _write(self, topic: str, message: object, stamp: rospy.Time) -> None:
-        self._bag.write(topic if topic.startswith("/") else f"/{topic}", message, stamp)
+    def _stamp(self, seconds: float) -> Any:
+        stamp_ns = round((START_TIME + seconds) * 1e9)
+        return stamp_ns, self._bag.time(stamp_ns)
+
+    def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
+        self._bag.write(topic if topic.startswith("/") else f"/{topic}", message, stamp_ns)
 
 
 def write_bag(
@@ -84,9 +83,9 @@ def write_bag(
     `tell` receives the simulated time [s] from time to time. Raises OSError.
     """
     beams = 0
-    with whole_file(path) as temporary, rosbag.Bag(str(temporary), "w", compression=compression) as bag:
-        writer = BagWriter(bag, setup)
-        writer.begin(robot, settings)
+    with whole_file(path) as temporary, BagWriter(temporary, compression) as bag:
+        writer = SimulatedBag(bag, setup, settings)
+        writer.begin(robot)
         for moment in setup.simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
             writer.add(moment)
             if moment.ping is not None:
@@ -100,7 +99,3 @@ def _told(settings: Settings) -> str:
     values = settings.to_mapping()
     files = {key: Path(values[key]).name for key in ("world", "script")}
     return yaml.safe_dump({**values, **files}, sort_keys=False)
-
-
-def _stamp(seconds: float) -> rospy.Time:
-    return _Stamp.from_sec(START_TIME + seconds)

@@ -4,9 +4,9 @@ import threading
 from collections import deque
 from typing import Deque, Optional
 
-from imagenex_852_driver.line.timing import LineTiming
 from sonar_driver.emulator import EmulatedHead, Transmission
 from sonar_driver.line.port import READ_TIMEOUT, PortUnavailableError
+from sonar_driver.line.timing import transmission_time
 
 
 class VirtualTime:
@@ -36,8 +36,8 @@ class VirtualStop(threading.Event):
 class VirtualLine:
     """The port of an emulated head, as far as the device uses a port of pyserial."""
 
-    def __init__(self, head: EmulatedHead, timing: LineTiming, time: VirtualTime) -> None:
-        self._head, self._timing, self._time = head, timing, time
+    def __init__(self, head: EmulatedHead, baud_rate: float, time: VirtualTime) -> None:
+        self._head, self._baud_rate, self._time = head, baud_rate, time
         self._outgoing: Deque[Transmission] = deque()
         self._arrived = bytearray()
 
@@ -54,9 +54,13 @@ class VirtualLine:
     def write(self, data: bytes) -> int:
         """Hand a command to the head, which acts when its last byte has arrived."""
         self._check_present()
-        arrival = self._time.now + self._timing.transmission(len(data))
+        self._deliver()
+        arrival = self._time.now + transmission_time(len(data), self._baud_rate)
         self._outgoing.extend(self._head.receive(data, arrival))
         return len(data)
+
+    def send_break(self) -> None:
+        """Do nothing: an emulated head does not hear it."""
 
     @property
     def in_waiting(self) -> int:
@@ -68,15 +72,20 @@ class VirtualLine:
     def read(self, size: int = 1) -> bytes:
         """Return `size` bytes, or what has come until the timeout."""
         deadline = self._time.now + READ_TIMEOUT
-        while self.in_waiting < size and self._outgoing and self._outgoing[0].time <= deadline:
-            self._time.now = self._outgoing[0].time
+        while self.in_waiting < size and self._next_event() <= deadline:
+            self._time.now = max(self._time.now, self._next_event())
         if self.in_waiting < size:
             self._time.now = deadline
         data = bytes(self._arrived[:size])
         del self._arrived[:size]
         return data
 
+    def _next_event(self) -> float:
+        return min(self._head.next_event, self._outgoing[0].time if self._outgoing else float("inf"))
+
     def _deliver(self) -> None:
+        while self._head.next_event <= self._time.now:
+            self._outgoing.extend(self._head.advance(self._head.next_event))
         while self._outgoing and self._outgoing[0].time <= self._time.now:
             self._arrived += self._outgoing.popleft().data
 
@@ -86,4 +95,4 @@ class VirtualLine:
             raise OSError("the port has disappeared")
 
     def _is_absent(self) -> bool:
-        return self._time.now < self._head.absent_until
+        return self._head.absent_from <= self._time.now < self._head.absent_until

@@ -21,28 +21,50 @@ _LEAST_PAIRS = 5
 _SHARE = 0.75
 
 
+class ZDownSigns:
+    """Collects the signs scan by scan, for a run that is still going on."""
+
+    def __init__(self, start: float = 0.0) -> None:
+        """`start`: z that the vehicle is compared with, m; 0 is the surface, or where the odometry began."""
+        self._start = self._lowest = self._highest = start
+        self._previous: Optional[Scan] = None
+        self._pairs = self._against = 0
+
+    def take_heights(self, heights: np.ndarray) -> None:
+        """Take (n,) z of the vehicle in odom, m, n > 0."""
+        self._lowest = min(self._lowest, float(heights.min()))
+        self._highest = max(self._highest, float(heights.max()))
+
+    def take_scan(self, scan: Scan) -> None:
+        """Compare a scan with the one before it."""
+        vote = None if self._previous is None else _fits_opposite_turn(self._previous, scan)
+        self._previous = scan
+        if vote is not None:
+            self._pairs += 1
+            self._against += int(vote)
+
+    def lines(self) -> List[str]:
+        """Return one line for each sign; none where nothing speaks for z down."""
+        found = []
+        climb, dive = self._highest - self._start, self._start - self._lowest
+        if climb > _CLIMB and climb > dive:
+            found.append(f"z grows by {climb:.1f} m from the start, as a depth does")
+        share = self._against / max(self._pairs, 1)
+        if self._pairs >= _LEAST_PAIRS and share >= _SHARE:
+            found.append(f"in {100.0 * share:.0f} % of the turns the echoes drift with the yaw instead of against it")
+        return found
+
+
 def suspicions(heights: np.ndarray, scans: Sequence[Scan]) -> List[str]:
-    """Return one line for each sign of z down; none where nothing speaks for it.
+    """Return one line for each sign of z down in a whole recording; none where nothing speaks for it.
 
     heights: (n,) z of the sonar in odom, m, one for each beam.
     """
-    found = []
-    climb, dive = float(heights.max() - heights[0]), float(heights[0] - heights.min())
-    if climb > _CLIMB and climb > dive:
-        found.append(f"z grows by {climb:.1f} m from the start, as a depth does")
-    against = yaw_contradiction(scans)
-    if against is not None:
-        found.append(f"in {100.0 * against:.0f} % of the turns the echoes drift with the yaw instead of against it")
-    return found
-
-
-def yaw_contradiction(scans: Sequence[Scan]) -> Optional[float]:
-    """Return the share of pairs of scans that fit the opposite turn better; None where it is not most of them."""
-    votes = [_fits_opposite_turn(earlier, later) for earlier, later in zip(scans, scans[1:])]
-    known = [vote for vote in votes if vote is not None]
-    if len(known) < _LEAST_PAIRS or np.mean(known) < _SHARE:
-        return None
-    return float(np.mean(known))
+    signs = ZDownSigns(float(heights[0]))
+    signs.take_heights(heights)
+    for scan in scans:
+        signs.take_scan(scan)
+    return signs.lines()
 
 
 def _fits_opposite_turn(earlier: Scan, later: Scan) -> Optional[bool]:

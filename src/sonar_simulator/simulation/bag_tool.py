@@ -3,18 +3,22 @@
 import sys
 import time
 from argparse import Namespace
-from pathlib import Path
 from typing import List
 
-import rospkg
 from tqdm import tqdm
 
+from node_support.package_folder import package_folder
 from node_support.parameters import ParameterError
-from sonar_simulator.ros.bag_writer import write_bag
 from sonar_simulator.simulation.bag_arguments import parse, settings_of
+from sonar_simulator.simulation.simulated_bag import write_bag
 from sonar_simulator.simulation.simulation import Drive
-from sonar_simulator.simulation.simulation_setup import PACKAGE, Settings, make_setup
+from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
+
+
+def run_simulate_bag() -> None:
+    """Run simulate_bag with the command line."""
+    sys.exit(main(sys.argv[1:]))
 
 
 def main(arguments: List[str]) -> int:
@@ -35,7 +39,7 @@ def main(arguments: List[str]) -> int:
 
 
 def _run(options: Namespace) -> None:
-    package = Path(rospkg.RosPack().get_path(PACKAGE))
+    package = package_folder()
     settings = Settings.from_mapping(settings_of(options, package))
     if settings.simulator.drive is not Drive.SCRIPT:
         raise ParameterError("drive = 'CMD_VEL': nobody sends commands while a bag is written; must be SCRIPT")

@@ -16,9 +16,9 @@ class TestEmulatedGraph(unittest.TestCase):
         cloud = maps.wait_for_more(1, _ONE_TURN)[0]
         assert cloud.header.frame_id == "map"
         assert cloud.width > 100
-        assert len(raw.received) >= 110
+        assert len(raw.received) >= rospy.get_param("~least_beams")
 
 
 if __name__ == "__main__":
-    rospy.init_node("imagenex_852_emulated")
-    rostest.rosrun("underwater_map_construction", "imagenex_852_emulated", TestEmulatedGraph)
+    rospy.init_node("driver_emulated")
+    rostest.rosrun("underwater_map_construction", "driver_emulated", TestEmulatedGraph)

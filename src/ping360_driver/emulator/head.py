@@ -1,0 +1,169 @@
+"""The emulated head: a state machine from messages to messages with the delays of motor, sound and line."""
+
+from typing import List, Optional
+
+from brping.pingmessage import PingMessage
+
+from ping360_driver.emulator.parameters import Ping360FaultRates
+from ping360_driver.emulator.sector_scan import SectorScan
+from ping360_driver.protocol.angles import AHEAD, TURN, head_angle
+from ping360_driver.protocol.message_stream import MessageStream
+from ping360_driver.protocol.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageId, packed, packed_nack
+from ping360_driver.protocol.sampling import PERIOD_TICKS, SAMPLES, bin_length, longest_pulse_us
+from ping360_driver.protocol.scan_command import PulseSettings
+from sonar_driver.emulator import (
+    EchoSource,
+    EmulatedHead,
+    Fault,
+    FaultInjector,
+    FixedPattern,
+    PingRequest,
+    Transmission,
+)
+
+_PING360 = 2
+_FIRMWARES = {True: (3, 3, 1), False: (3, 1, 1)}  # With and without auto-transmit
+_TURNING_TIME = 2.4 / TURN  # s per gradian: Ping Viewer's angular speed of the head
+_ANSWER_TIME = 0.002  # s: what a processor needs for an answer that takes no ping
+_STILL_UNREAD = 0.1  # s: nobody waits for the driver to read a beam before the head sends the next one
+_GAINS_DB = (-6.0, 0.0, 6.0)  # Of the emulated echoes; the manufacturer gives no figures
+
+# What the ping protocol allows in a command to ping.
+_ALLOWED = {
+    "gain_setting": range(3),
+    "angle": range(TURN),
+    "transmit_duration": range(1, 1001),
+    "sample_period": range(PERIOD_TICKS[0], PERIOD_TICKS[1] + 1),
+    "transmit_frequency": range(500, 1001),
+    "number_of_samples": range(SAMPLES[0], SAMPLES[1] + 1),
+    "start_angle": range(TURN),
+    "stop_angle": range(TURN),
+    "num_steps": range(1, 11),
+    "delay": range(101),
+}
+
+
+class EmulatedPing360(EmulatedHead):
+    """A Ping360 in software. A silence or a disappearance ends its scan, like a loss of power."""
+
+    def __init__(
+        self,
+        echo_source: Optional[EchoSource] = None,
+        faults: Optional[FaultInjector] = None,
+        baud_rate: float = 115200,
+        speed_of_sound: float = 1500.0,
+        auto_transmit: bool = True,
+    ) -> None:
+        super().__init__(faults or FaultInjector(Ping360FaultRates()), baud_rate)
+        self._echo_source = echo_source or FixedPattern()
+        self._speed_of_sound = speed_of_sound
+        self._auto_transmit = auto_transmit
+        self._angle = AHEAD
+        self._stream = MessageStream()
+        self._scan: Optional[SectorScan] = None
+        self._command: Optional[PingMessage] = None
+
+    def receive(self, data: bytes, time: float) -> List[Transmission]:
+        """Take bytes that arrived at `time`; return what the head sends in reply, in order of time."""
+        answers = []
+        for parsed in self._stream.feed(data):
+            if time >= self._silent_until:
+                answers.extend(self._obey(parsed.message, time))
+        return answers
+
+    def advance(self, time: float) -> List[Transmission]:
+        """Return the beam of the ping that is due at `time`, while the head scans by itself."""
+        if time < self.next_event:
+            return []
+        ping_time = self.next_event
+        self._angle = self._scan.angle
+        sent = self._ping(self._command, ping_time, MessageId.AUTO_DEVICE_DATA)
+        if self._scan is not None:
+            turning = self._scan.turn() * _TURNING_TIME
+            quiet = ping_time + _pulse(self._command).listening_time
+            self.next_event = max(quiet, self._line_free) + turning + self._command.delay / 1000
+        return sent
+
+    def _obey(self, message: PingMessage, time: float) -> List[Transmission]:
+        if message.message_id == MessageId.GENERAL_REQUEST:
+            return self._answer(message.requested_id, time)
+        if message.message_id == MessageId.MOTOR_OFF:
+            self._rest()
+            return self._at_once(packed(MessageId.ACK, acked_id=MessageId.MOTOR_OFF), time)
+        if message.message_id not in (MessageId.TRANSDUCER, MessageId.AUTO_TRANSMIT):
+            return []
+        wrong = self._complaint(message)
+        if wrong:
+            return self._at_once(packed_nack(message.message_id, wrong), time)
+        self._rest()
+        if message.message_id == MessageId.TRANSDUCER:
+            return self._point_and_ping(message, time)
+        self._command, self._scan = message, SectorScan(message.start_angle, message.stop_angle, message.num_steps)
+        self.next_event = time + self._turning_time_to(message.start_angle)
+        return []
+
+    def _answer(self, requested_id: int, time: float) -> List[Transmission]:
+        if requested_id != MessageId.DEVICE_INFORMATION:
+            return self._at_once(packed_nack(MessageId.GENERAL_REQUEST, "not known to the emulated head"), time)
+        names = ("firmware_version_major", "firmware_version_minor", "firmware_version_patch")
+        firmware = dict(zip(names, _FIRMWARES[self._auto_transmit]))
+        return self._at_once(packed(MessageId.DEVICE_INFORMATION, device_type=_PING360, **firmware), time)
+
+    def _at_once(self, frame: bytes, time: float) -> List[Transmission]:
+        return self._paced(frame, time + _ANSWER_TIME)
+
+    def _complaint(self, message: PingMessage) -> str:
+        if message.message_id == MessageId.AUTO_TRANSMIT and not self._auto_transmit:
+            return "not known to this firmware"
+        for name in message.payload_field_names:
+            if getattr(message, name) not in _ALLOWED.get(name, range(0x10000)):
+                return f"{name} out of range"
+        return ""
+
+    def _point_and_ping(self, message: PingMessage, time: float) -> List[Transmission]:
+        ping_time = time + self._turning_time_to(message.angle)
+        self._angle = message.angle
+        return self._ping(message, ping_time, MessageId.DEVICE_DATA)
+
+    def _turning_time_to(self, angle: int) -> float:
+        turn = (angle - self._angle) % TURN
+        return min(turn, TURN - turn) * _TURNING_TIME
+
+    def _ping(self, command: PingMessage, time: float, message_id: MessageId) -> List[Transmission]:
+        fault = self.faults.next()
+        if self._struck_dumb(fault, time, _STILL_UNREAD if message_id is MessageId.AUTO_DEVICE_DATA else 0.0):
+            self._rest()
+            return []
+        if fault is Fault.REFUSED:
+            self._rest()
+            return self._at_once(packed_nack(command.message_id, "fault ordered"), time)
+        frame = self._beam(command, time, message_id)
+        return self._transmissions(fault, frame, time + _pulse(command).listening_time)
+
+    def _beam(self, command: PingMessage, time: float, message_id: MessageId) -> bytes:
+        pulse = _pulse(command)
+        reach = pulse.number_of_samples * bin_length(pulse.sample_period, self._speed_of_sound)
+        gain_db = _GAINS_DB[pulse.gain_setting]
+        ping = PingRequest(time, head_angle(self._angle), pulse.number_of_samples, reach, gain_db)
+        echoes = self._echo_source.echoes(ping)
+        told = {name: getattr(command, name) for name in command.payload_field_names}
+        return packed(
+            message_id,
+            **{**told, **vars(pulse), "angle": self._angle, "data_length": len(echoes), "data": bytearray(echoes)},
+        )
+
+    def _rest(self) -> None:
+        self._scan = self._command = None
+        self.next_event = float("inf")
+
+    def _garbled(self, frame: bytes) -> bytes:
+        last = len(frame)
+        telling = (*range(HEADER_LENGTH - 2), *range(last - CHECKSUM_LENGTH, last))
+        return self.faults.garble(frame, range(HEADER_LENGTH, last), telling)
+
+
+def _pulse(command: PingMessage) -> PulseSettings:
+    """Return the pulse of a command, as the firmware makes it."""
+    asked = {name: getattr(command, name) for name in PulseSettings.__dataclass_fields__}
+    longest = longest_pulse_us(command.sample_period)
+    return PulseSettings(**{**asked, "transmit_duration": min(asked["transmit_duration"], longest)})

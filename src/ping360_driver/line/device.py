@@ -1,0 +1,116 @@
+"""The head on its line: greets it, chooses who turns it, and stamps its beams."""
+
+import threading
+import time
+from dataclasses import dataclass
+from typing import Callable, Optional, Union
+
+from ping360_driver.line.auto_scan import AutoScan
+from ping360_driver.line.message_line import MessageLine
+from ping360_driver.line.outcome import Outcome
+from ping360_driver.line.parameters import ConnectionParameters
+from ping360_driver.line.request_scan import RequestScan
+from ping360_driver.line.stats import Ping360Stats
+from ping360_driver.protocol.messages import MessageId
+from ping360_driver.protocol.replies import Beam, DeviceInformation, device_information
+from ping360_driver.protocol.scan_command import ScanCommand, ScanMode, information_request, motor_off
+from sonar_driver.line.device import LineDevice
+from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port, open_port
+
+_GREETINGS = 3
+_ANSWER_TIME = 0.3  # s: a head at rest answers within a few milliseconds; one that scans, between two beams
+
+
+@dataclass(frozen=True)
+class Ping:
+    """A beam, and the time at which the ping left, in seconds of the device's clock."""
+
+    stamp: float
+    beam: Beam
+
+
+class Ping360Device(LineDevice[ScanCommand, Ping]):
+    """Gets beams from a head that scans by itself, or that is asked for every ping where it cannot."""
+
+    def __init__(
+        self,
+        connection: ConnectionParameters,
+        stop: Optional[threading.Event] = None,
+        clock: Callable[[], float] = time.time,
+        elapsed: Callable[[], float] = time.monotonic,
+        opener: Callable[[str, int], Port] = open_port,
+    ) -> None:
+        """As `LineDevice` takes them."""
+        super().__init__(connection, Ping360Stats(), stop, clock, elapsed, opener)
+        self._is_serial = not is_datagram_port(connection.port)
+        self._baud_rate = connection.baud_rate if self._is_serial else float("inf")
+        self._line: Optional[MessageLine] = None
+        self._information: Optional[DeviceInformation] = None
+        self._auto: Optional[AutoScan] = None
+        self._requests: Optional[RequestScan] = None
+
+    def _greet(self) -> None:
+        self._line = MessageLine(self._port, self._baud_rate, self.connection.byte_gap, self.stop, self.elapsed)
+        if self._is_serial:
+            self._line.interrupt()
+        self._information = self._who_is_there()
+        has_scanned = self._auto is not None and self._auto.has_scanned
+        self._auto = AutoScan(self._line, self.connection, self._baud_rate, self._is_serial, has_scanned)
+        self._requests = RequestScan(self._line, self.connection, self._baud_rate)
+        self._recorder.note(firmware=".".join(str(number) for number in self._information.firmware))
+
+    def _who_is_there(self) -> DeviceInformation:
+        for _ in range(_GREETINGS):
+            self._line.send(information_request())
+            deadline = self.elapsed() + _ANSWER_TIME
+            while self.elapsed() < deadline and not self.stop.is_set():
+                arrival = self._line.receive(deadline)
+                if arrival is not None and arrival.message.message_id == MessageId.DEVICE_INFORMATION:
+                    return self._checked(device_information(arrival.message))
+                self._line.take_broken()
+        raise PortUnavailableError(
+            f"no Ping360 answers at {self.connection.port}; check its power, the cable and baud_rate"
+        )
+
+    def _checked(self, information: DeviceInformation) -> DeviceInformation:
+        if not information.is_ping360:
+            raise PortUnavailableError(
+                f"what answers at {self.connection.port} is no Ping360: device_type = {information.device_type}"
+            )
+        return information
+
+    def _take_leave(self, port: Port) -> None:
+        if self._is_serial:
+            port.send_break()
+        port.write(motor_off())
+
+    def _ping(self, command: ScanCommand) -> Optional[Ping]:
+        try:
+            outcome = self._scan(command).ping(command)
+        except BaseException:
+            self._recorder.count("pings")
+            self._recorder.count("interrupted")
+            raise
+        self._count(outcome)
+        if outcome.beam is None:
+            return None
+        self._recorder.note(pulse=outcome.beam.pulse)
+        return Ping(self._clock() - (self.elapsed() - outcome.pinged), outcome.beam)
+
+    def _scan(self, command: ScanCommand) -> Union[AutoScan, RequestScan]:
+        by_itself = command.can_auto_transmit and self._information.can_auto_transmit and not self._auto.refused
+        if not by_itself:
+            self._auto.end()
+        mode = ScanMode.AUTO_TRANSMIT if by_itself else ScanMode.REQUEST
+        if mode.value != self.stats.mode:
+            self._recorder.note(mode=mode.value)
+        return self._auto if by_itself else self._requests
+
+    def _count(self, outcome: Outcome) -> None:
+        if self.stop.is_set() and outcome.beam is None and not outcome.bad_frames:
+            self._recorder.count("pings")
+            self._recorder.count("interrupted")
+            return
+        for name, number in outcome.counts().items():
+            if number:
+                self._recorder.count(name, outcome.error, number)

@@ -1,0 +1,115 @@
+"""Finds messages in a stream of bytes, however the stream is split and whatever is between the messages."""
+
+from typing import List, NamedTuple
+
+from brping.pingmessage import PingMessage
+
+from ping360_driver.protocol.messages import HEADER_LENGTH, START, MessageError, frame_length, is_whole, unpacked
+
+
+class ParsedMessage(NamedTuple):
+    """A message, its bytes, and the position of the first of them in the stream, counted from the start."""
+
+    offset: int
+    frame: bytes
+    message: PingMessage
+
+
+class MessageStream:
+    """Incremental parser. No whole message is lost because of what is around it; never raises.
+
+    `broken` counts messages that were begun but are not whole, and stretches of bytes that belong to no message.
+    """
+
+    def __init__(self) -> None:
+        self.broken = 0
+        self._buffer = bytearray()
+        self._offset = 0
+        self._in_rubbish = False
+
+    @property
+    def pending(self) -> bool:
+        """Whether there are bytes that may be the beginning of a message."""
+        return bool(self._buffer)
+
+    @property
+    def missing(self) -> int:
+        """Number of bytes that complete the message that has begun; 1 when none has."""
+        if len(self._buffer) < HEADER_LENGTH:
+            return 1
+        return max(1, frame_length(self._buffer) - len(self._buffer))
+
+    def feed(self, data: bytes) -> List[ParsedMessage]:
+        """Take the next bytes of the stream and return the messages that they complete."""
+        self._buffer += data
+        found = []
+        while self._skip_to_header():
+            length = frame_length(self._buffer)
+            if len(self._buffer) >= length and is_whole(self._buffer[:length]):
+                found.append(self._take(length))
+            else:
+                if len(self._buffer) < length and not self._holds_another():
+                    break
+                self._give_up()
+        return found
+
+    def reset(self) -> None:
+        """Give up waiting for the rest of a message."""
+        if self._buffer:
+            self._skip_rubbish(len(self._buffer))
+        self._in_rubbish = False
+
+    def _skip_to_header(self) -> bool:
+        """Drop what comes before a plausible header; return whether there is one."""
+        while True:
+            start = self._buffer.find(START)
+            if start < 0:
+                start = len(self._buffer) - int(self._buffer.endswith(START[:1]))
+            if start > 0:
+                self._skip_rubbish(start)
+            if len(self._buffer) < HEADER_LENGTH:
+                return False
+            if _is_header(self._buffer):
+                return True
+            self._skip_rubbish(len(START))
+
+    def _take(self, length: int) -> ParsedMessage:
+        frame = bytes(self._buffer[:length])
+        parsed = ParsedMessage(self._offset, frame, unpacked(frame))
+        self._skip(length)
+        self._in_rubbish = False
+        return parsed
+
+    def _holds_another(self) -> bool:
+        """Return whether a whole message lies inside an unfinished one, whose own end was then lost."""
+        start = self._buffer.find(START, 1)
+        while 0 <= start <= len(self._buffer) - HEADER_LENGTH:
+            inner = self._buffer[start:]
+            if _is_header(inner) and len(inner) >= frame_length(inner) and is_whole(inner[: frame_length(inner)]):
+                return True
+            start = self._buffer.find(START, start + 1)
+        return False
+
+    def _give_up(self) -> None:
+        """Count the message at the front as broken; look for the next one inside it, where its own end may be lost."""
+        self.broken += 1
+        self._in_rubbish = True
+        self._skip(len(START))
+
+    def _skip_rubbish(self, count: int) -> None:
+        """Drop bytes that begin no message; count each stretch once, unless it follows a broken message."""
+        self.broken += int(not self._in_rubbish)
+        self._in_rubbish = True
+        self._skip(count)
+
+    def _skip(self, count: int) -> None:
+        del self._buffer[:count]
+        self._offset += count
+
+
+def _is_header(data: bytes) -> bool:
+    try:
+        frame_length(data)
+    except MessageError:
+        return False
+    return True

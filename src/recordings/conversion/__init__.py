@@ -1,0 +1,1 @@
+"""Recordings of any kind as bags of ROS 1."""

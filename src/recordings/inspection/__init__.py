@@ -1,0 +1,1 @@
+"""What a recording holds and lacks, before anything is made of it."""

@@ -1,0 +1,129 @@
+"""The state at one moment of a simulation as messages, for publishers and for bags."""
+
+from typing import Any, Callable, List, Tuple
+
+import numpy as np
+
+from node_support import topics
+from node_support.geometry.matrices import quaternion_of
+from sonar_simulator.simulation.simulation import Instruments, Moment, Ping
+from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
+
+ODOM_FRAME = "odom"
+WORLD_FRAME = "map"
+SERVO_JOINT = "sonar_servo_joint"
+
+_ALWAYS = {
+    topics.JOINT_STATES: "sensor_msgs/JointState",
+    topics.VELOCITY: "geometry_msgs/Twist",
+    topics.GROUND_TRUTH: "nav_msgs/Odometry",
+    topics.BEAMS: "underwater_map_construction/SonarScanLine",
+}
+TOPICS = {
+    Instruments.DVL: {topics.TRANSFORMS: "tf2_msgs/TFMessage", topics.ODOMETRY: "nav_msgs/Odometry", **_ALWAYS},
+    Instruments.COMPASS: {topics.HEADING: "sensor_msgs/Imu", topics.DEPTH: "std_msgs/Float64", **_ALWAYS},
+}
+"""Topics and their types; relative to the namespace, except /tf."""
+
+_Told = List[Tuple[str, Any]]
+
+
+class MomentMessages:
+    """Fills in messages of any library, whose fields are named as in their definitions."""
+
+    def __init__(self, make: Callable[[str], Any], octets: Callable[[np.ndarray], Any]) -> None:
+        """`make` returns an empty message of a type, package/Name; `octets` what a field uint8[] takes."""
+        self._make = make
+        self._octets = octets
+
+    def at(self, moment: Moment, stamp: Any, max_range: float, instruments: Instruments) -> _Told:
+        """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
+
+        Transform and joint are part of every moment, so that a beam can be placed at its own stamp; the rest is part of
+        ticks only, at the steady rate of an instrument.
+        """
+        messages = self.placing(moment, stamp, instruments)
+        if moment.is_tick:
+            messages += self._measured(moment, stamp, instruments)
+        if moment.ping is not None:
+            messages.append((topics.BEAMS, self.scan_line(moment.ping, moment.tilt, stamp, SONAR_FRAME, max_range)))
+        return messages
+
+    def placing(self, moment: Moment, stamp: Any, instruments: Instruments) -> _Told:
+        """Return the (topic, message) pairs that place vehicle and sonar, the transform, if there is one, first."""
+        pose = moment.odometry.T_odom_base
+        joint = (topics.JOINT_STATES, self._joint_state(moment.tilt, stamp))
+        if instruments is Instruments.DVL:
+            transform = self.transform(pose, stamp, ODOM_FRAME, BASE_FRAME)
+            return [(topics.TRANSFORMS, self.transforms([transform])), joint]
+        if not moment.is_tick:
+            return [joint]
+        heading, depth = self._stamped("sensor_msgs/Imu", stamp, BASE_FRAME), self._make("std_msgs/Float64")
+        _turn(heading.orientation, pose)
+        depth.data = -pose[2, 3]
+        return [(topics.HEADING, heading), (topics.DEPTH, depth), joint]
+
+    def transforms(self, transforms: List[Any]) -> Any:
+        """Return the message of several transforms."""
+        message = self._make("tf2_msgs/TFMessage")
+        message.transforms = transforms
+        return message
+
+    def transform(self, T_parent_child: np.ndarray, stamp: Any, parent: str, child: str) -> Any:
+        """Return the transform that places `child` at a (4, 4) pose in `parent`."""
+        message = self._stamped("geometry_msgs/TransformStamped", stamp, parent)
+        message.child_frame_id = child
+        _shift(message.transform.translation, T_parent_child)
+        _turn(message.transform.rotation, T_parent_child)
+        return message
+
+    def scan_line(self, ping: Ping, tilt: float, stamp: Any, frame: str, max_range: float) -> Any:
+        """Return a beam's message; `tilt` [rad] is that of the sonar's servo, `max_range` [m] the last bin's end."""
+        message = self._stamped(_ALWAYS[topics.BEAMS], stamp, frame)
+        message.angle = ping.angle
+        message.intensities = self._octets(ping.strengths)
+        message.maxrange_meters = max_range
+        message.range_resolution = max_range / len(ping.strengths)
+        message.sensorAngle = tilt
+        return message
+
+    def _measured(self, moment: Moment, stamp: Any, instruments: Instruments) -> _Told:
+        truth = self._odometry(moment.truth.T_world_base, moment.truth.twist, stamp, WORLD_FRAME)
+        messages = [(topics.GROUND_TRUTH, truth)]
+        if instruments is Instruments.DVL:
+            odometry = self._odometry(moment.odometry.T_odom_base, moment.odometry.twist, stamp, ODOM_FRAME)
+            messages.append((topics.ODOMETRY, odometry))
+        velocity = self._make(_ALWAYS[topics.VELOCITY])
+        _move(velocity, moment.odometry.twist)
+        return [(topics.VELOCITY, velocity), *messages]
+
+    def _odometry(self, pose: np.ndarray, twist: np.ndarray, stamp: Any, frame: str) -> Any:
+        message = self._stamped("nav_msgs/Odometry", stamp, frame)
+        message.child_frame_id = BASE_FRAME
+        _shift(message.pose.pose.position, pose)
+        _turn(message.pose.pose.orientation, pose)
+        _move(message.twist.twist, twist)
+        return message
+
+    def _joint_state(self, tilt: float, stamp: Any) -> Any:
+        message = self._stamped("sensor_msgs/JointState", stamp, "")
+        message.name, message.position = [SERVO_JOINT], np.array([tilt])
+        return message
+
+    def _stamped(self, kind: str, stamp: Any, frame: str) -> Any:
+        message = self._make(kind)
+        message.header.stamp, message.header.frame_id = stamp, frame
+        return message
+
+
+def _shift(vector: Any, pose: np.ndarray) -> None:
+    vector.x, vector.y, vector.z = pose[:3, 3]
+
+
+def _turn(quaternion: Any, pose: np.ndarray) -> None:
+    quaternion.x, quaternion.y, quaternion.z, quaternion.w = quaternion_of(pose)
+
+
+def _move(twist: Any, values: np.ndarray) -> None:
+    twist.linear.x, twist.linear.y, twist.linear.z = values[:3]
+    twist.angular.x, twist.angular.y, twist.angular.z = values[3:]

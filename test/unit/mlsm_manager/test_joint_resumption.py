@@ -1,0 +1,154 @@
+"""A node with the joint solver that was killed goes on with its run, where its vehicle is where it was."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, tour
+
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
+
+HARBOUR = tour(14, direction=0.05)
+KILLED_AFTER = 9
+FREE_SCANS = 4
+PARAMETERS = MlsmCoreParameters(
+    estimator=Estimator.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
+    speed_deviation=0.025, rate_time=12.0, heading_deviation=0.0175, direction_deviation=0.1, size_x_meters=0.0,
+    size_y_meters=0.0, free_scans=FREE_SCANS,
+)  # fmt: skip
+
+
+def new_localiser():
+    return PARAMETERS.build_localiser(SONAR_IN_BASE)
+
+
+def taken(localiser, scans):
+    return [localiser.take_scan(scan).scan for scan in scans]
+
+
+@pytest.fixture(scope="module")
+def killed():
+    """Return the localiser that was killed, and what it had saved."""
+    localiser = new_localiser()
+    taken(localiser, HARBOUR.scans[:KILLED_AFTER])
+    return localiser, map_of_bytes(map_bytes(localiser.stored("map", {}, 0.0, "run")))
+
+
+def resumed(stored, same_odometry=True):
+    localiser = new_localiser()
+    localiser.restore(stored, same_odometry)
+    return localiser
+
+
+def displaced(stored, shift):
+    """Return the stored map with a correction that is `shift` (3,) beside the true one."""
+    return replace(stored, arrays={**stored.arrays, "T_map_odom": stored.arrays["T_map_odom"] + np.array(shift)})
+
+
+def without_a_run(stored):
+    place = {name: array for name, array in stored.arrays.items() if not name.startswith("run.")}
+    return replace(stored, arrays=place)
+
+
+def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed):
+    _, stored = killed
+    whole, halves = new_localiser(), resumed(stored)
+    wanted = taken(whole, HARBOUR.scans)[KILLED_AFTER:]
+    for one, other in zip(taken(halves, HARBOUR.scans[KILLED_AFTER:]), wanted):
+        np.testing.assert_allclose(one.belief.theta, other.belief.theta, atol=1e-9)
+        np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-9)
+    assert halves.block_count == whole.block_count
+    np.testing.assert_allclose(np.sort(halves.blocks.mean, axis=0), np.sort(whole.blocks.mean, axis=0), atol=1e-4)
+
+
+def test_the_newest_scans_of_a_resumed_run_may_still_move(killed):
+    _, stored = killed
+    localiser = resumed(stored)
+    before = localiser.mapper.solver.state.nodes[KILLED_AFTER].copy()
+    taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 2])
+    assert np.abs(localiser.mapper.solver.state.nodes[KILLED_AFTER] - before).max() > 1e-6
+
+
+def test_a_resumed_map_is_the_one_that_was_saved(killed):
+    localiser, stored = killed
+    again = resumed(stored)
+    assert again.block_count == localiser.block_count
+    assert again.believed_until == localiser.believed_until
+
+
+def test_a_second_kill_loses_no_more_than_the_first(killed):
+    _, stored = killed
+    once = resumed(stored)
+    twice = resumed(map_of_bytes(map_bytes(once.stored("map", {}, 0.0, "run"))))
+    one, other = (taken(localiser, HARBOUR.scans[KILLED_AFTER:])[-1] for localiser in (once, twice))
+    np.testing.assert_allclose(one.belief.theta, other.belief.theta, atol=1e-9)
+
+
+@pytest.mark.parametrize("has_run", [True, False])
+def test_a_vehicle_that_is_elsewhere_writes_nothing_before_it_is_found(killed, has_run):
+    _, stored = killed
+    localiser = resumed(displaced(stored if has_run else without_a_run(stored), [12.0, -9.0, 0.4]))
+    before = localiser.blocks.rows.copy()
+    updates = taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3])
+    assert [update.accepted for update in updates] == [False, False, False]
+    assert localiser.is_lost
+    np.testing.assert_array_equal(localiser.blocks.rows, before)
+
+
+@pytest.mark.parametrize("has_run", [True, False])
+def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, has_run):
+    before, stored = killed
+    localiser = resumed(displaced(stored if has_run else without_a_run(stored), [12.0, -9.0, 0.4]))
+    updates = taken(localiser, HARBOUR.scans[KILLED_AFTER:])
+    whole = new_localiser()
+    wanted = taken(whole, HARBOUR.scans)[-1]
+    assert updates[3].accepted
+    assert not localiser.is_lost
+    np.testing.assert_allclose(updates[-1].belief.theta[:2], wanted.belief.theta[:2], atol=0.5)
+    walls = {tuple(cell) for cell in whole.blocks.cells.tolist()}
+    beside = sum(tuple(cell) not in walls for cell in localiser.blocks.cells.tolist())
+    assert beside < 0.2 * before.block_count
+
+
+def test_a_loaded_map_is_not_written_into_before_the_vehicle_is_found(killed):
+    _, stored = killed
+    localiser = resumed(stored, same_odometry=False)
+    rng, last = np.random.RandomState(0), HARBOUR.scans[-1]
+    places = np.column_stack([rng.uniform(-25.0, 25.0, (len(last), 2)), last.points[:, 2:]])
+    before = localiser.blocks.rows.copy()
+    nowhere = Scan(places, last.times, last.moving, last.track, last.reference_time)
+    assert not localiser.take_scan(nowhere).scan.accepted
+    np.testing.assert_array_equal(localiser.blocks.rows, before)
+
+
+def test_a_jump_in_time_after_the_start_makes_the_place_unknown(killed):
+    _, stored = killed
+    localiser = resumed(stored)
+    localiser.notice_time(0.0)
+    assert localiser.is_lost
+
+
+@pytest.mark.parametrize(
+    ("name", "array"),
+    [
+        ("run.T_map_odom", np.zeros(2)),
+        ("run.solver.nodes", np.zeros((3, 5))),
+        ("run.scan_lengths", np.array([4])),
+        ("run.solver.estimate.time", np.zeros(2)),
+    ],
+)
+def test_a_run_that_does_not_fit_leaves_the_map_alone(killed, name, array):
+    _, stored = killed
+    localiser = resumed(replace(stored, arrays={**stored.arrays, name: array}))
+    assert localiser.mapper.solver is None
+    assert localiser.block_count == len(stored.shown)
+    assert taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 1])[0].accepted
+
+
+def test_a_run_is_only_stored_for_the_run_of_the_graph_that_can_go_on_with_it(killed):
+    localiser, _ = killed
+    assert not any(name.startswith("run.") for name in localiser.stored("map", {}, 0.0, "").arrays)

@@ -1,0 +1,239 @@
+import time
+
+import pytest
+from ping360_line import PATIENCE, SETTINGS, Run, connection_to, emulated, number, running, served_line
+
+from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
+from ping360_driver.line.device import Ping360Device
+from ping360_driver.protocol.messages import MessageId, packed
+from ping360_driver.protocol.sampling import bin_length
+from sonar_driver.emulator import Fault, FaultInjector, HeadServer, PtyLine
+from sonar_driver.line.port import PortUnavailableError
+
+SECTOR = SETTINGS.changed({"sector_width_deg": 18.0})
+REQUESTS = SETTINGS.changed({"scan_mode": "request"})
+
+
+def faults(**rates):
+    return FaultInjector(Ping360FaultRates(**{"silence_duration": 0.5, "absence_duration": 0.3, **rates}))
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
+def test_beams_of_a_full_turn_come_one_after_the_other(port, settings):
+    with running(port, settings) as (scan, _):
+        assert scan.wait_for_more(30)
+    assert scan.angles[:30] == list(range(30))
+    assert [number(ping) for ping in scan.pings] == list(range(len(scan.pings)))
+
+
+@pytest.mark.parametrize("settings", [SECTOR, SECTOR.changed({"scan_mode": "request"})], ids=["auto", "request"])
+def test_a_sector_is_scanned_to_and_fro(port, settings):
+    with running(port, settings) as (scan, _):
+        assert scan.wait_for_more(30)
+    assert scan.angles[:30] == [*range(190, 211), *range(209, 200, -1)]
+
+
+def test_the_mode_is_told(port):
+    with running(port) as (scan, _):
+        assert scan.wait_for_more(1)
+        assert scan.stats.details()["scan mode"] == "auto_transmit"
+        scan.scanner.command = REQUESTS.command()
+        assert scan.wait(lambda _: scan.stats.mode == "request")
+        assert scan.wait_for_more(3)
+    assert scan.stats.timeouts == 0
+
+
+def test_older_firmware_is_asked_for_every_ping(port):
+    with running(port, head=emulated(port, auto_transmit=False)) as (scan, _):
+        assert scan.wait_for_more(3)
+    assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
+
+
+def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
+    with running(port, SECTOR.changed({"train_angle_deg": 180.0})) as (scan, _):
+        assert scan.wait_for_more(15)
+    assert scan.angles[:15] == [*range(390, 400), *range(5)]
+
+
+class CannotScan(EmulatedPing360):
+    """A head that says that its firmware is new, and does not scan by itself all the same."""
+
+    def _complaint(self, message):
+        return "not today" if message.message_id == MessageId.AUTO_TRANSMIT else ""
+
+
+def test_a_head_that_refuses_to_scan_by_itself_is_asked_for_every_ping(tmp_path):
+    port = str(tmp_path / "sonar")
+    with running(port, head=CannotScan(baud_rate=1152000)) as (scan, _):
+        assert scan.wait_for_more(3)
+    assert (scan.stats.mode, scan.stats.refusals) == ("request", 1)
+    assert "message 2602: not today" in scan.stats.last_error
+
+
+def test_changed_settings_reach_the_head(port):
+    with running(port) as (scan, _):
+        assert scan.wait_for_more(3)
+        scan.scanner.command = SECTOR.changed({"max_range": 2.0, "gain_setting": 2}).command()
+        assert scan.wait(lambda pings: pings[-1].beam.sector == (190, 210, 1))
+    pulse = scan.pings[-1].beam.pulse
+    assert pulse.gain_setting == 2
+    assert pulse.number_of_samples * bin_length(pulse.sample_period, 1500.0) == pytest.approx(2.0, rel=0.005)
+
+
+def test_a_pulse_too_long_for_the_head_comes_back_as_the_head_made_it(port):
+    settings = SETTINGS.changed({"data_points": 440, "transmit_duration_us": 100})
+    command = settings.command()
+    too_long = command.__class__(command.pulse.__class__(1, 500, 80, 750, 440))
+    with running(port) as (scan, _):
+        scan.scanner.command = too_long
+        assert scan.wait(lambda pings: bool(pings) and pings[-1].beam.pulse.number_of_samples == 440)
+        assert scan.wait_for_more(20)
+    assert scan.pings[-1].beam.pulse.transmit_duration == 128
+    assert scan.device.stats.details()["transmit duration [us]"] == "128"
+
+
+def test_stamps_are_when_the_pings_left(tmp_path):
+    """The emulated head notes when it pings; on a line that is as slow as a real one."""
+    port = str(tmp_path / "sonar")
+    head = EmulatedPing360(baud_rate=115200)
+    echoes, pinged = head._echo_source.echoes, []
+    head._echo_source.echoes = lambda ping: pinged.append(ping.time) or echoes(ping)
+    offset = time.time() - time.monotonic()
+    with running(port, SETTINGS.changed({"max_range": 20.0}), head=head, baud_rate=115200) as (scan, _):
+        assert scan.wait_for_more(20)
+    late = sorted(ping.stamp - offset - true for ping, true in zip(scan.pings, pinged))
+    assert late[0] > -1e-3
+    assert late[len(late) // 2] < 5e-3
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
+@pytest.mark.parametrize(
+    ("fault", "count"),
+    [
+        (Fault.GARBLED, "bad_frames"),
+        (Fault.TRUNCATED, "bad_frames"),
+        (Fault.DOUBLED, "unexpected_replies"),
+        (Fault.REFUSED, "refusals"),
+    ],
+)
+def test_each_fault_is_counted_and_every_good_beam_delivered(port, settings, fault, count):
+    injector = faults()
+    with running(port, settings, injector) as (scan, _):
+        assert scan.wait_for_more(2)
+        before = scan.pings[-1]
+        injector.order(fault)
+        assert scan.wait(lambda _: getattr(scan.stats, count) == 1)
+        assert scan.wait_for_more(3)
+    numbers = [number(ping) for ping in scan.pings]
+    lost = set(range(numbers[-1] + 1)) - set(numbers)
+    assert number(before) not in lost
+    assert len(lost) == int(count == "bad_frames")
+    assert numbers == sorted(set(numbers))
+
+
+def test_a_beam_that_the_head_lost_is_missed(port):
+    injector = faults()
+    with running(port, faults=injector) as (scan, _):
+        assert scan.wait_for_more(2)
+        injector.order(Fault.DROPPED)
+        assert scan.wait(lambda _: scan.stats.missing_beams == 1)
+    assert scan.stats.timeouts == 0
+
+
+def test_a_request_without_reply_is_a_timeout(port):
+    injector = faults()
+    with running(port, REQUESTS, injector) as (scan, _):
+        assert scan.wait_for_more(2)
+        injector.order(Fault.DROPPED)
+        assert scan.wait(lambda _: scan.stats.timeouts == 1)
+        assert scan.wait_for_more(2)
+
+
+def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(port):
+    injector = faults(lateness=0.4)
+    with running(port, REQUESTS, injector) as (scan, _):
+        assert scan.wait_for_more(2)
+        injector.order(Fault.LATE)
+        assert scan.wait(lambda _: scan.stats.unexpected_replies >= 1)
+        assert scan.wait_for_more(2)
+    assert all(ping.beam.angle == number(ping) for ping in scan.pings)
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
+def test_the_scan_goes_on_within_two_seconds_after_a_silence(port, settings):
+    injector = faults(silence_duration=1.0)
+    with running(port, settings, injector) as (scan, _):
+        assert scan.wait_for_more(2)
+        injector.order(Fault.SILENCE)
+        assert scan.wait(lambda _: scan.stats.timeouts > 0)
+        assert scan.wait_for_more(2, timeout=1.0 + 2.0)
+
+
+@pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
+def test_the_scan_goes_on_within_two_seconds_after_the_line_was_away(port, settings):
+    with running(port, settings, back_off_longest=1.0) as (scan, server):
+        assert scan.wait_for_more(2)
+        server.disappear()
+        assert scan.wait(lambda _: not scan.stats.connected)
+        time.sleep(0.5)
+        server.reappear()
+        assert scan.wait_for_more(2, timeout=2.0)
+    assert scan.stats.connections == 2
+
+
+def test_a_head_that_appears_after_the_driver_is_found(port):
+    with HeadServer(emulated(port), served_line(port)) as server:
+        server.disappear()
+        with Run(connection_to(port)) as scan:
+            assert not scan.stats.connected
+            server.reappear()
+            assert scan.wait_for_more(1)
+
+
+class Nobody(EmulatedPing360):
+    """A line at whose end nobody answers."""
+
+    def receive(self, data, time):
+        return []
+
+
+class EchoSounder(EmulatedPing360):
+    """Another device of the same manufacturer."""
+
+    def _answer(self, requested_id, time):
+        return self._at_once(packed(MessageId.DEVICE_INFORMATION, device_type=1), time)
+
+
+@pytest.mark.parametrize(("head", "complaint"), [(Nobody, "no Ping360 answers at"), (EchoSounder, "is no Ping360")])
+def test_a_line_without_a_ping360_is_not_connected(tmp_path, head, complaint):
+    connection = connection_to(str(tmp_path / "sonar"))
+    with HeadServer(head(baud_rate=1152000), PtyLine(connection.port)):
+        device = Ping360Device(connection)
+        with pytest.raises(PortUnavailableError, match=complaint):
+            device.open()
+    assert not device.stats.connected
+
+
+def test_a_stop_ends_the_scan_of_the_head_too(tmp_path):
+    port = str(tmp_path / "sonar")
+    head = emulated(port)
+    with running(port, head=head) as (scan, _):
+        assert scan.wait_for_more(2)
+        begin = time.monotonic()
+        assert scan.stop()
+        assert time.monotonic() - begin < 0.5
+        end = time.monotonic() + PATIENCE
+        while head.next_event < float("inf") and time.monotonic() < end:
+            time.sleep(0.01)
+        assert head.next_event == float("inf")
+
+
+def test_every_ping_ends_in_exactly_one_count(port):
+    injector = faults()
+    with running(port, REQUESTS, injector) as (scan, _):
+        assert scan.wait_for_more(1)
+        for fault in (Fault.DROPPED, Fault.GARBLED, Fault.DOUBLED, Fault.REFUSED):
+            injector.order(fault)
+        assert scan.wait_for_more(5)
+    stats = scan.stats
+    assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.refusals + stats.interrupted

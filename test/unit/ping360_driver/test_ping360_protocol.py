@@ -1,0 +1,138 @@
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ping360_driver.protocol.angles import gradians, head_angle
+from ping360_driver.protocol.messages import (
+    MessageError,
+    MessageId,
+    frame_length,
+    is_whole,
+    packed,
+    packed_nack,
+    unpacked,
+)
+from ping360_driver.protocol.replies import beam, device_information, refusal
+from ping360_driver.protocol.sampling import bin_length, longest_pulse_us, pulse_us, sampling
+from ping360_driver.protocol.scan_command import PulseSettings, ScanCommand, information_request, motor_off
+
+
+def test_a_request_has_the_bytes_that_the_protocol_gives():
+    """As a user of the head recorded them (discuss.bluerobotics.com, topic 11410)."""
+    assert information_request() == bytes.fromhex("42520200060000000400a000")
+
+
+def test_an_auto_transmit_command_has_the_bytes_that_the_protocol_gives():
+    """As the same user recorded it, but for the delay, which is 0 here."""
+    pulse = PulseSettings(1, 100, 1040, 700, 1250)
+    frame = ScanCommand(pulse, center=250, width=100, step=5).auto_transmit()
+    assert frame[:8] == bytes.fromhex("425210002a0a0000")
+    assert frame[8:24] == bytes.fromhex("010164001004bc02e204c8002c010500")
+
+
+def test_a_message_without_payload_is_whole():
+    frame = motor_off()
+    assert len(frame) == frame_length(frame[:8]) == 10
+    assert is_whole(frame)
+
+
+def test_a_refusal_says_what_was_refused_and_why():
+    message = unpacked(packed_nack(MessageId.AUTO_TRANSMIT, "num_steps out of range"))
+    assert refusal(message) == "the head refused message 2602: num_steps out of range"
+
+
+@pytest.mark.parametrize(
+    ("header", "complaint"),
+    [
+        ("4252020006000000", None),
+        ("4352020006000000", "begins with"),
+        ("42520200ffff0000", "message_id = 65535"),
+        ("4252030006000000", "payload_length = 3"),
+        ("4252ffff fc080000", "payload_length = 65535"),
+    ],
+)
+def test_a_header_that_begins_no_message_is_refused(header, complaint):
+    if complaint is None:
+        assert frame_length(bytes.fromhex(header)) == 12
+        return
+    with pytest.raises(MessageError, match=complaint):
+        frame_length(bytes.fromhex(header))
+
+
+def device_data(**changes):
+    fields = {"angle": 10, "sample_period": 80, "number_of_samples": 3, "data_length": 3, "data": bytearray(b"abc")}
+    return unpacked(packed(MessageId.DEVICE_DATA, **{**fields, **changes}))
+
+
+def test_a_beam_says_how_it_was_made():
+    found = beam(device_data(gain_setting=2, transmit_frequency=740))
+    assert (found.angle, found.echoes, found.sector) == (10, b"abc", None)
+    assert found.pulse == PulseSettings(2, 0, 80, 740, 3)
+
+
+def test_a_beam_of_a_scan_says_its_sector():
+    fields = {"sample_period": 80, "start_angle": 5, "stop_angle": 9, "num_steps": 2, "data_length": 1, "data": b"a"}
+    assert beam(unpacked(packed(MessageId.AUTO_DEVICE_DATA, **fields))).sector == (5, 9, 2)
+
+
+@pytest.mark.parametrize("wrong", [{"angle": 400}, {"data_length": 2}, {"sample_period": 0}])
+def test_a_beam_that_no_head_sends_is_refused(wrong):
+    with pytest.raises(MessageError, match=f"{next(iter(wrong))} = {next(iter(wrong.values()))}"):
+        beam(device_data(**wrong))
+
+
+@pytest.mark.parametrize(
+    ("firmware", "can"), [((3, 3, 1), True), ((3, 3, 0), False), ((3, 1, 9), False), ((4, 0, 0), True)]
+)
+def test_newer_firmware_scans_by_itself(firmware, can):
+    names = ("firmware_version_major", "firmware_version_minor", "firmware_version_patch")
+    message = unpacked(packed(MessageId.DEVICE_INFORMATION, device_type=2, **dict(zip(names, firmware))))
+    assert device_information(message).can_auto_transmit is can
+
+
+@pytest.mark.parametrize(("gradian", "angle"), [(200, 0.0), (300, -math.pi / 2), (100, math.pi / 2), (0, math.pi)])
+def test_gradians_count_clockwise_and_200_is_ahead(gradian, angle):
+    assert math.remainder(head_angle(gradian) - angle, 2 * math.pi) == pytest.approx(0.0)
+    assert math.remainder(head_angle(gradian, inverted=True) + angle, 2 * math.pi) == pytest.approx(0.0)
+
+
+def test_degrees_become_whole_gradians():
+    assert [gradians(degrees) for degrees in (0.0, 0.9, 90.0, -180.0)] == [0, 1, 100, -200]
+
+
+ranges = st.floats(0.75, 50.0)
+counts = st.integers(200, 1200)
+speeds = st.floats(1300.0, 1700.0)
+
+
+@given(ranges, counts, speeds)
+def test_the_sampled_range_is_the_wanted_one_to_half_a_percent(max_range, wanted, speed):
+    samples, period = sampling(max_range, wanted, speed)
+    assert samples * bin_length(period, speed) == pytest.approx(max_range, rel=0.007)
+
+
+@given(ranges, counts, speeds)
+def test_sampling_and_pulse_are_what_the_device_allows(max_range, wanted, speed):
+    samples, period = sampling(max_range, wanted, speed)
+    assert 200 <= samples <= wanted
+    assert 80 <= period <= 40000
+    assert 5 <= pulse_us(max_range, period, speed) <= longest_pulse_us(period) <= 500
+
+
+def test_a_short_range_has_fewer_samples_than_were_asked_for():
+    assert sampling(1.0, 1200, 1500.0) == (666, 80)
+
+
+@pytest.mark.parametrize(("max_range", "pulse"), [(2.0, 11), (20.0, 107), (50.0, 267)])
+def test_the_pulse_grows_with_the_range_as_in_ping_viewer(max_range, pulse):
+    _, period = sampling(max_range, 1200, 1500.0)
+    assert pulse_us(max_range, period, 1500.0) == pulse
+
+
+def test_a_pulse_lasts_at_least_two_and_a_half_sample_periods():
+    _, period = sampling(50.0, 200, 1500.0)
+    assert pulse_us(50.0, period, 1500.0) == 500
+    _, period = sampling(10.0, 200, 1500.0)
+    assert pulse_us(10.0, period, 1500.0) == pytest.approx(2.5 * period * 0.025, abs=1)

@@ -1,0 +1,104 @@
+import pytest
+
+from node_support.parameters import ParameterError
+from ping360_driver.emulator import EmulatorParameters
+from ping360_driver.line.parameters import DriverParameters
+from ping360_driver.protocol.scan_command import ScanCommand
+from ping360_driver.protocol.sector_walk import SectorWalk
+from ping360_driver.protocol.settings import HeadSettings
+
+
+def walk(count, **sector):
+    steps = SectorWalk()
+    return [steps.next(ScanCommand(**sector)) for _ in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("values", "complaint"),
+    [
+        ({"max_range": 0.5}, "max_range = 0.5: must be a number from 0.75 to 50"),
+        ({"gain_setting": 3}, "gain_setting = 3: must be an integer from 0 to 2"),
+        ({"transmit_duration_us": 3}, "transmit_duration_us = 3: must be 0, or from 5 to 500 us"),
+        ({"transmit_duration_us": 400, "max_range": 2.0}, "the head makes at most 284 us"),
+        ({"sector_width_deg": 1.8, "step_gradians": 10}, "narrower than step_gradians = 10"),
+        ({"step_gradians": 11}, "step_gradians = 11: must be an integer from 1 to 10"),
+        ({"scan_mode": "by_hand"}, "must be one of auto_transmit, request"),
+        ({"back_off_first": 0.9, "back_off_longest": 0.5}, "longer than back_off_longest"),
+    ],
+)
+def test_what_line_or_head_cannot_do_is_refused(values, complaint):
+    with pytest.raises(ParameterError, match=complaint):
+        DriverParameters.from_mapping(values)
+
+
+def test_line_and_frame_cannot_be_changed_while_the_driver_runs():
+    names = {field.name for field in DriverParameters.tunable_fields()}
+    assert {
+        "max_range",
+        "gain_setting",
+        "frequency_khz",
+        "sector_width_deg",
+        "step_gradians",
+        "speed_of_sound",
+    } <= names
+    assert names.isdisjoint({"port", "baud_rate", "frame_id"})
+
+
+def test_the_default_port_may_be_a_network_address():
+    assert EmulatorParameters().link == "/tmp/ping360"
+    assert "udp://" in EmulatorParameters.__dataclass_fields__["link"].metadata["parameter"].text
+
+
+def test_without_a_sector_the_whole_turn_is_scanned():
+    command = HeadSettings().command()
+    assert (command.start, command.stop, command.step, command.is_full_turn) == (0, 399, 1, True)
+
+
+def test_a_sector_is_centred_clockwise_from_ahead():
+    command = HeadSettings(train_angle_deg=90.0, sector_width_deg=90.0).command()
+    assert (command.start, command.stop) == (250, 350)
+
+
+@pytest.mark.parametrize(
+    ("settings", "can"),
+    [
+        ({}, True),
+        ({"sector_width_deg": 90.0}, True),
+        ({"sector_width_deg": 90.0, "train_angle_deg": 180.0}, False),
+        ({"sector_width_deg": 0.0}, False),
+        ({"scan_mode": "request"}, False),
+    ],
+)
+def test_the_head_scans_by_itself_what_does_not_lie_astern(settings, can):
+    assert HeadSettings.from_mapping(settings).command().can_auto_transmit is can
+
+
+def test_a_pulse_of_the_users_own_is_used():
+    assert HeadSettings(transmit_duration_us=50).command().pulse.transmit_duration == 50
+
+
+def test_the_speed_of_sound_turns_the_range_into_a_time():
+    slow, fast = (HeadSettings(speed_of_sound=speed).command().pulse.sample_period for speed in (1400.0, 1550.0))
+    assert slow / fast == pytest.approx(1550 / 1400, rel=0.002)
+
+
+def test_by_request_a_full_turn_goes_round():
+    assert walk(402)[398:] == [398, 399, 0, 1]
+
+
+def test_by_request_a_sector_is_scanned_to_and_fro_and_to_its_edges():
+    assert walk(8, center=200, width=10, step=4) == [195, 199, 203, 205, 201, 197, 195, 199]
+
+
+def test_by_request_a_sector_astern_is_scanned_across_zero():
+    assert walk(5, center=0, width=4) == [398, 399, 0, 1, 2]
+
+
+def test_by_request_a_sector_of_no_width_is_a_fixed_beam():
+    assert walk(3, center=120, width=0) == [120, 120, 120]
+
+
+def test_a_changed_sector_begins_at_its_start():
+    steps = SectorWalk()
+    steps.next(ScanCommand())
+    assert steps.next(ScanCommand(center=200, width=20)) == 190

@@ -1,0 +1,171 @@
+"""The motion is found wherever a recording has it, and what is missing is said at once."""
+
+from pathlib import Path
+
+import foreign_bag as foreign
+import numpy as np
+import pytest
+
+from imagenex_852_driver.logs.log_file import LogWriter
+from imagenex_852_driver.logs.log_record import LoggedPing
+from imagenex_852_driver.protocol import Reply, ReplyKind
+from mlsm_manager.offline.bag_recording import read_recording
+from recordings.errors import RecordingError
+from recordings.reading.parameters import ReadingParameters
+from recordings.reading.reader import Request, read
+from recordings.vehicle.motion import MotionNames, MotionSource
+
+BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
+LOCAL_POSITION = "/mavros/local_position/pose"
+CSV = "time,x,y,yaw\n100,0,0,0\n105,2.5,0,0\n110,5,0,0\n"
+COMPASS = CSV.replace("yaw", "Heading_deg").replace(",0\n", ",90\n")
+
+
+def assert_goes_ahead(recording):
+    places = np.array([one.T_target_sonar[0, 3] for one in recording.beams])
+    assert len(places) == foreign.BEAMS
+    assert np.diff(places) == pytest.approx(foreign.SPEED * 10.0 / (foreign.BEAMS - 1), abs=1e-6)
+
+
+@pytest.mark.parametrize("add", [foreign.add_odometry, lambda bag: foreign.add_poses(bag, LOCAL_POSITION)])
+def test_without_tf_the_odometry_comes_from_a_topic(tmp_path, add):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_beams(bag)
+        add(bag)
+    recording = read_recording(tmp_path / "a.bag", Request())
+    assert_goes_ahead(recording)
+    assert "because tf does not link odom and base_link" in recording.notes[0]
+
+
+def test_the_mount_is_found_through_the_frame_of_the_odometry(tmp_path):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_beams(bag)
+        foreign.add_odometry(bag, child="hull")
+        foreign.add_fixed(bag, "hull", "head", x=2.0)
+    recording = read_recording(tmp_path / "a.bag", Request())
+    assert recording.beams[0].T_target_sonar[0, 3] == pytest.approx(2.0)
+
+
+def test_a_mount_that_tf_does_not_tell_is_that_of_the_parameters(tmp_path):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_beams(bag)
+        foreign.add_odometry(bag)
+    parameters = ReadingParameters(mount_x=1.5, upside_down=True)
+    recording = read_recording(tmp_path / "a.bag", Request(parameters=parameters))
+    assert recording.beams[0].T_target_sonar[:3, 3] == pytest.approx([1.5, 0.0, 0.0])
+    assert recording.beams[0].T_target_sonar[2, 2] == pytest.approx(-1.0)
+
+
+@pytest.mark.parametrize("topic", ["/mavros/setpoint_position/local", "/goal", "/ground_truth/pose"])
+def test_poses_that_are_no_odometry_are_not_taken_for_one(tmp_path, topic):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_beams(bag)
+        foreign.add_poses(bag, topic)
+    with pytest.raises(RecordingError, match="no topic holds odometry"):
+        read(tmp_path / "a.bag", Request())
+
+
+def test_a_topic_that_is_asked_for_goes_before_tf():
+    names = MotionNames(odometry="/ground_truth")
+    by_truth, by_tf = read_recording(BASIN, Request(motion=names)), read_recording(BASIN, Request())
+    assert "odometry from /ground_truth" in by_truth.notes[0]
+    # The truth ends a little before tf does.
+    assert by_truth.track.times[-1] < by_tf.track.times[-1]
+
+
+def test_with_an_imu_alone_the_heading_is_known(tmp_path):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_beams(bag)
+        foreign.add_imu(bag)
+    assert read(tmp_path / "a.bag", Request()).motion.source is MotionSource.HEADING
+
+
+def test_a_vehicle_that_is_declared_as_standing_needs_nothing(tmp_path):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_beams(bag)
+    recording = read_recording(tmp_path / "a.bag", Request(motion=MotionNames(is_standing=True)))
+    assert all(np.array_equal(one.T_target_sonar, np.eye(4)) for one in recording.beams)
+
+
+def test_everything_that_is_missing_is_said_at_once(tmp_path):
+    with foreign.written(tmp_path / "a.bag") as bag:
+        foreign.add_poses(bag, "/goal")
+    with pytest.raises(RecordingError) as refused:
+        read(tmp_path / "a.bag", Request(truth="/gps"))
+    for part in ("no topic holds beams", "no topic /gps", "no topic holds odometry", "--standing"):
+        assert part in str(refused.value)
+
+
+def test_a_topic_without_beams_is_refused_with_its_type():
+    with pytest.raises(RecordingError, match="nav_msgs/Odometry is not read as beams"):
+        read(BASIN, Request(beams="/odom"))
+
+
+def test_the_motion_comes_from_a_second_bag(tmp_path):
+    with foreign.written(tmp_path / "sonar.bag") as bag:
+        foreign.add_beams(bag)
+    with foreign.written(tmp_path / "vehicle.bag") as bag:
+        foreign.add_odometry(bag)
+    assert_goes_ahead(read_recording(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.bag")))
+
+
+@pytest.mark.parametrize("text", [CSV, CSV.replace(",", ";"), COMPASS])
+def test_the_motion_comes_from_a_table(tmp_path, text):
+    (tmp_path / "vehicle.csv").write_text(text)
+    with foreign.written(tmp_path / "sonar.bag") as bag:
+        foreign.add_beams(bag)
+    recording = read_recording(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.csv"))
+    assert_goes_ahead(recording)
+    assert recording.track.poses[:, 2] == pytest.approx(0.0, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "reason"),
+    [
+        ("time,x,y\n1,2,3\n2,3,4\n", "columns time, x, y; needs time, one of yaw, yaw_deg, heading_deg"),
+        ("time,x,yaw\n1,2,3\n2,3,4\n", "x and y or none of both"),
+        ("time,yaw\n1,2\n2,east\n", "line 3: yaw = 'east', must be a number"),
+        ("time,yaw\n1,2\n", "1 rows; needs at least 2"),
+        ("", "0 rows"),
+    ],
+)
+def test_a_table_that_cannot_be_used_is_refused_with_its_line(tmp_path, text, reason):
+    (tmp_path / "vehicle.csv").write_text(text)
+    with pytest.raises(RecordingError, match=reason):
+        read(BASIN, Request(vehicle=tmp_path / "vehicle.csv"))
+
+
+def test_clocks_that_differ_are_told_with_the_offset_that_mends_them(tmp_path):
+    (tmp_path / "vehicle.csv").write_text(CSV)
+    with foreign.written(tmp_path / "sonar.bag") as bag:
+        foreign.add_beams(bag, start=5000.0)
+    with pytest.raises(RecordingError, match=r"no time in common; .* -4900\.000$"):
+        read(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.csv"))
+    recording = read_recording(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.csv", offset=-4900.0))
+    assert_goes_ahead(recording)
+
+
+@pytest.fixture
+def log(tmp_path):
+    """A .852 log of a head that turned once in 10 s."""
+    path = tmp_path / "turn.852"
+    writer = LogWriter(path)
+    for index in range(100):
+        reply = Reply(ReplyKind.IMX, max_range=10, echoes=bytes(252), head_position=200 + 24 * index)
+        writer.write(LoggedPing(reply, stamp=1e9 + 0.1 * index))
+    writer.close()
+    return path
+
+
+def test_a_sonars_log_is_mapped_with_a_table(log, tmp_path):
+    (tmp_path / "vehicle.csv").write_text("time,yaw_deg\n0,0\n20,40\n")
+    recording = read_recording(log, Request(vehicle=tmp_path / "vehicle.csv", offset=5.0 - 1e9))
+    assert len(recording.beams) == 100
+    turned = [np.arctan2(one.T_target_sonar[1, 0], one.T_target_sonar[0, 0]) for one in recording.beams]
+    assert np.degrees(turned[0]) == pytest.approx(10.0, abs=1e-3)
+    assert np.degrees(turned[-1]) == pytest.approx(29.8, abs=1e-3)
+
+
+def test_a_sonars_log_alone_is_told_what_it_lacks(log):
+    with pytest.raises(RecordingError, match="give a bag or a table with --vehicle, or --standing"):
+        read(log, Request())
