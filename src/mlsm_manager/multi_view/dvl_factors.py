@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
-from mlsm_manager.multi_view.odometry_motion import Motion, as_complex
+from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.odometry_terms import add_compass, add_walk, turned
 from mlsm_manager.multi_view.state import YAW, Layout
@@ -59,7 +59,7 @@ class DvlFactors:
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
         """See OdometryModel."""
         step = after.positions - before.positions
-        error = self.gain(nodes) * turned(nodes[:, YAW]) * step - step
+        error = product(product(self.gain(nodes), turned(nodes[:, YAW])), step) - step
         result = nodes.copy()
         result[:, 0] += error.real
         result[:, 1] += error.imag
@@ -93,7 +93,7 @@ class DvlFactors:
         """
         step, one = np.diff(motion.positions), np.ones(len(starts))
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
-        turned_step = turned(nodes[:-1, DIRECTION] + yaw) * step
+        turned_step = product(turned(nodes[:-1, DIRECTION] + yaw), step)
         scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
         change = np.diff(as_complex(nodes))
         residual = change - (scaled - step) - self._carried(nodes[:-1], motion.durations)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
-from mlsm_manager.multi_view.odometry_motion import Motion, as_complex
+from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
 from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
 from mlsm_manager.multi_view.odometry_terms import add_compass, add_forgetting, add_walk, turned
 from mlsm_manager.multi_view.state import YAW, Layout
@@ -61,7 +61,7 @@ class HeadingFactors:
         result[:, AHEAD] = nodes[:, TRAVEL] + kept * (nodes[:, AHEAD] - nodes[:, TRAVEL])
         result[:, ASIDE] = slipping * nodes[:, ASIDE]
         mean = (self.gain(nodes) + self.gain(result)) / 2.0
-        step = mean * turned(nodes[:, YAW]) * (self.reference(after) - self.reference(before))
+        step = product(product(mean, turned(nodes[:, YAW])), self.reference(after) - self.reference(before))
         error = step - (after.positions - before.positions)
         result[:, 0] += error.real
         result[:, 1] += error.imag
@@ -106,8 +106,8 @@ class HeadingFactors:
     def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         speeds = self.gain(nodes)
-        ahead = turned(yaw) * np.diff(self.reference(motion))
-        step = (speeds[:-1] + speeds[1:]) / 2.0 * ahead
+        ahead = product(turned(yaw), np.diff(self.reference(motion)))
+        step = product((speeds[:-1] + speeds[1:]) / 2.0, ahead)
         residual = np.diff(as_complex(nodes)) + np.diff(motion.positions) - step
         weight = 1.0 / (self._step_variance(motion.durations) + _ROUNDING_VARIANCE)
         one, own = np.ones(len(starts)), np.array([AHEAD, ASIDE, YAW])

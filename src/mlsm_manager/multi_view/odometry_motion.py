@@ -38,3 +38,12 @@ class Motion:
 def as_complex(vectors: np.ndarray) -> np.ndarray:
     """Return x + i y (...) of vectors (..., >= 2)."""
     return vectors[..., 0] + 1j * vectors[..., 1]
+
+
+def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the products (...) of complex numbers.
+
+    numpy's own product rounds by where in memory the numbers lie, so that equal runs would end differently.
+    """
+    real = first.real * second.real - first.imag * second.imag
+    return real + 1j * (first.real * second.imag + first.imag * second.real)

@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.odometry_model import OdometryModel
-from mlsm_manager.multi_view.odometry_motion import Motion, as_complex
+from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
 from mlsm_manager.multi_view.odometry_terms import turned
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.state import POSE, YAW
@@ -54,8 +54,8 @@ class NodePath:
         poses = self._poses_of(near, legs)
         after = times > last
         gain = np.where(after, self._last_gain, self._gain[0])
-        beyond = gain * turned(self._nodes[np.where(after, -1, 0), YAW])
-        beyond = beyond * (self._odometry.reference(motion) - self._odometry.reference(near))
+        beyond = product(gain, turned(self._nodes[np.where(after, -1, 0), YAW]))
+        beyond = product(beyond, self._odometry.reference(motion) - self._odometry.reference(near))
         turn = motion.poses[:, 2] - near.poses[:, 2]
         return poses + np.column_stack([beyond.real, beyond.imag, turn])
 
@@ -68,7 +68,7 @@ class NodePath:
     def _bow_of(self, motion: Motion, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
         from_node = self._odometry.reference(motion) - self._reference[legs]
         bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
-        return self._gain[legs] * turned(self._yaw(legs, share)) * bow
+        return product(product(self._gain[legs], turned(self._yaw(legs, share))), bow)
 
     def _yaw(self, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
         return (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
