@@ -1,5 +1,6 @@
 """For catkin, and for `pip install .` without ROS."""
 
+import os
 import re
 from pathlib import Path
 
@@ -12,7 +13,9 @@ SHARED = ("package.xml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*"
 
 
 def shared_files():
-    """Return (folder, files) for everything that goes to share/."""
+    """Return (folder, files) for everything that goes to share/; nothing for catkin, whose CMakeLists.txt does that."""
+    if "CATKIN_BINARY_DIR" in os.environ:
+        return []
     found = {}
     for pattern in SHARED:
         for path in sorted(HERE.glob(pattern)):

@@ -9,9 +9,18 @@ from typing import Callable, List, Tuple
 import numpy as np
 from std_msgs.msg import Header
 
+from benchmarks import joint_map_figures
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map, write_map
+from mlsm_manager.surface_map.files.array_file import ArrayFileError
+from mlsm_manager.surface_map.files.map_file import (
+    Layer,
+    StoredMap,
+    map_bytes,
+    map_of_bytes,
+    read_map,
+    write_map,
+)
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -24,6 +33,8 @@ _BEAM_WIDTH = 0.0436
 _RADIUS = 50.0
 _REACH = 70.0
 _SCANS = 20
+_GROWN, _GROWTH = 10_000_000, 1000
+_MUTATIONS, _MUTATED_BLOCKS = 1000, 2000
 
 
 def sea_floor(blocks: int, rng: np.random.Generator, points_per_block: int = 1) -> MultiLevelSurfaceMap:
@@ -117,6 +128,48 @@ def _seconds(call: Callable[[], object]) -> Tuple[float, float]:
     return time.perf_counter() - wall, time.process_time() - cpu
 
 
+def growth_rows() -> List[Row]:
+    """Measure the longest insertion while a map grows to ten million blocks: its memory is then moved."""
+    rng, surface_map, seconds = np.random.default_rng(5), MultiLevelSurfaceMap(RESOLUTION), []
+    side = int(np.sqrt(_GROWN / _GROWTH))
+    for number in range(_GROWTH):
+        first = np.array([side * (number % 100), side * (number // 100)])
+        cells = first + np.stack(np.meshgrid(np.arange(side), np.arange(side), indexing="ij"), axis=-1).reshape(-1, 2)
+        points = np.column_stack([(cells + 0.5) * RESOLUTION, rng.uniform(-10.0, -9.9, (len(cells), 2))])
+        seconds.append(_seconds(lambda points=points: surface_map.insert(points))[1])
+    longest, usual = 1e3 * max(seconds), 1e3 * float(np.median(seconds))
+    name = f"insertions of {side**2} blocks up to {len(surface_map)}"
+    return [(name, f"median {usual:.0f} ms, longest {longest:.0f} ms of a core", "")]
+
+
+def mutation_rows() -> List[Row]:
+    """Change files of a map at random, and count those that are read as something else or end in an error of ours."""
+    rng = np.random.default_rng(6)
+    blocks = sea_floor(_MUTATED_BLOCKS, rng).blocks
+    data = map_bytes(StoredMap("map", {Layer.SHOWN: blocks}, {"beam_width": 0.04}, 1.0, {"place": np.zeros(3)}))
+    crashed = accepted = 0
+    for _ in range(_MUTATIONS):
+        try:
+            map_of_bytes(_mutated(data, rng))
+            accepted += 1
+        except ArrayFileError:
+            pass
+        except Exception:
+            crashed += 1
+    return [(f"{_MUTATIONS} mutated files", f"{accepted} accepted, {crashed} crashed", "0, 0")]
+
+
+def _mutated(data: bytes, rng: np.random.Generator) -> bytes:
+    """Return the bytes with one changed, some left out or some put in."""
+    place, kind = int(rng.integers(len(data))), int(rng.integers(3))
+    if kind == 0:
+        return data[:place] + bytes([data[place] ^ int(rng.integers(1, 256))]) + data[place + 1 :]
+    some = int(rng.integers(1, 9))
+    if kind == 1:
+        return data[:place] + data[place + some :]
+    return data[:place] + rng.bytes(some) + data[place:]
+
+
 def rows() -> List[Row]:
     """Return the figures of map files and of large maps."""
-    return file_rows() + size_rows()
+    return file_rows() + mutation_rows() + size_rows() + growth_rows() + joint_map_figures.rows()

@@ -27,11 +27,13 @@ class Truth:
     def __init__(self, world: World, parameters: CircleDetectorParameters) -> None:
         upright = [shape for shape in world.shapes if shape.mesh is None and abs(shape.pose[2, 2]) > 0.9]
         self._widest = 2.0 * parameters.max_radius
-        self._round = [shape for shape in upright if shape.kind in ("cylinder", "sphere")]
+        rounds = [shape for shape in upright if shape.kind in ("cylinder", "sphere")]
+        self._round = [shape for shape in rounds if shape.size[0] <= parameters.max_radius]
+        self._too_large = [shape for shape in rounds if shape.size[0] > parameters.max_radius]
         self._flat = [shape for shape in upright if shape.kind == "box" and not _is_floor(shape)]
 
     def thing(self, center: np.ndarray) -> int:
-        """Return the number of the round thing at a place (2,) x y [m], -1 where none is."""
+        """Return the number of the thing of a circle's size at a place (2,) x y [m], -1 where none is."""
         off = [_plan_distance(shape, center) for shape in self._round]
         return int(np.argmin(off)) if off and min(off) <= _SAME_THING else -1
 
@@ -40,7 +42,9 @@ class Truth:
         return self._round[thing].pose[:2, 3]
 
     def flat(self, center: np.ndarray) -> str:
-        """Return what stands at a place that is at no round thing."""
+        """Return what stands at a place that is at no thing as small as circles."""
+        if any(_plan_distance(shape, center) <= _SAME_THING for shape in self._too_large):
+            return "larger round things"
         off, shape = min(((_plan_distance(shape, center), shape) for shape in self._flat), key=lambda found: found[0])
         if off > _ON_A_WALL:
             return "open water"

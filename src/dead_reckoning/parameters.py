@@ -20,6 +20,7 @@ class DepthType(Enum):
     NONE = "NONE"
     POSE = "POSE"
     DEPTH = "DEPTH"
+    ALTITUDE = "ALTITUDE"
     PRESSURE = "PRESSURE"
 
 
@@ -44,7 +45,8 @@ class DeadReckoningParameters(StampParameters):
     depth_type: DepthType = parameter(
         DepthType.NONE,
         "messages on the topic depth: POSE (geometry_msgs/PoseWithCovarianceStamped, z up), DEPTH (std_msgs/Float64, m "
-        "below the surface), PRESSURE (sensor_msgs/FluidPressure); NONE: the vehicle stays at one depth",
+        "below the surface), ALTITUDE (std_msgs/Float64, m above the surface, as MAVROS's rel_alt), PRESSURE "
+        "(sensor_msgs/FluidPressure); NONE: the vehicle stays at one depth",
         tunable=False,
     )
     surface_pressure: float = parameter(

@@ -39,7 +39,7 @@ class TestLoad(unittest.TestCase):
         sequence = [beam.header.seq for beam in listener.received]
         assert sequence == list(range(sequence[0], sequence[0] + len(sequence)))
         lost = [health[count] for count in ("timeouts", "bad frames", "unexpected replies", "early replies")]
-        assert lost == ["0", "0", "0"]
+        assert lost == ["0", "0", "0", "0"]
 
 
 if __name__ == "__main__":

@@ -17,6 +17,7 @@ ATTEMPTS = 3
         ("demo.launch", ["rviz:=false"]),
         ("survey_simulated.launch", ["rviz:=false", "processes:=many"]),
         ("driver_emulated.launch", ["processes:=many"]),
+        ("driver_emulated.launch", ["sonar:=ping360"]),
         ("play_bag.launch", ["rviz:=false", BAG]),
         ("vehicle.launch", ["standing:=true", "servo:=true", "processes:=many"]),
     ],

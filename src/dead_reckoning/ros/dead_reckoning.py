@@ -59,6 +59,7 @@ class DeadReckoning:
         depths: Dict[DepthType, Tuple[type, Callable[[Any], float]]] = {
             DepthType.POSE: (PoseWithCovarianceStamped, lambda message: -message.pose.pose.position.z),
             DepthType.DEPTH: (Float64, lambda message: message.data),
+            DepthType.ALTITUDE: (Float64, lambda message: -message.data),
             DepthType.PRESSURE: (FluidPressure, self._depth_of_pressure),
         }
         inputs = [velocities[parameters.velocity_source], (topics.HEADING, Imu, self._take_heading)]

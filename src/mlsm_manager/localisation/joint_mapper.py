@@ -66,18 +66,19 @@ class JointMapper:
         self.matcher = matcher
         self.matching = False
         self._sonar_in_base = sonar_in_base
-        self._shown = self._matched = self._new_map(1.0, 0)
+        self._session: Optional[JointSession] = None
         self.clear()
 
-    def _new_map(self, resolution: float, expected_blocks: int) -> KeyframeMap:
-        settings = self.settings
-        return KeyframeMap(resolution, settings.limit, expected_blocks, settings.kernel, settings.carver)
+    def _new_maps(self) -> Tuple[KeyframeMap, KeyframeMap]:
+        """Return the map that is shown and the one that is matched with, which shows nobody what may still change."""
+        own = self.settings
+        shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.kernel, own.carver)
+        return shown, KeyframeMap(own.match_resolution, own.limit, 0, own.kernel, own.carver, most_followed=0)
 
     def clear(self) -> None:
         """Forget the map and the place in it."""
-        self._session: Optional[JointSession] = None
-        self._shown = self._new_map(self.settings.resolution, self.settings.expected_blocks)
-        self._matched = self._new_map(self.settings.match_resolution, 0)
+        self._session = None
+        self._shown, self._matched = self._new_maps()
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -173,9 +174,7 @@ class JointMapper:
             self._take(layers)
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
-        settings = self.settings
-        shown = self._new_map(settings.resolution, settings.expected_blocks)
-        matched = self._new_map(settings.match_resolution, 0)
+        shown, matched = self._new_maps()
         blocks = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
         shown.map.insert_blocks(blocks)
         matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))

@@ -18,9 +18,9 @@ from mlsm_manager.surface_map.overlay import Overlay
 
 _STRAYED = 0.5
 """Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
-_MOST_FOLLOWED = 2
-"""The beams of so many keyframes are followed with each scan, which takes 4 ms each: those that moved farthest first,
-and a new one before them. More would take over a fifth of the time of a scan. What settles is followed in any case."""
+MOST_FOLLOWED = 2
+"""The beams of so many moving keyframes are followed with each scan: those that moved farthest, and a new one before
+them. More would take over a fifth of the time of a scan. What settles is followed in any case."""
 
 
 @dataclass(frozen=True)
@@ -37,9 +37,12 @@ class KeyframeCarving:
     Keyframes that are settled carve for ever, in the order of time. What the others say is kept beside the map.
     """
 
-    def __init__(self, resolution: float, limit: float, carver: Optional[Carver]) -> None:
-        """`carver`: None where nothing is to be carved."""
+    def __init__(self, resolution: float, limit: float, carver: Optional[Carver], most_followed: int) -> None:
+        """`carver`: None where nothing is to be carved. most_followed: keyframes that may still move and whose beams
+        are followed with each scan; with 0 only those that settle carve.
+        """
         self._carver = carver
+        self._most_followed = most_followed
         self._free = MultiLevelSurfaceMap(resolution, limit)
         self._looks: Deque[Optional[_Look]] = deque()
         self._hit_cells, self._hit_by = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
@@ -84,7 +87,7 @@ class KeyframeCarving:
         placement: Placement,
     ) -> None:
         """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`."""
-        if self._carver is None:
+        if self._carver is None or not self._most_followed:
             return
         self._looks.extend([None] * (len(clouds) - len(self._looks)))
         for number in self._strayed(points, surface_map.resolution):
@@ -120,7 +123,7 @@ class KeyframeCarving:
     def _strayed(self, points: List[np.ndarray], resolution: float) -> List[int]:
         """Return the numbers of the keyframes to be looked at again."""
         moved = np.array([_moved(look, there) for look, there in zip(self._looks, points)])
-        farthest = np.argsort(-moved, kind="stable")[:_MOST_FOLLOWED]
+        farthest = np.argsort(-moved, kind="stable")[: self._most_followed]
         return farthest[moved[farthest] > _STRAYED * resolution].tolist()
 
     def _last_hit(self, keys: np.ndarray) -> np.ndarray:

@@ -6,7 +6,7 @@ from typing import Deque, List, Optional
 
 import numpy as np
 
-from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
+from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
 from mlsm_manager.localisation.placement import Placement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
@@ -36,10 +36,14 @@ class KeyframeMap:
         expected_blocks: int = 0,
         kernel: InsertionKernel = InsertionKernel.NUMPY,
         carver: Optional[Carver] = None,
+        most_followed: int = MOST_FOLLOWED,
     ) -> None:
-        """`carver`: what marks free space and takes blocks away, None for nothing. The rest as MultiLevelSurfaceMap."""
+        """`carver`: what marks free space and takes blocks away, None for nothing. most_followed: see KeyframeCarving.
+
+        The rest as MultiLevelSurfaceMap.
+        """
         self.map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
-        self.free = KeyframeCarving(resolution, limit, carver)
+        self.free = KeyframeCarving(resolution, limit, carver, most_followed)
         self._moving: Deque[TimedPoints] = deque()
         self._overlay = Overlay(self.map)
         self._above = self._new().blocks

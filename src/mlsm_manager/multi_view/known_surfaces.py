@@ -10,24 +10,59 @@ from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.state import BEFORE_THE_RUN
 from mlsm_manager.multi_view.surface_points import LEAST_REACH, surface_normals
+from mlsm_manager.surface_map.blocks import cells_of
+from mlsm_manager.surface_map.cell_index import cell_keys
+
+_SQUARE = 32.0
+"""m: side of the squares into which blocks are sorted, to find those of an area without looking at all."""
+_MARGIN = 64.0
+"""m beyond the scans that are looked at too: so far the vehicle may go before other blocks are looked at."""
 
 
 class KnownSurfaces:
-    """A search tree over blocks of a map. A block does not say from which side it was heard."""
+    """A search tree over the blocks of a map around the vehicle. A block does not say from which side it was heard.
+
+    Beginning costs a sort of all blocks, comparing depends on those around the vehicle only.
+    """
 
     def __init__(self, places: np.ndarray) -> None:
         """places: (n, 2) m, x y of the blocks' means in map."""
-        self.places = places
+        keys = cell_keys(cells_of(places, _SQUARE))
+        order = np.argsort(keys, kind="stable")
+        self.places, self._keys = places[order], keys[order]
+        self._low, self._high = np.full(2, np.inf), np.full(2, -np.inf)
+        self._look_at(np.empty((0, 2)))
+
+    def _look_at(self, places: np.ndarray) -> None:
+        """Build the tree over blocks at places (n, 2)."""
         normals, qualities = surface_normals(places, np.full(len(places), LEAST_REACH))
         known = qualities > 0.0
         self._tree = cKDTree(places[known]) if known.any() else None
         self._points = _placed(places[known], normals[known], qualities[known])
+
+    def _reach(self, places: np.ndarray, cut: float) -> None:
+        """Look at all blocks around `places` (n, 2), n > 0, if some that lie within `cut` [m] are not looked at yet."""
+        low, high = places.min(axis=0) - cut, places.max(axis=0) + cut
+        if (low >= self._low).all() and (high <= self._high).all():
+            return
+        first, last = cells_of(np.array([low - _MARGIN, high + _MARGIN]), _SQUARE)
+        columns = np.arange(first[0], last[0] + 1)
+        starts, ends = (
+            np.searchsorted(self._keys, cell_keys(np.column_stack([columns, np.full(len(columns), row)])))
+            for row in (first[1], last[1] + 1)
+        )
+        parts = [self.places[start:end] for start, end in zip(starts, ends)]
+        # A block at the border has not all its neighbours, so only what lies within it is relied on.
+        self._low, self._high = first * _SQUARE + LEAST_REACH, (last + 1) * _SQUARE - LEAST_REACH
+        self._look_at(np.concatenate(parts))
 
     def compared(self, sources: PlacedPoints, cut: float, matching: SurfaceMatching) -> tuple:
         """Return the Pairs of `sources` with their nearest blocks within `cut` [m], and these as PlacedPoints.
 
         The blocks' normals point as those of the sources do.
         """
+        if len(sources):
+            self._reach(sources.places, cut)
         if self._tree is None or not len(sources):
             nothing = np.empty(0, dtype=np.int64)
             return Pairs(nothing, nothing, np.empty(0)), self._points.selected(nothing)

@@ -41,9 +41,10 @@ def as_complex(vectors: np.ndarray) -> np.ndarray:
 
 
 def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-    """Return the products (...) of complex numbers.
+    """Return the product of complex numbers (...) and (...).
 
-    numpy's own product rounds by where in memory the numbers lie, so that equal runs would end differently.
+    numpy multiplies a few complex numbers with or without fused operations, depending on where in memory they lie. The
+    results differ in the last bit, so that equal runs would end differently.
     """
     real = first.real * second.real - first.imag * second.imag
     return real + 1j * (first.real * second.imag + first.imag * second.real)

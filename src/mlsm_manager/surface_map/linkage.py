@@ -10,6 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, SQUARES, TOP, Blocks
+from mlsm_manager.surface_map.cell_order import cell_order
 
 
 @dataclass(frozen=True)
@@ -48,7 +49,7 @@ def joined(first: Intervals, second: Intervals) -> Intervals:
 def concatenated(first: Intervals, second: Intervals) -> Intervals:
     """Return both, sorted by cell, then by bottom."""
     both = joined(first, second)
-    return both.take(np.lexsort((both.bottom, both.cell)))
+    return both.take(cell_order(both.cell, both.bottom))
 
 
 def intervals_of(blocks: Blocks, cell: np.ndarray) -> Intervals:
@@ -62,7 +63,7 @@ def intervals_of(blocks: Blocks, cell: np.ndarray) -> Intervals:
 
 def group_points(points: np.ndarray, cell: np.ndarray, resolution: float) -> Intervals:
     """Return the intervals that points (n, 4) of cells with keys `cell` (n,) make among themselves, n > 0."""
-    order = np.lexsort((points[:, 2], cell))
+    order = cell_order(cell, points[:, 2])
     cell, points = cell[order], points[order]
     z = points[:, 2]
     is_start = np.empty(len(points), dtype=bool)
@@ -97,7 +98,7 @@ def link(intervals: Intervals, resolution: float) -> np.ndarray:
 def linked_alone(intervals: Intervals, resolution: float) -> Intervals:
     """Return what intervals in any order (n > 0) make among themselves, sorted, at least the resolution apart."""
     if not _is_sorted(intervals):
-        intervals = intervals.take(np.lexsort((intervals.bottom, intervals.cell)))
+        intervals = intervals.take(cell_order(intervals.cell, intervals.bottom))
     while True:
         apart = intervals.bottom[1:] - intervals.top[:-1] >= resolution
         starts = np.flatnonzero(np.append(True, (intervals.cell[1:] != intervals.cell[:-1]) | apart))

@@ -8,6 +8,7 @@ import numpy as np
 from mlsm_manager.surface_map.block_store import BlockStore
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
+from mlsm_manager.surface_map.cell_order import cell_order
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
 from mlsm_manager.surface_map.insertion import InsertionKernel, insert_groups, point_inserter
 from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
@@ -108,7 +109,7 @@ class MultiLevelSurfaceMap:
         slots = self._store.slots(cells)
         held = self._store.stored(cells, slots)
         kept = held.take(np.flatnonzero(~np.isin(held.row, rows)))
-        kept = kept.take(np.lexsort((kept.bottom, kept.cell)))
+        kept = kept.take(cell_order(kept.cell, kept.bottom))
         self._store.release(rows)
         still = np.isin(cells, kept.cell)
         self._store.empty(slots[~still])

@@ -2,13 +2,11 @@
 
 from typing import List, Optional
 
-from brping.pingmessage import PingMessage
-
 from ping360_driver.emulator.parameters import Ping360FaultRates
 from ping360_driver.emulator.sector_scan import SectorScan
 from ping360_driver.protocol.angles import AHEAD, TURN, head_angle
 from ping360_driver.protocol.message_stream import MessageStream
-from ping360_driver.protocol.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageId, packed, packed_nack
+from ping360_driver.protocol.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageId, PingMessage, packed, packed_nack
 from ping360_driver.protocol.sampling import PERIOD_TICKS, SAMPLES, bin_length, longest_pulse_us
 from ping360_driver.protocol.scan_command import PulseSettings
 from sonar_driver.emulator import (

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from node_support.parameters import parameter
+from node_support.parameters import parameter, with_defaults
 from sonar_driver.emulator.faults import FaultRates
 from sonar_driver.emulator.parameters import EmulatedHeadParameters
 
@@ -15,6 +15,7 @@ class Ping360FaultRates(FaultRates):
 
 
 @dataclass(frozen=True)
+@with_defaults(beam_height_deg=25.0, beam_width_deg=2.0)
 class EmulatorParameters(EmulatedHeadParameters, Ping360FaultRates):
     """Parameters of ping360_emulator."""
 

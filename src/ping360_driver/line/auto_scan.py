@@ -45,17 +45,15 @@ class AutoScan:
         self._last: Optional[Beam] = None
         self._last_frame = b""
 
-    def ping(self, command: ScanCommand) -> Outcome:
-        """Wait for the next beam of the scan."""
-        outcome = Outcome()
+    def ping(self, command: ScanCommand, outcome: Outcome) -> None:
+        """Wait for the next beam of the scan; note in `outcome` what comes."""
         if command != self._running:
             self._start(command)
         self._wait(outcome, command, self._patience(command))
-        while self._nothing_came(outcome) and self._is_turning() and self._answers(outcome, command):
+        while not outcome.is_over and self._is_turning() and self._answers(outcome, command):
             self._wait(outcome, command, self._patience(command))
-        if self._nothing_came(outcome):
+        if not outcome.is_over:
             self._revive(outcome, command)
-        return outcome
 
     def end(self) -> None:
         """Make the head stop, if it scans."""
@@ -76,7 +74,7 @@ class AutoScan:
     def _revive(self, outcome: Outcome, command: ScanCommand) -> None:
         """Start the scan again as soon as the head answers; give up where it never scanned."""
         is_alive = self._answers(outcome, command)
-        if not self._nothing_came(outcome):
+        if outcome.is_over:
             return
         outcome.timeouts, outcome.error = 1, "the head fell silent"
         if is_alive and self.has_scanned:
@@ -98,12 +96,9 @@ class AutoScan:
         """Return whether the head may still be on its way to the start of the sector."""
         return self._last is None and self._line.elapsed() < self._started + turning_time(TURN)
 
-    def _nothing_came(self, outcome: Outcome) -> bool:
-        return outcome.beam is None and not (outcome.bad_frames or outcome.refusals or outcome.timeouts)
-
     def _wait(self, outcome: Outcome, command: ScanCommand, patience: float, until_alive: bool = False) -> None:
         deadline = self._line.elapsed() + patience
-        while self._nothing_came(outcome) and not (until_alive and self._is_alive):
+        while not outcome.is_over and not (until_alive and self._is_alive):
             arrival = self._line.receive(deadline)
             broken = self._line.take_broken()
             if broken:

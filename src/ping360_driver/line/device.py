@@ -85,13 +85,16 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         port.write(motor_off())
 
     def _ping(self, command: ScanCommand) -> Optional[Ping]:
+        outcome = Outcome()
         try:
-            outcome = self._scan(command).ping(command)
+            self._scan(command).ping(command, outcome)
+            if self.stop.is_set():
+                outcome.interrupt()
         except BaseException:
-            self._recorder.count("pings")
-            self._recorder.count("interrupted")
+            outcome.interrupt()
             raise
-        self._count(outcome)
+        finally:
+            self._count(outcome)
         if outcome.beam is None:
             return None
         self._recorder.note(pulse=outcome.beam.pulse)
@@ -107,10 +110,6 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         return self._auto if by_itself else self._requests
 
     def _count(self, outcome: Outcome) -> None:
-        if self.stop.is_set() and outcome.beam is None and not outcome.bad_frames:
-            self._recorder.count("pings")
-            self._recorder.count("interrupted")
-            return
         for name, number in outcome.counts().items():
             if number:
                 self._recorder.count(name, outcome.error, number)

@@ -6,9 +6,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Callable, Deque, List, Optional, Tuple
 
-from brping.pingmessage import PingMessage
-
 from ping360_driver.protocol.message_stream import MessageStream, ParsedMessage
+from ping360_driver.protocol.messages import PingMessage
 from sonar_driver.line.port import Port
 from sonar_driver.line.timing import transmission_time
 

@@ -27,11 +27,10 @@ class RequestScan:
         self._walk = SectorWalk()
         self._last_angle: Optional[int] = None
 
-    def ping(self, command: ScanCommand) -> Outcome:
-        """Ask for the next ping of the scan and wait for it."""
+    def ping(self, command: ScanCommand, outcome: Outcome) -> None:
+        """Ask for the next ping of the scan and wait for it; note in `outcome` what comes."""
         angle = self._walk.next(command)
         sent = self._line.send(command.transducer(angle))
-        outcome = Outcome()
         deadline = sent + beam_time(self._turn_to(angle), command.pulse, self._baud_rate) + self._margin
         earliest = sent + _SURELY_TOO_EARLY * command.pulse.listening_time
         self._wait(outcome, angle, earliest, deadline)
@@ -40,7 +39,6 @@ class RequestScan:
         if outcome.bad_frames:
             self._line.drain()
         self._last_angle = angle
-        return outcome
 
     def _await_late_reply(self, outcome: Outcome) -> None:
         """Let the head finish, so that it is free for the next request."""
@@ -60,7 +58,7 @@ class RequestScan:
         return min(shorter, TURN - shorter)
 
     def _wait(self, outcome: Outcome, angle: int, earliest: float, deadline: float) -> None:
-        while not outcome.counts()["pings"]:
+        while not outcome.is_over:
             arrival = self._line.receive(deadline)
             broken = self._line.take_broken()
             if arrival is not None and arrival.message.message_id == MessageId.NACK:
@@ -69,7 +67,7 @@ class RequestScan:
                 self._judge(outcome, arrival, angle, earliest)
             elif arrival is None and not broken:
                 outcome.timeouts, outcome.error = 1, "no beam in time"
-            if broken and not outcome.counts()["pings"]:
+            if broken and not outcome.is_over:
                 outcome.bad_frames, outcome.error = 1, "a broken message"
 
     def _judge(self, outcome: Outcome, arrival: Arrival, angle: int, earliest: float) -> None:

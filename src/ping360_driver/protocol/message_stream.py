@@ -1,10 +1,21 @@
 """Finds messages in a stream of bytes, however the stream is split and whatever is between the messages."""
 
+import math
 from typing import List, NamedTuple
 
-from brping.pingmessage import PingMessage
+from ping360_driver.protocol.messages import (
+    HEADER_LENGTH,
+    START,
+    MessageError,
+    MessageId,
+    PingMessage,
+    frame_length,
+    is_whole,
+    unpacked,
+)
 
-from ping360_driver.protocol.messages import HEADER_LENGTH, START, MessageError, frame_length, is_whole, unpacked
+_BEAMS = (MessageId.DEVICE_DATA, MessageId.AUTO_DEVICE_DATA)
+_UNKNOWN = float("inf")
 
 
 class ParsedMessage(NamedTuple):
@@ -18,14 +29,16 @@ class ParsedMessage(NamedTuple):
 class MessageStream:
     """Incremental parser. No whole message is lost because of what is around it; never raises.
 
-    `broken` counts messages that were begun but are not whole, and stretches of bytes that belong to no message.
+    `broken` counts messages that are not whole: by the headers that began them, and by the length of what lies between
+    whole messages, of which each beam explains as much as the last whole beam was long.
     """
 
     def __init__(self) -> None:
         self.broken = 0
         self._buffer = bytearray()
         self._offset = 0
-        self._in_rubbish = False
+        self._beam_length = _UNKNOWN
+        self._begin_stretch()
 
     @property
     def pending(self) -> bool:
@@ -57,7 +70,7 @@ class MessageStream:
         """Give up waiting for the rest of a message."""
         if self._buffer:
             self._skip_rubbish(len(self._buffer))
-        self._in_rubbish = False
+        self._begin_stretch()
 
     def _skip_to_header(self) -> bool:
         """Drop what comes before a plausible header; return whether there is one."""
@@ -77,7 +90,9 @@ class MessageStream:
         frame = bytes(self._buffer[:length])
         parsed = ParsedMessage(self._offset, frame, unpacked(frame))
         self._skip(length)
-        self._in_rubbish = False
+        if parsed.message.message_id in _BEAMS:
+            self._beam_length = length
+        self._begin_stretch()
         return parsed
 
     def _holds_another(self) -> bool:
@@ -92,15 +107,19 @@ class MessageStream:
 
     def _give_up(self) -> None:
         """Count the message at the front as broken; look for the next one inside it, where its own end may be lost."""
-        self.broken += 1
-        self._in_rubbish = True
-        self._skip(len(START))
+        self._stretch_headers += 1
+        self._skip_rubbish(len(START))
 
     def _skip_rubbish(self, count: int) -> None:
-        """Drop bytes that begin no message; count each stretch once, unless it follows a broken message."""
-        self.broken += int(not self._in_rubbish)
-        self._in_rubbish = True
+        """Drop bytes of a stretch between whole messages, and count the messages that it was."""
+        self._stretch_bytes += count
+        number = max(1, self._stretch_headers, math.ceil(self._stretch_bytes / self._beam_length))
+        self.broken += number - self._stretch_messages
+        self._stretch_messages = number
         self._skip(count)
+
+    def _begin_stretch(self) -> None:
+        self._stretch_bytes = self._stretch_headers = self._stretch_messages = 0
 
     def _skip(self, count: int) -> None:
         del self._buffer[:count]

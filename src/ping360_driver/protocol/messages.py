@@ -3,8 +3,11 @@
 import struct
 from enum import IntEnum
 
-from brping.definitions import payload_dict_common, payload_dict_ping360
-from brping.pingmessage import PingMessage, variable_msgs
+try:
+    from brping.definitions import payload_dict_common, payload_dict_ping360
+    from brping.pingmessage import PingMessage, variable_msgs
+except ImportError as missing:
+    raise ImportError("a Ping360 needs the library bluerobotics-ping: pip install bluerobotics-ping") from missing
 
 HEADER_LENGTH = PingMessage.headerLength
 CHECKSUM_LENGTH = PingMessage.checksumLength

@@ -3,10 +3,8 @@
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from brping.pingmessage import PingMessage
-
 from ping360_driver.protocol.angles import TURN
-from ping360_driver.protocol.messages import MessageError, MessageId
+from ping360_driver.protocol.messages import MessageError, MessageId, PingMessage
 from ping360_driver.protocol.scan_command import PulseSettings
 
 _PING360 = 2  # Device type (ping protocol)

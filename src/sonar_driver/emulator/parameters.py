@@ -33,3 +33,9 @@ class EmulatedHeadParameters(FaultRates):
     y: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
     z: float = parameter(-2.0, "world: position of the head", unit="m", tunable=False)
     yaw_deg: float = parameter(0.0, "world: heading of the head, counter-clockwise", unit="deg", tunable=False)
+    beam_height_deg: float = parameter(
+        22.0, "world: vertical opening of the beam", unit="deg", low=0.0, high=150.0, tunable=False
+    )
+    beam_width_deg: float = parameter(
+        2.5, "world: horizontal opening of the beam", unit="deg", low=0.0, high=150.0, tunable=False
+    )

@@ -1,10 +1,14 @@
 """Deserialises messages whose packages are not installed, by the definition that came with the connection."""
 
+import shutil
+import sys
+from functools import partial
+from pathlib import Path
 from typing import Dict, Tuple
 
 import genpy
 import genpy.dynamic
-from rospy import AnyMsg
+import rospy
 from sensor_msgs.msg import LaserScan
 
 from node_support.errors import RefusedInput
@@ -20,7 +24,7 @@ class MessageClasses:
     def __init__(self) -> None:
         self._classes: Dict[str, type] = {kind._md5sum: kind for kind in _BUILT}
 
-    def deserialised(self, message: AnyMsg) -> genpy.Message:
+    def deserialised(self, message: rospy.AnyMsg) -> genpy.Message:
         """Return the message; raises RefusedInput when definition and bytes do not make one."""
         header = message._connection_header
         made = self._class_of(header["type"], header["md5sum"], header.get("message_definition", ""))
@@ -31,8 +35,16 @@ class MessageClasses:
 
     def _class_of(self, name: str, md5sum: str, definition: str) -> type:
         if md5sum not in self._classes:
-            try:
-                self._classes[md5sum] = genpy.dynamic.generate_dynamic(name, definition)[name]
-            except Exception as error:  # Whatever the parser, the generator or the generated code stumbles over
-                raise RefusedInput(_KIND, f"{name}: no usable definition: {error}") from error
+            self._classes[md5sum] = _generated(name, definition)
         return self._classes[md5sum]
+
+
+def _generated(name: str, definition: str) -> type:
+    try:
+        made = genpy.dynamic.generate_dynamic(name, definition)[name]
+    except Exception as error:  # Whatever the parser, the generator or the generated code stumbles over
+        raise RefusedInput(_KIND, f"{name}: no usable definition: {error}") from error
+    # genpy imports the class from a folder of its own, which it removes at an exit that our nodes do not take.
+    folder = Path(sys.modules[made.__module__].__file__).parent
+    rospy.on_shutdown(partial(shutil.rmtree, folder, ignore_errors=True))
+    return made

@@ -14,13 +14,14 @@ class BeamEchoes:
     """The echoes of one scan, seen from above.
 
     points: (m, 2) float64, x y [m]: the middle of each echo, weighted by strength.
-    weights: (m,) number of cloud points in each.
+    weights: (m,) number of cloud points in each. lengths: (m,) from the nearest point of each to the farthest, m.
     members: (k,) indices of the finite points of the cloud; owner: (k,) the echo that each of them belongs to.
     time_stamps: (m,) float64, when each echo's beam was taken, s, without the sign that tells still from moving.
     """
 
     points: np.ndarray
     weights: np.ndarray
+    lengths: np.ndarray
     members: np.ndarray
     owner: np.ndarray
     time_stamps: np.ndarray
@@ -55,9 +56,9 @@ def beam_echoes(cloud: IntensityCloud, gap: float) -> BeamEchoes:
     owner = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(points))))
     strengths = np.maximum(points[:, 3], _SAME_POINT)[:, np.newaxis]
     sums = _sums(np.hstack([points[:, :2] * strengths, strengths]), starts)
-    return BeamEchoes(
-        sums[:, :2] / sums[:, 2:], np.bincount(owner, minlength=len(starts)), members, owner, stamps[starts]
-    )
+    weights = np.bincount(owner, minlength=len(starts))
+    lengths = np.linalg.norm(points[starts + weights - 1, :3] - points[starts, :3], axis=1)
+    return BeamEchoes(sums[:, :2] / sums[:, 2:], weights, lengths, members, owner, stamps[starts])
 
 
 def _begins(points: np.ndarray, stamps: np.ndarray, gap: float) -> np.ndarray:

@@ -12,6 +12,7 @@ from sonar_processing.cloud import IntensityCloud
 from sonar_processing.shapes.beam_echoes import beam_echoes
 from sonar_processing.shapes.circle_fit import CircleFit, CircleSight, fitted_circle
 from sonar_processing.shapes.lines import fitted_line
+from sonar_processing.shapes.lone_groups import footprint, is_alone, is_oblique, is_scattered
 from sonar_processing.shapes.ransac import RansacParameters, best_hypothesis
 from sonar_processing.shapes.sightings import Sightings, sightings
 from sonar_processing.shapes.wall_echoes import wall_echoes
@@ -24,8 +25,9 @@ SonarPositions = Callable[[np.ndarray], np.ndarray]
 _NEXT_BEAM = 1.5
 # One echo too near to a circle outweighs so many on it: more than beams that a small thing fills.
 _PENALTY = 4
-# Three echoes of a buoy at 10 m lie as nearly on a line as on the circle; from four on the better fit decides.
-_LINE_ECHOES = 4
+# Echoes that graze a buoy at 10 m lie as nearly on a line as on the circle, five of them where a turning vehicle sees
+# it twice; from six on the better fit decides.
+_LINE_ECHOES = 6
 # Echoes of a near side bulge towards the sonar. Noise, and a vehicle that moves between them, makes them as hollow as
 # this, in metres; a niche or a corner of walls is deeper.
 _HOLLOW = 0.25
@@ -58,6 +60,13 @@ class CircleDetectorParameters(RansacParameters):
     max_residual: float = parameter(
         0.2,
         "root mean square difference of a circle's ranges from the measured ones, at most",
+        unit="m",
+        low=0.0,
+        high=100.0,
+    )
+    max_footprint: float = parameter(
+        1.65,
+        "two neighbouring beams cover at most this much where they hear a circle, or it may be the end of a wall",
         unit="m",
         low=0.0,
         high=100.0,
@@ -158,17 +167,28 @@ class CircleDetector:
         strong = echoes.strong(self.parameters.min_echo_share)
         if not len(strong):
             return []
-        origins = sonar_positions(echoes.time_stamps[strong])
-        known = np.isfinite(origins).all(axis=1)
-        strong, origins = strong[known], origins[known]
-        seen = sightings(echoes.points[strong], origins, echoes.time_stamps[strong], echoes.weights[strong])
+        origins = sonar_positions(echoes.time_stamps)
+        known = np.flatnonzero(np.isfinite(origins).all(axis=1))
+        everything, is_strong = sightings(echoes, known, origins[known]), np.isin(known, strong)
+        seen, weak = everything.only(np.flatnonzero(is_strong)), everything.only(np.flatnonzero(~is_strong))
         found = []
         for inliers in self._groups(seen):
-            fit = self._fit(seen.only(inliers))
-            if fit is not None:
-                members = echoes.members[np.isin(echoes.owner, strong[inliers])]
-                found.append(Circle(fit.center, fit.radius, members, len(inliers), fit.residual))
+            fit = self._fit(seen.only(inliers)) if self._is_own_thing(seen, inliers, weak) else None
+            if fit is None:
+                continue
+            members = echoes.members[np.isin(echoes.owner, known[is_strong][inliers])]
+            found.append(Circle(fit.center, fit.radius, members, len(inliers), fit.residual))
         return found
+
+    def _is_own_thing(self, seen: Sightings, inliers: np.ndarray, weak: Sightings) -> bool:
+        """Return whether a group of echoes cannot be a piece of a wall or of the floor."""
+        parameters, group = self.parameters, seen.only(inliers)
+        if footprint(group, parameters.beam_width) > parameters.max_footprint:
+            return False
+        if is_oblique(group) or is_scattered(group, seen):
+            return False
+        others = seen.only(np.setdiff1d(np.arange(len(seen.points)), inliers))
+        return is_alone(group, others, weak, parameters.clearance)
 
     def _groups(self, seen: Sightings) -> Iterator[np.ndarray]:
         """Yield the indices of the echoes that stand together apart from all others, best group first."""

@@ -63,7 +63,7 @@ class SimulatedBag:
         return self._mount
 
     def _stamp(self, seconds: float) -> Any:
-        stamp_ns = round((START_TIME + seconds) * 1e9)
+        stamp_ns = round(float(START_TIME + seconds) * 1e9)
         return stamp_ns, self._bag.time(stamp_ns)
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:

@@ -26,24 +26,31 @@ class PingRequest(Protocol):
 
 
 class HeadInWorld(Protocol):
-    """The world, and the position and heading of the head in it: m, degrees counter-clockwise."""
+    """The world, the position and heading of the head in it, and its beam: m, degrees counter-clockwise."""
 
     world_file: str
     x: float
     y: float
     z: float
     yaw_deg: float
+    beam_height_deg: float
+    beam_width_deg: float
     seed: int
+
+
+DEFAULT_SONAR = SonarParameters()
 
 
 class WorldEchoes:
     """Answers pings with what a head at rest hears in a world; the gain scales the strengths."""
 
-    def __init__(self, world: World, T_world_sonar: np.ndarray, seed: int) -> None:
+    def __init__(
+        self, world: World, T_world_sonar: np.ndarray, seed: int, sonar: SonarParameters = DEFAULT_SONAR
+    ) -> None:
         """Raises MissingPackageError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
         self._caster = RayCaster(world)
         self._pose = T_world_sonar
-        self._pattern: BeamPattern = SonarParameters().pattern()
+        self._pattern: BeamPattern = sonar.pattern()
         self._rng = np.random.default_rng(seed)
 
     def echoes(self, ping: PingRequest) -> bytes:
@@ -59,7 +66,10 @@ def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
     """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
     position = parameters.x, parameters.y, parameters.z
     pose = pose_matrix(position, (0.0, 0.0, math.radians(parameters.yaw_deg)))
+    sonar = SonarParameters(
+        vertical_opening_deg=parameters.beam_height_deg, horizontal_opening_deg=parameters.beam_width_deg
+    )
     try:
-        return WorldEchoes(load_world(parameters.world_file).world, pose, parameters.seed)
+        return WorldEchoes(load_world(parameters.world_file).world, pose, parameters.seed, sonar)
     except WorldError as error:
         raise ParameterError(f"world_file: {error}") from error

@@ -56,3 +56,22 @@ def test_a_run_in_a_known_map_goes_on_when_its_first_scans_are_frozen():
     solver = LiveSolver(parameters, SONAR, start=np.array([1.0, 1.0, 0.05]), known=KnownSurfaces(known_places()))
     estimates = [solver.add(scan) for scan in HARBOUR.scans]
     np.testing.assert_allclose(estimates[-1].T_map_base, estimates[-1].T_odom_base, atol=0.2)
+
+
+def test_blocks_far_from_the_vehicle_change_nothing():
+    far = known_places() + np.array([400.0, -900.0])
+    (near, targets), _ = pairs_with(KnownSurfaces(known_places()))
+    (same, others), _ = pairs_with(KnownSurfaces(np.concatenate([far, known_places()])))
+    np.testing.assert_array_equal(near.rows, same.rows)
+    np.testing.assert_array_equal(targets.places, others.places)
+    np.testing.assert_allclose(targets.normals, others.normals, atol=1e-12)
+
+
+def test_a_vehicle_that_goes_far_meets_what_is_there():
+    known = KnownSurfaces(np.concatenate([known_places(), known_places() + np.array([400.0, -900.0])]))
+    _, sources = pairs_with(known)
+    there = replace(sources, places=sources.places + np.array([400.0, -900.0]))
+    pairs, _ = known.compared(there, 2.2, SurfaceMatching())
+    assert len(pairs.rows) > 40
+    again, _ = known.compared(sources, 2.2, SurfaceMatching())
+    np.testing.assert_array_equal(pairs.rows, again.rows)

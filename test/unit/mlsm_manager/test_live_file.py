@@ -3,6 +3,7 @@
 import dataclasses
 import subprocess
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -69,15 +70,19 @@ def values_of(field):
 ANY_PARAMETERS = st.fixed_dictionaries({field.name: values_of(field) for field in dataclasses.fields(ReplayParameters)})
 
 
+@lru_cache(maxsize=None)
+def default_values(node):
+    return yaml.safe_load((ROOT / f"yaml/{node}_default.yaml").read_text())
+
+
 @given(ANY_PARAMETERS, ANY_FRAME, ANY_FRAME)
 def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     """Over their default files, as launch files load it."""
     parameters = ReplayParameters(**values)
-    text = live_text(parameters, odom_frame, base_frame)
-    for name, own in yaml.safe_load(text).items():
-        defaults = yaml.safe_load((ROOT / f"yaml/{name}_default.yaml").read_text())
-        NODES[name].from_mapping({**defaults, **own})
-    assert ReplayParameters.from_mapping(replay_values(yaml.safe_load(text))) == parameters
+    live = yaml.safe_load(live_text(parameters, odom_frame, base_frame))
+    for name, own in live.items():
+        NODES[name].from_mapping({**default_values(name), **own})
+    assert ReplayParameters.from_mapping(replay_values(live)) == parameters
 
 
 def test_map_bag_takes_it_back(written):

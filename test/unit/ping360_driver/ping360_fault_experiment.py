@@ -1,30 +1,26 @@
-"""Drives an emulated Ping360 with every fault at a given rate and settles the accounts.
+"""Drives an emulated Ping360 with every fault at a given rate, in virtual time, and settles the accounts.
 
-Command line:
-    python3 ping360_fault_experiment.py [replies] [rate of each fault] [auto_transmit | request] [serial | udp]
+Command line: python3 ping360_fault_experiment.py [auto_transmit | request] [REPLIES RATE]; 10,000 replies, a third of
+them with a fault, unless told otherwise. RATE is the share of each of the eight faults.
 """
 
 import os
 import sys
-import tempfile
-import threading
-import time
 from dataclasses import dataclass
 from typing import List, Set
 
 sys.path.append(os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "sonar_driver"))
 
 from numbered_pings import RecordingInjector
-from ping360_line import SETTINGS, connection_to, emulated, number, served_line
+from ping360_line import BAUD_RATE, SETTINGS, connection_to, emulated, number
+from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
 from ping360_driver.emulator import Ping360FaultRates
 from ping360_driver.line.device import Ping360Device
 from ping360_driver.line.stats import Ping360Stats
 from ping360_driver.protocol.scan_command import ScanMode
-from sonar_driver.emulator import Fault, HeadServer
+from sonar_driver.emulator import Fault
 from sonar_driver.line.scanner import Scanner
-
-UDP_PORT = "udp://127.0.0.1:23460"
 
 
 @dataclass(frozen=True)
@@ -49,37 +45,35 @@ def fault_rates(rate: float) -> Ping360FaultRates:
     return Ping360FaultRates(**dict.fromkeys((fault.value for fault in Ping360FaultRates.known()), rate), **lasting)
 
 
-def run(port: str, mode: ScanMode, commands: int, rate: float, seed: int = 0) -> Account:
+def run(mode: ScanMode, commands: int, rate: float, seed: int = 0) -> Account:
     """Let the head send or spoil `commands` replies; return the account."""
-    stop = threading.Event()
+    time = VirtualTime()
+    stop = VirtualStop(time)
     faults = RecordingInjector(fault_rates(rate), seed, commands, stop)
+    line = VirtualLine(emulated("virtual", faults), BAUD_RATE, time)
+    device = Ping360Device(connection_to("virtual", reply_margin=0.15), stop, time.elapsed, time.elapsed, line.open)
     delivered: List[int] = []
-    device = Ping360Device(connection_to(port), stop)
     command = SETTINGS.changed({"scan_mode": mode.value}).command()
     scanner = Scanner(device, command, lambda ping: delivered.append(number(ping)))
-    begin = time.monotonic()
-    with HeadServer(emulated(port, faults), served_line(port)):
-        scanner.connect()
-        scanner.run()
-    seconds = time.monotonic() - begin
+    scanner.connect()
+    scanner.run()
     by_itself = mode is ScanMode.AUTO_TRANSMIT
     good = (Fault.NONE, Fault.DOUBLED, Fault.LATE) if by_itself else (Fault.NONE, Fault.DOUBLED)
     expected = [number for number, fault in enumerate(faults.of_pings) if fault in good]
     optional = {number for number, fault in enumerate(faults.of_pings) if fault is Fault.LATE and not by_itself}
-    return Account(expected, optional, delivered, dict(faults.counts), device.stats, seconds)
+    return Account(expected, optional, delivered, dict(faults.counts), device.stats, time.now)
 
 
-def main(commands: int = 10000, rate: float = 0.05, mode: str = "auto_transmit", line: str = "serial") -> None:
-    """Run the experiment and print what came of it."""
-    with tempfile.TemporaryDirectory() as directory:
-        port = UDP_PORT if line == "udp" else f"{directory}/sonar"
-        account = run(port, ScanMode(mode), int(commands), float(rate))
-    print({fault.value: count for fault, count in account.faults.items()})
+def main(mode: str = "auto_transmit", commands: str = "10000", rate: str = str(1 / 24)) -> None:
+    """Print the account of a run."""
+    account = run(ScanMode(mode), int(commands), float(rate))
+    faults = {fault.value: count for fault, count in account.faults.items()}
+    print(f"{commands} replies, {account.seconds:.0f} s on the line: {faults}")
     print(account.stats)
     taken = [one for one in account.delivered if one not in account.optional]
-    print(f"{len(account.expected)} good replies sent, {len(taken)} delivered,", end=" ")
-    print("the same in order" if account.expected == taken else "NOT the same", end=", ")
-    print(f"{len(account.delivered) - len(taken)} late ones, {account.seconds:.0f} s")
+    same = "the same in order" if account.expected == taken else "NOT the same"
+    late = len(account.delivered) - len(taken)
+    print(f"{len(account.expected)} good replies sent, {len(taken)} delivered, {same}; {late} late ones taken")
 
 
 if __name__ == "__main__":

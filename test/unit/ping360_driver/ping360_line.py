@@ -22,8 +22,8 @@ _POLL = 0.01
 
 
 def connection_to(port, **changes):
-    """Return the parameters of a fast line."""
-    fast = {"baud_rate": BAUD_RATE, "reply_margin": 0.15, "late_window": 0.3, "byte_gap": 0.05, "back_off_first": 0.02}
+    """Return the parameters of a fast line, on a machine that may be busy."""
+    fast = {"baud_rate": BAUD_RATE, "reply_margin": 0.5, "late_window": 0.3, "byte_gap": 0.05, "back_off_first": 0.02}
     return ConnectionParameters(port=port, **{**fast, **changes})
 
 

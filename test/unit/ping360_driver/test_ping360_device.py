@@ -1,7 +1,7 @@
 import time
 
 import pytest
-from ping360_line import PATIENCE, SETTINGS, Run, connection_to, emulated, number, running, served_line
+from ping360_line import PATIENCE, SETTINGS, Run, connection_to, emulated, running, served_line
 
 from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
 from ping360_driver.line.device import Ping360Device
@@ -18,21 +18,6 @@ def faults(**rates):
     return FaultInjector(Ping360FaultRates(**{"silence_duration": 0.5, "absence_duration": 0.3, **rates}))
 
 
-@pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
-def test_beams_of_a_full_turn_come_one_after_the_other(port, settings):
-    with running(port, settings) as (scan, _):
-        assert scan.wait_for_more(30)
-    assert scan.angles[:30] == list(range(30))
-    assert [number(ping) for ping in scan.pings] == list(range(len(scan.pings)))
-
-
-@pytest.mark.parametrize("settings", [SECTOR, SECTOR.changed({"scan_mode": "request"})], ids=["auto", "request"])
-def test_a_sector_is_scanned_to_and_fro(port, settings):
-    with running(port, settings) as (scan, _):
-        assert scan.wait_for_more(30)
-    assert scan.angles[:30] == [*range(190, 211), *range(209, 200, -1)]
-
-
 def test_the_mode_is_told(port):
     with running(port) as (scan, _):
         assert scan.wait_for_more(1)
@@ -47,12 +32,6 @@ def test_older_firmware_is_asked_for_every_ping(port):
     with running(port, head=emulated(port, auto_transmit=False)) as (scan, _):
         assert scan.wait_for_more(3)
     assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
-
-
-def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
-    with running(port, SECTOR.changed({"train_angle_deg": 180.0})) as (scan, _):
-        assert scan.wait_for_more(15)
-    assert scan.angles[:15] == [*range(390, 400), *range(5)]
 
 
 class CannotScan(EmulatedPing360):
@@ -90,73 +69,6 @@ def test_a_pulse_too_long_for_the_head_comes_back_as_the_head_made_it(port):
         assert scan.wait_for_more(20)
     assert scan.pings[-1].beam.pulse.transmit_duration == 128
     assert scan.device.stats.details()["transmit duration [us]"] == "128"
-
-
-def test_stamps_are_when_the_pings_left(tmp_path):
-    """The emulated head notes when it pings; on a line that is as slow as a real one."""
-    port = str(tmp_path / "sonar")
-    head = EmulatedPing360(baud_rate=115200)
-    echoes, pinged = head._echo_source.echoes, []
-    head._echo_source.echoes = lambda ping: pinged.append(ping.time) or echoes(ping)
-    offset = time.time() - time.monotonic()
-    with running(port, SETTINGS.changed({"max_range": 20.0}), head=head, baud_rate=115200) as (scan, _):
-        assert scan.wait_for_more(20)
-    late = sorted(ping.stamp - offset - true for ping, true in zip(scan.pings, pinged))
-    assert late[0] > -1e-3
-    assert late[len(late) // 2] < 5e-3
-
-
-@pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
-@pytest.mark.parametrize(
-    ("fault", "count"),
-    [
-        (Fault.GARBLED, "bad_frames"),
-        (Fault.TRUNCATED, "bad_frames"),
-        (Fault.DOUBLED, "unexpected_replies"),
-        (Fault.REFUSED, "refusals"),
-    ],
-)
-def test_each_fault_is_counted_and_every_good_beam_delivered(port, settings, fault, count):
-    injector = faults()
-    with running(port, settings, injector) as (scan, _):
-        assert scan.wait_for_more(2)
-        before = scan.pings[-1]
-        injector.order(fault)
-        assert scan.wait(lambda _: getattr(scan.stats, count) == 1)
-        assert scan.wait_for_more(3)
-    numbers = [number(ping) for ping in scan.pings]
-    lost = set(range(numbers[-1] + 1)) - set(numbers)
-    assert number(before) not in lost
-    assert len(lost) == int(count == "bad_frames")
-    assert numbers == sorted(set(numbers))
-
-
-def test_a_beam_that_the_head_lost_is_missed(port):
-    injector = faults()
-    with running(port, faults=injector) as (scan, _):
-        assert scan.wait_for_more(2)
-        injector.order(Fault.DROPPED)
-        assert scan.wait(lambda _: scan.stats.missing_beams == 1)
-    assert scan.stats.timeouts == 0
-
-
-def test_a_request_without_reply_is_a_timeout(port):
-    injector = faults()
-    with running(port, REQUESTS, injector) as (scan, _):
-        assert scan.wait_for_more(2)
-        injector.order(Fault.DROPPED)
-        assert scan.wait(lambda _: scan.stats.timeouts == 1)
-        assert scan.wait_for_more(2)
-
-
-def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(port):
-    injector = faults(lateness=0.4)
-    with running(port, REQUESTS, injector) as (scan, _):
-        assert scan.wait_for_more(2)
-        injector.order(Fault.LATE)
-        assert scan.wait(lambda _: scan.stats.unexpected_replies >= 1)
-        assert scan.wait_for_more(2)
-    assert all(ping.beam.angle == number(ping) for ping in scan.pings)
 
 
 @pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
@@ -226,14 +138,3 @@ def test_a_stop_ends_the_scan_of_the_head_too(tmp_path):
         while head.next_event < float("inf") and time.monotonic() < end:
             time.sleep(0.01)
         assert head.next_event == float("inf")
-
-
-def test_every_ping_ends_in_exactly_one_count(port):
-    injector = faults()
-    with running(port, REQUESTS, injector) as (scan, _):
-        assert scan.wait_for_more(1)
-        for fault in (Fault.DROPPED, Fault.GARBLED, Fault.DOUBLED, Fault.REFUSED):
-            injector.order(fault)
-        assert scan.wait_for_more(5)
-    stats = scan.stats
-    assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.refusals + stats.interrupted

@@ -7,9 +7,9 @@ from sonar_driver.emulator import Fault
 
 
 @pytest.fixture(scope="module", params=ScanMode, ids=[mode.value for mode in ScanMode])
-def account(request, tmp_path_factory):
-    port = str(tmp_path_factory.mktemp("line") / "sonar")
-    return run(port, request.param, commands=50, rate=0.06, seed=3)
+def account(request):
+    """Return what became of 10,000 replies of which a third met a fault."""
+    return run(request.param, commands=10000, rate=1.0 / 24.0, seed=3)
 
 
 def test_the_experiment_met_every_fault(account):
@@ -22,10 +22,10 @@ def test_with_every_fault_each_good_reply_is_delivered_once_and_in_order(account
 
 
 def test_with_every_fault_each_bad_reply_is_counted(account):
-    """While the head scans by itself, two broken messages in a row may look like one."""
+    """While the head scans by itself, a few pieces of broken messages in a row look like one message."""
     faults, stats = account.faults, account.stats
     spoilt = faults[Fault.GARBLED] + faults[Fault.TRUNCATED]
-    assert stats.bad_frames in ([spoilt] if stats.mode == "request" else [spoilt, spoilt - 1])
+    assert spoilt >= stats.bad_frames >= (spoilt if stats.mode == "request" else 0.98 * spoilt)
     assert stats.unexpected_replies >= faults[Fault.DOUBLED]
     assert stats.refusals == faults[Fault.REFUSED]
     assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.refusals + stats.interrupted

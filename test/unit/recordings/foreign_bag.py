@@ -13,7 +13,7 @@ SPEED = 0.5
 
 
 def nanoseconds(seconds):
-    return round(seconds * 1e9)
+    return round(float(seconds) * 1e9)
 
 
 @contextmanager

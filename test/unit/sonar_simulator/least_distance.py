@@ -7,6 +7,7 @@ involved but those of meshes.
 """
 
 import math
+from functools import partial
 
 import numpy as np
 from scipy.optimize import nnls
@@ -26,9 +27,10 @@ def nearest_range(world, T_world_beam, planes, max_range):
     best = max_range
     for shape in world.shapes:
         pieces = _triangles(shape, T_beam_world, planes) if shape.kind == "mesh" else [_solid(shape, T_beam_world)]
-        for lower_bound, faces, tangent in sorted(pieces, key=lambda piece: piece[0]):
+        for lower_bound, surface in sorted(pieces, key=lambda piece: piece[0]):
             if lower_bound > best:
                 break
+            faces, tangent = surface()
             best = min(best, _least_distance([(plane, 0.0) for plane in planes] + faces, tangent))
     return best if best < max_range else math.inf
 
@@ -51,19 +53,28 @@ def _least_distance(half_spaces, tangent):
 
 
 def _solid(shape, T_beam_world):
-    """Return a lower bound of the distance, the half-spaces of a primitive and what cuts its round sides."""
+    """Return a lower bound of the distance, and what makes a primitive's half-spaces and cuts its round sides."""
     pose = T_beam_world @ shape.pose
     centre, axes = pose[:3, 3], pose[:3, :3].T
-    if shape.kind == "box":
-        half = np.array(shape.size) / 2.0
-        return max(0.0, np.linalg.norm(centre) - np.linalg.norm(half)), _slabs(centre, axes, half), lambda point: None
+    if shape.kind in ("box", "plane"):
+        return _flat_solid(shape, centre, axes)
+    reach = math.hypot(shape.size[0], shape.size[1] / 2.0) if shape.kind == "cylinder" else shape.size[0]
+    return max(0.0, np.linalg.norm(centre) - reach), lambda: _round_solid(shape, centre, axes, reach)
+
+
+def _flat_solid(shape, centre, axes):
     if shape.kind == "plane":
         half = np.minimum(np.array([*shape.size, 0.0]) / 2.0, 1e5)
-        return 0.0, _slabs(centre, axes, half), lambda point: None
+        return 0.0, lambda: (_slabs(centre, axes, half), lambda point: None)
+    half = np.array(shape.size) / 2.0
+    bound = max(0.0, np.linalg.norm(centre) - np.linalg.norm(half))
+    return bound, lambda: (_slabs(centre, axes, half), lambda point: None)
+
+
+def _round_solid(shape, centre, axes, reach):
     radius = shape.size[0]
     along = axes[2] if shape.kind == "cylinder" else np.zeros(3)
     caps = _slabs(centre, axes[2:], [shape.size[1] / 2.0]) if shape.kind == "cylinder" else []
-    reach = math.hypot(radius, shape.size[1] / 2.0) if shape.kind == "cylinder" else radius
 
     def tangent(point):
         outward = point - centre
@@ -76,7 +87,7 @@ def _solid(shape, T_beam_world):
     around = [tangent(centre + 2.0 * reach * (math.cos(t) * axes[0] + math.sin(t) * axes[1])) for t in _TURN]
     if shape.kind == "sphere":
         around += [tangent(centre + sign * 2.0 * radius * axes[2]) for sign in (1.0, -1.0)]
-    return max(0.0, np.linalg.norm(centre) - reach), caps + around, tangent
+    return caps + around, tangent
 
 
 def _slabs(centre, axes, halves):
@@ -87,17 +98,19 @@ def _triangles(shape, T_beam_world, planes):
     vertices, faces = shape.triangles()
     corners = (vertices @ T_beam_world[:3, :3].T + T_beam_world[:3, 3])[faces]
     behind = (corners @ planes.T < 0.0).all(axis=1).any(axis=1)
-    return [_triangle(corner) for corner in corners[~behind]]
+    corners = corners[~behind]
+    centres = corners.mean(axis=1)
+    bounds = np.linalg.norm(centres, axis=1) - np.linalg.norm(corners - centres[:, np.newaxis], axis=2).max(axis=1)
+    return [(max(0.0, bound), partial(_triangle, corner)) for bound, corner in zip(bounds, corners)]
 
 
 def _triangle(corners):
-    centre = corners.mean(axis=0)
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     normal = normal / np.linalg.norm(normal)
-    half_spaces = [(normal, normal @ centre), (-normal, -(normal @ centre))]
+    height = normal @ corners.mean(axis=0)
+    half_spaces = [(normal, height), (-normal, -height)]
     for start, end in zip(corners, np.roll(corners, -1, axis=0)):
         inward = np.cross(normal, end - start)
         inward = inward / np.linalg.norm(inward)
         half_spaces.append((inward, inward @ start))
-    bound = np.linalg.norm(centre) - np.linalg.norm(corners - centre, axis=1).max()
-    return max(0.0, bound), half_spaces, lambda point: None
+    return half_spaces, lambda point: None

@@ -31,7 +31,7 @@ def test_a_tour_keeps_its_distance_from_everything(name, distance):
     path = np.array([TOURS[name].pose(time)[:2, 3] for time in times])
     world = load_world(ROOT / "worlds" / f"{name}.sdf").world
     for outline in world.outlines():
-        assert min(_distance_to_polyline(point, outline) for point in path) > distance
+        assert _distance_to_polyline(path, outline) > distance
 
 
 @pytest.mark.parametrize("name", ["basin", "harbour", "tank"])
@@ -44,10 +44,12 @@ def test_a_tour_stays_between_surface_and_bottom(name):
     assert below.min() > 0.6
 
 
-def _distance_to_polyline(point, outline):
+def _distance_to_polyline(points, outline):
+    """Return the least distance of any of the points (n, 2) from the line through the corners (m, 2)."""
     start, along = outline[:-1], np.diff(outline, axis=0)
-    share = np.clip(((point - start) * along).sum(axis=1) / (along**2).sum(axis=1), 0.0, 1.0)
-    return np.linalg.norm(start + share[:, np.newaxis] * along - point, axis=1).min()
+    offsets = points[:, np.newaxis] - start
+    share = np.clip((offsets * along).sum(axis=2) / (along**2).sum(axis=1), 0.0, 1.0)
+    return np.linalg.norm(share[..., np.newaxis] * along - offsets, axis=2).min()
 
 
 def test_the_basins_tour_brings_every_part_of_every_wall_within_40_m_of_a_still_scan():

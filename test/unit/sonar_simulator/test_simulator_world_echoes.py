@@ -20,6 +20,11 @@ def ping(angle=0.0, bin_count=500, max_range=20, gain=0):
     return SimpleNamespace(angle=angle, bin_count=bin_count, max_range=max_range, gain_db=gain)
 
 
+def head_in(world_file):
+    place = {"x": 0.0, "y": 0.0, "z": -2.0, "yaw_deg": 0.0}
+    return SimpleNamespace(world_file=world_file, **place, beam_height_deg=22.0, beam_width_deg=2.5, seed=1)
+
+
 @pytest.fixture
 def source():
     return WorldEchoes(WALL, np.eye(4), seed=1)
@@ -55,13 +60,12 @@ def test_the_head_hears_from_where_it_was_placed():
 
 
 def test_a_world_that_cannot_be_read_is_a_bad_parameter():
-    parameters = SimpleNamespace(world_file="none.sdf", x=0.0, y=0.0, z=0.0, yaw_deg=0.0, seed=0)
     with pytest.raises(ParameterError, match=r"world_file.*none\.sdf"):
-        world_echoes(parameters)
+        world_echoes(head_in("none.sdf"))
 
 
 def test_without_the_ray_caster_the_head_is_refused_with_what_to_install(monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
     basin = str(Path(__file__).resolve().parents[3] / "worlds" / "basin.sdf")
     with pytest.raises(ParameterError, match="-m pip install embreex"):
-        world_echoes(SimpleNamespace(world_file=basin, x=0.0, y=0.0, z=-2.0, yaw_deg=0.0, seed=1))
+        world_echoes(head_in(basin))

@@ -1,6 +1,7 @@
 """Which cells each beam of a scan crossed before its first echo."""
 
 from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
@@ -49,9 +50,11 @@ class BeamPaths:
 
     def take(self, chosen: np.ndarray) -> "BeamPaths":
         """Return the chosen pairs, a mask (p,), and the cells that are left."""
-        old, cell = np.unique(self.cell[chosen], return_inverse=True)
-        starts = np.flatnonzero(np.diff(cell, prepend=-1))
-        return BeamPaths(self.cells[old], starts, cell, self.beam[chosen], self.distance[chosen], self.height[chosen])
+        old = self.cell[chosen]
+        starts, cell = _runs(old)
+        return BeamPaths(
+            self.cells[old[starts]], starts, cell, self.beam[chosen], self.distance[chosen], self.height[chosen]
+        )
 
 
 def beam_paths(beams: FirstEchoes, width: float, resolution: float) -> BeamPaths:
@@ -81,7 +84,17 @@ def _pairs(beam: np.ndarray, distance: np.ndarray, height: np.ndarray, cells: np
     low = cells.min(axis=0) if len(cells) else np.zeros(2, dtype=np.int64)
     rows = int(cells[:, 1].max() - low[1] + 1) if len(cells) else 1
     beams = int(beam.max(initial=0) + 1)
-    pairs, sample = np.unique(((cells - low) @ (rows, 1)) * beams + beam, return_index=True)
-    number, starts, cell = np.unique(pairs // beams, return_index=True, return_inverse=True)
-    where = np.column_stack([number // rows, number % rows]) + low
+    number = ((cells - low) @ (rows, 1)) * beams + beam
+    order = np.argsort(number)
+    sample = order[_runs(number[order])[0]]
+    pairs = number[sample]
+    starts, cell = _runs(pairs // beams)
+    where = pairs[starts] // beams
+    where = np.column_stack([where // rows, where % rows]) + low
     return BeamPaths(where, starts, cell, pairs % beams, distance[sample], height[sample])
+
+
+def _runs(values: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return where each run of equal values begins in sorted integers (n,), and the number of the run of each (n,)."""
+    begins = np.diff(values, prepend=values[:1] - 1) != 0
+    return np.flatnonzero(begins), np.cumsum(begins) - 1

@@ -1,0 +1,109 @@
+"""What a scan costs the joint solver's mapper in a small map and in a large one, with and without carving."""
+
+import time
+from io import BytesIO
+from typing import List, NamedTuple, Tuple
+
+import numpy as np
+from std_msgs.msg import Header
+
+from benchmarks.table import Row
+from mlsm_manager.localisation.joint_mapper import JointMapper
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.parameters import LocaliserParameters
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+RESOLUTION = 0.5
+_WALLS_APART = 40.0
+_WALL_LENGTH = 12_000.0
+_TURN = 14.0
+_BEAMS = 400
+_SPEED = 0.3
+_WARM_UP = 42
+"""Scans until the window of 40 is full, from where on a scan costs what it will always cost."""
+_SCANS = 12
+
+
+class Costs(NamedTuple):
+    """Seconds of a core: first and median of a whole scan, the markers of its change; and bytes of these."""
+
+    first: float
+    scan: float
+    markers: float
+    size: int
+
+
+def walls(blocks: int) -> Blocks:
+    """Return parallel walls, `_WALLS_APART` m from each other, a block for each cell of each."""
+    length = min(_WALL_LENGTH, blocks * RESOLUTION / 2.0)
+    x = np.arange(-length / 2.0, length / 2.0, RESOLUTION) + RESOLUTION / 2.0
+    count = int(np.ceil(blocks / len(x)))
+    surface_map = MultiLevelSurfaceMap(RESOLUTION, limit=1e6)
+    for y in (np.arange(count) - count // 2) * _WALLS_APART + 0.25:
+        points = np.column_stack([x, np.full(len(x), y), np.full(len(x), -2.0), np.full(len(x), 60.0)])
+        surface_map.insert(points)
+    return surface_map.blocks
+
+
+def scan(number: int, rng: np.random.Generator) -> Scan:
+    """Return a scan of a vehicle that goes along the middle between two walls."""
+    times = _TURN * (number + (np.arange(_BEAMS) + 1.0) / _BEAMS)
+    bearing = np.linspace(0.0, 2.0 * np.pi, _BEAMS, endpoint=False)
+    reach = np.minimum(_WALLS_APART / 2.0 / np.maximum(np.abs(np.sin(bearing)), 1e-9), 60.0)
+    heard = reach < 60.0
+    reach = reach + rng.normal(0.0, 0.1, _BEAMS)
+    places = np.column_stack([_SPEED * times + reach * np.cos(bearing), 20.25 + reach * np.sin(bearing)])[heard]
+    track_times = np.arange(_TURN * (number - 1), _TURN * (number + 1) + 2.0, 0.2)
+    track = np.column_stack([_SPEED * track_times, np.full(len(track_times), 20.25), np.zeros(len(track_times))])
+    points = np.column_stack([places, np.full(len(places), -2.0), np.full(len(places), 60.0)])
+    return Scan(points, times[heard], np.ones(len(places), dtype=bool), Track(track_times, track), float(times[-1]))
+
+
+def costs(known: Blocks, carve: bool) -> Costs:
+    """Measure scans in a map that has `known` blocks already."""
+    parameters = LocaliserParameters(estimator=Estimator.JOINT, carve=carve, match_resolution=RESOLUTION)
+    mapper = parameters.build_localiser().mapper
+    mapper.restore({Layer.SHOWN: known.take(slice(0, 1)), Layer.MATCHED: known}, {})
+    rng, markers, header = np.random.default_rng(4), BlockMarkers(), Header(frame_id="map")
+    taken, published, sizes = [], [], []
+    for number in range(_WARM_UP + _SCANS):
+        one = scan(number, rng)
+        taken.append(_cpu(lambda one=one: (mapper.take_echoes(one), mapper.take_cloud(TimedPoints.of_scan(one)))))
+        published.append(_cpu(lambda: sizes.append(_published(mapper, markers, header))))
+    newest = slice(_WARM_UP, None)
+    return Costs(taken[0], float(np.median(taken[newest])), float(np.median(published[newest])), max(sizes[newest]))
+
+
+def _cpu(call) -> float:
+    start = time.process_time()
+    call()
+    return time.process_time() - start
+
+
+def _published(mapper: JointMapper, markers: BlockMarkers, header: Header) -> int:
+    tiles, blocks = mapper.changed_tiles()
+    buffer = BytesIO()
+    markers.changed(blocks, map(tuple, tiles.tolist()), header).serialize(buffer)
+    return len(buffer.getvalue())
+
+
+def rows(sizes: Tuple[int, ...] = (10_000, 10_000_000)) -> List[Row]:
+    """Return the figures of the joint solver's mapper."""
+    result = []
+    for size in sizes:
+        known = walls(size)
+        plain, carved = costs(known, carve=False), costs(known, carve=True)
+        name = f"map of {len(known)} blocks"
+        result += [
+            (f"JOINT: a scan of {_BEAMS} beams, {name}", f"{1e3 * carved.scan:.0f} ms of a core", "no slower"),
+            ("JOINT: of that for carving", f"{100 * (1.0 - plain.scan / carved.scan):.0f} %", "< 20 %"),
+            ("JOINT: the first scan in that map", f"{carved.first:.2f} s", ""),
+            ("JOINT: markers of a scan's change", f"{1e3 * carved.markers:.1f} ms", "< 20 ms"),
+            ("JOINT: their size", f"{carved.size / 1e6:.2f} MB", "< 1 MB"),
+        ]
+    return result

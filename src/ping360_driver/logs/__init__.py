@@ -1,0 +1,1 @@
+"""The logs of Ping Viewer, the manufacturer's program."""

@@ -1,0 +1,107 @@
+import pytest
+from ping360_line import SETTINGS
+from virtual_scan import VirtualScan
+
+from ping360_driver.emulator import Ping360FaultRates
+from sonar_driver.emulator import Fault, FaultInjector
+
+REQUESTS = SETTINGS.changed({"scan_mode": "request"})
+MODES = pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
+
+
+@pytest.fixture(params=["virtual", "udp://virtual:1"], ids=["serial", "udp"])
+def port(request):
+    return request.param
+
+
+@pytest.fixture
+def injector():
+    return FaultInjector(Ping360FaultRates(lateness=0.4))
+
+
+@MODES
+def test_beams_of_a_full_turn_come_one_after_the_other(port, settings):
+    scan = VirtualScan(port, settings)
+    scan.beams(405)
+    assert scan.angles == [*range(400), *range(5)]
+    assert scan.numbers == list(range(405))
+
+
+@MODES
+def test_a_sector_is_scanned_to_and_fro(port, settings):
+    scan = VirtualScan(port, settings.changed({"sector_width_deg": 18.0}))
+    scan.beams(30)
+    assert scan.angles == [*range(190, 211), *range(209, 200, -1)]
+
+
+def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
+    scan = VirtualScan(port, SETTINGS.changed({"sector_width_deg": 18.0, "train_angle_deg": 180.0}))
+    scan.beams(15)
+    assert scan.angles == [*range(390, 400), *range(5)]
+    assert scan.stats.mode == "request"
+
+
+@MODES
+@pytest.mark.parametrize("max_range", [1.0, 20.0])
+def test_stamps_are_when_the_pings_left(port, settings, max_range):
+    scan = VirtualScan(port, settings.changed({"max_range": max_range}), baud_rate=115200)
+    scan.beams(20)
+    assert [ping.stamp for ping in scan.pings] == pytest.approx(scan.echoes.times[:20], abs=1e-4)
+
+
+@MODES
+@pytest.mark.parametrize(
+    ("fault", "count"),
+    [
+        (Fault.GARBLED, "bad_frames"),
+        (Fault.TRUNCATED, "bad_frames"),
+        (Fault.DOUBLED, "unexpected_replies"),
+        (Fault.REFUSED, "refusals"),
+    ],
+)
+def test_each_fault_is_counted_and_every_good_beam_delivered(port, settings, injector, fault, count):
+    scan = VirtualScan(port, settings, injector)
+    scan.beams(2)
+    injector.order(fault)
+    scan.until(lambda: getattr(scan.stats, count) == 1)
+    scan.beams(3)
+    lost = {2} if count == "bad_frames" else set()
+    assert scan.numbers == [one for one in range(scan.numbers[-1] + 1) if one not in lost]
+    assert scan.stats.timeouts == 0
+
+
+def test_a_beam_that_the_head_lost_is_missed(port, injector):
+    scan = VirtualScan(port, SETTINGS, injector)
+    scan.beams(2)
+    injector.order(Fault.DROPPED)
+    scan.until(lambda: scan.stats.missing_beams == 1)
+    assert scan.stats.timeouts == 0
+
+
+def test_a_request_without_reply_is_a_timeout(port, injector):
+    scan = VirtualScan(port, REQUESTS, injector)
+    scan.beams(2)
+    injector.order(Fault.DROPPED)
+    scan.until(lambda: scan.stats.timeouts == 1)
+    scan.beams(2)
+    assert scan.numbers == [0, 1, 3, 4]
+
+
+def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(port, injector):
+    scan = VirtualScan(port, REQUESTS, injector)
+    scan.beams(2)
+    injector.order(Fault.LATE)
+    scan.until(lambda: scan.stats.unexpected_replies == 1)
+    scan.beams(2)
+    assert all(ping.beam.angle == number for ping, number in zip(scan.pings, scan.numbers))
+
+
+@MODES
+def test_every_ping_ends_in_exactly_one_count(port, settings, injector):
+    scan = VirtualScan(port, settings, injector)
+    scan.beams(1)
+    for fault in (Fault.DROPPED, Fault.GARBLED, Fault.DOUBLED, Fault.REFUSED):
+        injector.order(fault)
+    scan.beams(5)
+    stats = scan.stats
+    assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.refusals + stats.interrupted

@@ -1,0 +1,67 @@
+"""A driver that scans with an emulated Ping360 in virtual time: always the same, however busy the machine is."""
+
+from numbered_pings import NumberedEchoes
+from ping360_line import BAUD_RATE, SETTINGS, connection_to, number
+from virtual_line import VirtualLine, VirtualStop, VirtualTime
+
+from ping360_driver.emulator import EmulatedPing360
+from ping360_driver.line.device import Ping360Device
+from sonar_driver.line.port import is_datagram_port
+
+_MOST_PINGS = 1000
+
+
+class TimedEchoes(NumberedEchoes):
+    """Remembers when each ping left."""
+
+    def __init__(self):
+        super().__init__()
+        self.times = []
+
+    def echoes(self, ping):
+        self.times.append(ping.time)
+        return super().echoes(ping)
+
+
+class VirtualScan:
+    """Pings on request of a test; `pings` are those that brought a beam."""
+
+    def __init__(self, port="virtual", settings=SETTINGS, faults=None, baud_rate=BAUD_RATE):
+        self.settings = settings
+        self.pings = []
+        self.echoes = TimedEchoes()
+        self._time = VirtualTime()
+        head_rate = float("inf") if is_datagram_port(port) else baud_rate
+        head = EmulatedPing360(self.echoes, faults, head_rate)
+        line = VirtualLine(head, head_rate, self._time)
+        connection = connection_to(port, baud_rate=baud_rate, reply_margin=0.15)
+        stop, clock = VirtualStop(self._time), self._time.elapsed
+        self.device = Ping360Device(connection, stop, clock, clock, line.open)
+        self.device.open()
+
+    @property
+    def stats(self):
+        return self.device.stats
+
+    @property
+    def angles(self):
+        return [ping.beam.angle for ping in self.pings]
+
+    @property
+    def numbers(self):
+        return [number(ping) for ping in self.pings]
+
+    def until(self, ready):
+        """Ping until `ready`; fails when that does not come."""
+        for _ in range(_MOST_PINGS):
+            if ready():
+                return
+            ping = self.device.ping(self.settings.command())
+            if ping is not None:
+                self.pings.append(ping)
+        raise AssertionError(f"not within {_MOST_PINGS} pings: {self.stats}")
+
+    def beams(self, count):
+        """Ping until so many more beams have come."""
+        wanted = len(self.pings) + count
+        self.until(lambda: len(self.pings) >= wanted)

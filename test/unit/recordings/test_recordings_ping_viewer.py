@@ -1,0 +1,112 @@
+"""Logs of Ping Viewer: written as it writes them, read back, also damaged."""
+
+from io import BytesIO
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from ping360_driver.logs.ping_viewer_log import NoLogError, PingViewerLog, PingViewerLogWriter
+from ping360_driver.protocol.messages import MessageId, packed
+from recordings.beams.makers_logs import is_makers_log, makers_beams
+from recordings.errors import RecordingError
+from recordings.reading.reader import Request, read
+from recordings.vehicle.motion import MotionNames
+
+TICKS = 400
+SAMPLES = 300
+LISTENING = TICKS * 25e-9 * SAMPLES
+
+
+def beam_bytes(gradians, kind=MessageId.DEVICE_DATA):
+    echoes = bytes([gradians % 256] * SAMPLES)
+    return packed(
+        kind, mode=1, gain_setting=1, angle=gradians, transmit_duration=32, sample_period=TICKS, transmit_frequency=750,
+        number_of_samples=SAMPLES, data_length=SAMPLES, data=echoes,
+    )  # fmt: skip
+
+
+def log_bytes(parts):
+    file = BytesIO()
+    writer = PingViewerLogWriter(file)
+    for time, data in parts:
+        writer.write(time, data)
+    return file.getvalue()
+
+
+@pytest.fixture
+def turn(tmp_path):
+    path = tmp_path / "20200103-143114.bin"
+    path.write_bytes(log_bytes((5.0 + 0.05 * index, beam_bytes(index)) for index in range(400)))
+    return path
+
+
+def test_the_bytes_are_those_of_ping_viewer():
+    """As its documentation describes them: title, version, five texts, family and type, then time and data."""
+    expected = b"\0\0\0\x34" + "PingViewer sensor log file".encode("utf-16-be") + b"\0\0\0\x01"
+    expected += b"\0\0\0\0" * 5 + b"\0\0\0\x01" + b"\0\0\0\x02"
+    expected += b"\0\0\0\x18" + "01:02:03.456".encode("utf-16-be") + b"\0\0\0\x02" + b"BR"
+    assert log_bytes([(3723.456, b"BR")]) == expected
+
+
+def test_every_beam_is_read_at_the_time_of_its_ping(turn):
+    found = makers_beams(turn)
+    assert (len(found.beams), found.refused) == (400, 0)
+    assert found.stamps_ns * 1e-9 == pytest.approx(5.0 + 0.05 * np.arange(400) - LISTENING)
+    beam = found.beams[100]
+    assert beam.angle == pytest.approx(np.pi / 2)
+    assert beam.range_resolution == pytest.approx(TICKS * 25e-9 * 1500.0 / 2.0)
+    assert (beam.intensities == 100).all()
+
+
+def test_messages_split_over_parts_and_automatic_ones_are_read_too(tmp_path):
+    data = beam_bytes(7, MessageId.AUTO_DEVICE_DATA) + beam_bytes(8)
+    path = tmp_path / "split.bin"
+    path.write_bytes(log_bytes([(1.0, data[:100]), (1.1, data[100:500]), (1.2, data[500:])]))
+    angles = [beam.angle for beam in makers_beams(path).beams]
+    assert angles == pytest.approx([(200 - 7) * np.pi / 200, (200 - 8) * np.pi / 200])
+
+
+def test_times_go_on_after_midnight():
+    log = PingViewerLog(log_bytes([(86399.0, b"a"), (86401.0, b"b"), (86400.5, b"c")]))
+    assert [part.time for part in log] == [86399.0, 86401.0, 86401.0]
+
+
+def test_it_is_known_by_its_first_bytes(turn, tmp_path):
+    other = tmp_path / "other.bin"
+    other.write_bytes(b"\0" * 100)
+    assert is_makers_log(turn)
+    assert not is_makers_log(other)
+
+
+def test_it_is_read_as_a_recording_of_a_standing_vehicle(turn):
+    held = read(turn, Request(motion=MotionNames(is_standing=True), offset=1e9))
+    assert held.found.beams[0].stamp_ns == pytest.approx((1e9 + 5.0) * 1e9, abs=1e7)
+
+
+def test_a_log_without_beams_is_refused(tmp_path):
+    path = tmp_path / "empty.bin"
+    path.write_bytes(log_bytes([]))
+    with pytest.raises(RecordingError, match="no beam of a Ping360"):
+        makers_beams(path)
+
+
+@given(st.integers(0, 100), st.binary(max_size=40))
+def test_what_is_damaged_costs_no_other_part(place, rubbish):
+    parts = [(1.0 + index, bytes([index]) * 20) for index in range(5)]
+    whole = log_bytes(parts)
+    start = len(log_bytes([]))
+    length = (len(whole) - start) // 5
+    cut = start + 2 * length + place % length
+    log = PingViewerLog(whole[:cut] + rubbish + whole[start + 3 * length :])
+    found = [(part.time, part.data) for part in log]
+    assert {one for one in parts if one[0] != 3.0} <= set(found)
+
+
+@given(st.binary(max_size=300), st.integers(0, 200))
+def test_no_bytes_raise_anything_but_that_it_is_no_log(rubbish, kept):
+    try:
+        list(PingViewerLog(log_bytes([(1.0, b"x")])[:kept] + rubbish))
+    except NoLogError as error:
+        assert str(error)  # noqa: PT017
