@@ -41,16 +41,9 @@ def as_complex(vectors: np.ndarray) -> np.ndarray:
 
 
 def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
-<<<<<<< HEAD
     """Return the products (...) of complex numbers.
 
     numpy's own product rounds by where in memory the numbers lie, so that equal runs would end differently.
-=======
-    """Return the product of complex numbers (...) and (...).
-
-    numpy multiplies a few complex numbers with or without fused operations, depending on where in memory they lie. The
-    results differ in the last bit, so that equal runs would end differently.
->>>>>>> land_motion
     """
     real = first.real * second.real - first.imag * second.imag
     return real + 1j * (first.real * second.imag + first.imag * second.real)
