@@ -40,8 +40,8 @@ class ThrusterFactors(DvlFactors):
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
         """See OdometryModel."""
-        drift = super().drift(node, heading)
-        values, slopes = drift.values, drift.slopes
+        known = super().drift(node, heading)
+        values, slopes = known.values, known.slopes
         to_base = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
         values[:2] = to_base @ node[_CURRENT]
         slopes[:2, _CURRENT] = to_base

@@ -43,8 +43,8 @@ class UnaidedFactors(HeadingFactors):
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
         """See OdometryModel."""
-        drift = super().drift(node, heading)
-        values, slopes = drift.values, drift.slopes
+        known = super().drift(node, heading)
+        values, slopes = known.values, known.slopes
         values[2], slopes[2, TURN_RATE] = node[TURN_RATE], 1.0
         return Drift(values, slopes)
 
