@@ -25,7 +25,7 @@ def known_places():
 def pairs_with(known):
     solver = LiveSolver(PARAMETERS, SONAR)
     solver.add(HARBOUR.scans[0])
-    sources = place(solver.log, solver.state, solver.log.rows(0, 1))
+    sources = place(solver.log, solver.odometry, solver.state, solver.log.rows(0, 1))
     return known.compared(sources, 2.2, SurfaceMatching()), sources
 
 

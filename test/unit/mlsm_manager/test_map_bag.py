@@ -107,7 +107,11 @@ def test_parameters_of_a_file_are_taken_and_held(tmp_path):
 
 def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
     terminal, end = pty.openpty()
-    process = subprocess.Popen([*COMMAND, str(BASIN), "--out", str(tmp_path), "--refine"], stderr=end)
+    # Tests that a shell runs in the background would hand on that Ctrl-C is ignored.
+    process = subprocess.Popen(
+        [*COMMAND, str(BASIN), "--out", str(tmp_path), "--refine"],
+        stderr=end, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
+    )  # fmt: skip
     shown = b""
     while b"match" not in shown:
         shown += os.read(terminal, 4096)
