@@ -78,6 +78,8 @@ def test_every_node_is_described():
 
 @pytest.mark.parametrize("node", ["mlsm_core", "mapping", "map_bag", "map_tool", "simulate_bag", "convert_852"])
 def test_help_that_nobody_reads_to_its_end_ends_without_a_word(node):
+    if node in {"mlsm_core", "mapping"}:
+        pytest.importorskip("tf2_py")
     reader, writer = os.pipe()
     os.close(reader)
     command = [sys.executable, str(ROOT / "nodes" / node), "--help"]
