@@ -22,6 +22,7 @@ ENVIRONMENT_TIMEOUT = 1200.0
 TOGETHER = 3
 # Rostests that measure time, or whose simulation or playback runs as fast as a whole processor allows.
 ALONE = (
+    "compass_demo",
     "imagenex_852_load",
     "marina",
     "matching_many_processes",

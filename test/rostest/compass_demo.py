@@ -1,0 +1,46 @@
+#!/usr/bin/env python3
+"""A vehicle with a compass alone finds its way through the simulated harbour while its odometry comes from the fixes."""
+
+import sys
+import unittest
+
+import numpy as np
+import rospy
+import rostest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph import Inbox
+from nav_msgs.msg import Odometry
+
+PACKAGE = "underwater_map_construction"
+FIXES = 14  # about four minutes, in which the vehicle goes 30 m
+FARTHEST = 3.0  # m, median distance of the fixes from the truth
+LEAST_WAY = 15.0  # m by which a vehicle that believes to stand still would be wrong at the end
+
+
+class CompassDemo(unittest.TestCase):
+    """Runs the tour's first minutes."""
+
+    def test_the_fixes_follow_the_truth(self) -> None:
+        """Both begin at the same place; the odometry moves too, because it is told the velocity."""
+        truth, odometry = Inbox("/ground_truth", Odometry), Inbox("/odom", Odometry)
+        fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        fixes.wait_for(lambda _: len(fixes.messages) >= FIXES, timeout=90.0)
+        stamps, true = _way(truth)
+        times, fixed = _way(fixes)
+        there = np.column_stack([np.interp(times, stamps, true[:, axis]) for axis in (0, 1)])
+        error = np.hypot(*((fixed - fixed[0]) - (there - there[0])).T)
+        self.assertLess(np.median(error), FARTHEST)
+        self.assertGreater(np.hypot(*(there[-1] - there[0])), LEAST_WAY)
+        self.assertGreater(np.ptp(_way(odometry)[1], axis=0).max(), 3.0)
+
+
+def _way(inbox: Inbox) -> tuple:
+    """Return stamps (n,) s and positions (n, 2) m."""
+    rows = [(m.header.stamp.to_sec(), m.pose.pose.position.x, m.pose.pose.position.y) for m in inbox.messages]
+    values = np.array(rows)
+    return values[:, 0], values[:, 1:]
+
+
+if __name__ == "__main__":
+    rospy.init_node("compass_demo_test")
+    rostest.rosrun(PACKAGE, "compass_demo", CompassDemo, sys.argv)
