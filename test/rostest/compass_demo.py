@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A vehicle with a compass alone finds its way through the simulated harbour while its odometry comes from the fixes."""
+"""A vehicle with a compass alone finds its way through the simulated harbour; its odometry comes from the fixes."""
 
 import sys
 import unittest
