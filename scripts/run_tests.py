@@ -27,9 +27,15 @@ ALONE = (
     "marina",
     "matching_many_processes",
     "matching_one_process",
+    "micron_scan_line",
+    "micron_tank",
     "one_and_many_processes",
+    "ping360_load",
+    "play_bag",
+    "play_old_bag",
     "simulator_commands",
     "simulator_demo",
+    "standing",
     "vehicle",
 )
 _PRINTING = threading.Lock()
