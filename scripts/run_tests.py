@@ -19,7 +19,7 @@ STEP_TIMEOUT = 400.0
 # Downloads 100 MB.
 ENVIRONMENT_TIMEOUT = 1200.0
 # Rostests mostly wait; each has a master of its own. With more at once, two cores no longer answer in time.
-TOGETHER = 3
+TOGETHER = 2
 # Rostests that measure time, or whose simulation or playback runs as fast as a whole processor allows.
 ALONE = (
     "compass_demo",
