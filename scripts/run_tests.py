@@ -38,7 +38,7 @@ ALONE = (
     "standing",
     "vehicle",
 )
-# Processes that start at the same time on a busy machine may miss each other's first messages; a fault fails twice.
+# A busy machine may stop a process for longer than a live graph can wait; a fault fails twice.
 ROSTEST_TRIES = 2
 _PRINTING = threading.Lock()
 
