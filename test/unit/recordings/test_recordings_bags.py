@@ -38,7 +38,7 @@ def assert_same(recording, expected):
         assert np.array_equal(one.T_target_sonar, other.T_target_sonar)
         assert np.array_equal(one.beam.intensities, other.beam.intensities)
         assert (one.beam.angle, one.is_moving) == (other.beam.angle, other.is_moving)
-    assert np.array_equal(recording.track.poses, expected.track.poses)
+    np.testing.assert_allclose(recording.track.poses, expected.track.poses, rtol=0.0, atol=1e-9)
     assert np.array_equal(recording.truth.positions, expected.truth.positions)
 
 
