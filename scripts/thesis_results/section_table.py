@@ -1,0 +1,19 @@
+"""All sections of the page, in its order; a new one is one line here."""
+
+from typing import Tuple
+
+from thesis_results import processed_recording, processed_scans, recorded_scans, simulated_scans
+from thesis_results.section import Section
+
+SECTIONS: Tuple[Section, ...] = (
+    Section("simulation", "7.1", "Simulated scans", simulated_scans.make),
+    Section("recorded", "7.1", "Simulated and recorded scans", recorded_scans.make, recorded_scans.RECORDINGS),
+    Section("processing", "7.2", "A simulated scan, cleaned", processed_scans.make),
+    Section(
+        "processing-recorded",
+        "7.2",
+        "A recorded scan, cleaned",
+        processed_recording.make,
+        processed_recording.RECORDINGS,
+    ),
+)
