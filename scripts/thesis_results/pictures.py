@@ -60,7 +60,7 @@ def _small_png(figure: Figure) -> bytes:
 
 def _png(figure: Figure, resolution: int) -> bytes:
     full, small = BytesIO(), BytesIO()
-    figure.savefig(full, format="png", dpi=resolution, facecolor="white")
+    figure.savefig(full, format="png", dpi=resolution, facecolor="white", bbox_inches="tight")
     image = Image.open(full).convert("RGB").quantize(_COLOURS, method=Image.FASTOCTREE, dither=0)
     image.save(small, format="png", optimize=True)
     return small.getvalue()

@@ -2,7 +2,14 @@
 
 from typing import Tuple
 
-from thesis_results import processed_recording, processed_scans, recorded_scans, simulated_scans
+from thesis_results import (
+    processed_recording,
+    processed_scans,
+    recorded_scans,
+    simulated_scans,
+    three_moves,
+    tilt_survey,
+)
 from thesis_results.section import Section
 
 SECTIONS: Tuple[Section, ...] = (
@@ -16,4 +23,6 @@ SECTIONS: Tuple[Section, ...] = (
         processed_recording.make,
         processed_recording.RECORDINGS,
     ),
+    Section("mapping", "7.3", "A 3-D survey of the harbour", tilt_survey.make),
+    Section("moves", "7.4", "Three moves with an odometry that is 30 % off", three_moves.make),
 )
