@@ -3,6 +3,7 @@
 from typing import Tuple
 
 from thesis_results import (
+    moving_scan,
     processed_recording,
     processed_scans,
     recorded_scans,
@@ -25,4 +26,5 @@ SECTIONS: Tuple[Section, ...] = (
     ),
     Section("mapping", "7.3", "A 3-D survey of the harbour", tilt_survey.make),
     Section("moves", "7.4", "Three moves with an odometry that is 30 % off", three_moves.make),
+    Section("moving", "7.4", "A vehicle that never stops", moving_scan.make),
 )

@@ -38,7 +38,8 @@ SHOWN = MatcherName.DISTRIBUTIONS
 _SHARP, _THESIS = KINDS[0], KINDS[2]
 _REACH = 29.0  # m: both long walls and the gate are in the picture
 _BEFORE, _AFTER = "#d32f2f", "#2e7d32"
-_ARROW = 3.0  # m
+_GATE = (9.0, 15.0), (-1.7, 1.7)  # m, what the inset shows
+_ARROW = 1.0  # m
 
 
 @dataclass(frozen=True)
@@ -112,13 +113,14 @@ def _many_runs(sessions: Dict[SonarKind, List[List[Scan]]]) -> List[List[str]]:
     return [
         [
             str(kind),
-            *(_summary(np.concatenate([session_errors(scans, name) for scans in runs])) for name in MatcherName),
+            *(_summary(runs, name) for name in MatcherName),
         ]
         for kind, runs in sessions.items()
     ]
 
 
-def _summary(errors: np.ndarray) -> str:
+def _summary(runs: List[List[Scan]], name: MatcherName) -> str:
+    errors = np.concatenate([session_errors(scans, name) for scans in runs])
     accepted = errors[errors[:, 0] > 0]
     median, most = np.quantile((accepted if len(accepted) else errors)[:, 1], [0.5, 0.95])
     return f"{len(accepted)} of {len(errors)}; {median:.2f} m, {most:.2f} m"
@@ -134,22 +136,28 @@ def _picture(pictures: Pictures, found: List[Fix]) -> str:
     return pictures.save(
         "three_moves",
         figure,
-        """The map before each scan (red and yellow cells), the echoes of the scan where the odometry puts them and where
-        the match puts them, and the true outlines (blue). Last: the frames `map` and `odom` after the first move, with
-        the vehicle as both see it. Compare with figures 7.7 to 7.10 of the thesis.""",
+        """The map before each scan (red cells), the echoes of the scan where the odometry puts them and where the match
+        puts them, and the true outlines (blue). Last: the frames `map` and `odom` after the first move, with the
+        vehicle as both see it. Compare with figures 7.7 to 7.10 of the thesis.""",
     )
 
 
 def _draw_fix(axes: Axes, fix: Fix, world: World, move: str) -> None:
+    gate = axes.inset_axes((0.55, 0.18, 0.44, 0.24))
+    for part, size in ((axes, 3.0), (gate, 7.0)):
+        _draw_echoes(part, fix, world, size)
+    x, y = fix.correction[:2]
+    title = f"{move}: correction {x:.3f}, {y:.3f} m, error {fix.result.error:.3f} m"
+    to_scale(axes, title, _REACH, (fix.result.pose[0], 0.0))
+    gate.set(aspect="equal", title="the gate", xlim=_GATE[0], ylim=_GATE[1], xticks=[], yticks=[])
+
+
+def _draw_echoes(axes: Axes, fix: Fix, world: World, size: float) -> None:
     draw_outlines(axes, world, "truth")
     draw_from_above(axes, fix.target, alpha=0.5)
     matched = corrected_points(fix.scan, fix.result)
-    axes.plot(*fix.scan.points[:, :2].T, ".", color=_BEFORE, markersize=3.0, label="as by the odometry")
-    axes.plot(*matched[:, :2].T, ".", color=_AFTER, markersize=3.0, label="as matched")
-    x, y = fix.correction[:2]
-    to_scale(
-        axes, f"{move}: correction {x:.3f}, {y:.3f} m, error {fix.result.error:.3f} m", _REACH, fix.result.pose[:2]
-    )
+    axes.plot(*fix.scan.points[:, :2].T, ".", color=_BEFORE, markersize=size, label="as by the odometry")
+    axes.plot(*matched[:, :2].T, ".", color=_AFTER, markersize=size, label="as matched")
 
 
 def _draw_frames(axes: Axes, fix: Fix) -> None:
@@ -160,7 +168,7 @@ def _draw_frames(axes: Axes, fix: Fix) -> None:
     _draw_axes(axes, fix.result.pose, "base_link, matched", _AFTER)
     axes.annotate("", correction[:2], (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": "#c2185b", "linewidth": 2.0})
     axes.legend(loc="upper left", fontsize="small")
-    to_scale(axes, "the correction is the transform from odom to map", 5.0, (3.5, 0.0))
+    to_scale(axes, "the correction is the transform from odom to map", 4.0, (3.0, 0.0))
 
 
 def _draw_axes(axes: Axes, pose: np.ndarray, name: str, colour: str) -> None:
