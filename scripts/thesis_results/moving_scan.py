@@ -41,18 +41,20 @@ def make(pictures: Pictures) -> str:
     first = found[MatcherName.DISTRIBUTIONS][0]
     return joined(
         prose(f"""The thesis reports no figures for scans taken in motion. Here the vehicle runs on a circle at
-        {SPEED:g} m/s and {turned:.0f} deg/s and never stops, while its odometry reports velocities that are
-        {100.0 * (1.0 - WRONG):.0f} % too small. A turn of the head takes {seconds:g} s: the vehicle moves
-        {SPEED * seconds:.1f} m and turns by {turned * seconds:.0f} degrees within a scan. {SEEDS} runs of {TURNS - 1} such
+        {SPEED:g} m/s and {turned:.0f} deg/s and never stops, while its odometry reports velocities that are {
+            100.0 * (1.0 - WRONG):.0f} % too small. A turn of the head takes {seconds:g} s: the vehicle moves {
+            SPEED * seconds:.1f} m and turns by {turned * seconds:.0f} degrees within a scan. {SEEDS} runs of {
+            TURNS - 1
+        } such
         scans, {_SHOWN_KIND}."""),
         _picture(pictures, runs[0], first),
         table(
             ["matcher", "accepted", "path, root mean square", "heading", "velocity"],
             [[f"`{name.value}`", *_summary(results)] for name, results in found.items()],
         ),
-        prose("""Root mean squares over all beams of a run, and the median of the runs; of all matches where none was
-        accepted. `DISTRIBUTIONS` finds pose and velocity together, `SEGMENTS` moves the segments of a scan, `GICP` moves
-        the scan as one piece."""),
+        prose("""Root mean squares over all beams of a run, and the median of the runs; of all matches where none
+        was accepted. `DISTRIBUTIONS` finds pose and velocity together, `SEGMENTS` moves the segments of a scan,
+        `GICP` moves the scan as one piece."""),
     )
 
 

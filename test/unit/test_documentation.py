@@ -58,8 +58,8 @@ def test_the_readme_stays_short():
 
 
 def test_every_picture_is_shown():
-    shown = {Path(link).name for path in PAGES for link in LINK.findall(path.read_text())}
-    assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} - shown == set()
+    shown = {(path.parent / link).resolve() for path in PAGES for link in LINK.findall(path.read_text())}
+    assert set((ROOT / "docs" / "pictures").rglob("*.png")) - shown == set()
 
 
 @pytest.mark.parametrize(
