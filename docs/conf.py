@@ -22,9 +22,10 @@ myst_heading_anchors = 4
 
 
 def _add_contents(_app, page, source):
-    """Give the first page the list of all pages, in the order in which it links to them."""
+    """Give the first page the list of all pages, in the order of its table of pages, which comes last."""
     if page == root_doc:
-        pages = [*dict.fromkeys(_PAGE.findall(source[0])), "migration/README", "CHANGELOG"]
+        linked = _PAGE.findall(source[0].rpartition("## Documentation")[2])
+        pages = [*dict.fromkeys(linked), "migration/README", "CHANGELOG"]
         source[0] += "\n\n```{toctree}\n:hidden:\n\n" + "\n".join(pages) + "\n```\n"
 
 
