@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, MOST_CROSSINGS, ROW_WIDTH, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
 from mlsm_manager.surface_map.large_array import LargeArray
-from mlsm_manager.surface_map.linkage import Intervals
+from mlsm_manager.surface_map.linkage import Extents, Intervals
 
 _MIN_ROWS = 1024
 """Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
@@ -59,9 +59,18 @@ class BlockStore:
         """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
         return self._index.slots(cells)
 
-    def stored(self, cells: np.ndarray, slots: np.ndarray) -> Intervals:
-        """Return all blocks of cells with keys `cells` (n,) at `slots` (n,)."""
-        return self._intervals(*self._followed(cells, self._index.heads[slots]))
+    def extents(self, cells: np.ndarray, slots: np.ndarray) -> Extents:
+        """Return those of all blocks of cells with keys `cells` (n,) at `slots` (n,)."""
+        owners, rows = self._followed(cells, self._index.heads[slots])
+        return Extents(owners, self._rows[rows, BOTTOM], self._rows[rows, TOP], rows)
+
+    def intervals(self, extents: Extents) -> Intervals:
+        """Return the blocks whose extents are known, with the statistics of their points."""
+        data = self._rows[extents.row]
+        return Intervals(
+            extents.cell, extents.bottom, extents.top, extents.row, data[:, COUNT], data[:, MEAN], data[:, SQUARES],
+            self._crossed[extents.row],
+        )  # fmt: skip
 
     def chains(self, slots: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return views of all rows and of the row that follows each in its cell, and the first rows of cells (n,)."""
@@ -127,8 +136,3 @@ class BlockStore:
             found_rows.append(row)
             found_owners.append(owners)
             row = self._next[row].astype(np.int64)
-
-    def _intervals(self, cells: np.ndarray, rows: np.ndarray) -> Intervals:
-        data = self._rows[rows]
-        mean, squares = data[:, MEAN], data[:, SQUARES]
-        return Intervals(cells, data[:, BOTTOM], data[:, TOP], data[:, COUNT], mean, squares, rows, self._crossed[rows])
