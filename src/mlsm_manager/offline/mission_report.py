@@ -39,6 +39,7 @@ def mission_of(
         parameters=parameters,
         uncertainty=None if found is None else _uncertainty(found),
         errors=errors,
+        further=run.further,
     )
 
 
