@@ -13,6 +13,8 @@ import yaml
 from heading_only import reduce_bag
 from map_bag_runs import BASIN, COMMAND, run, summary_of
 
+from mlsm_manager.surface_map.files.map_file import Layer, read_map
+
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 
@@ -58,6 +60,16 @@ def test_a_simulated_basin_is_mapped_where_it_is(basin):
     assert summary["corrected"]["mean"] < 0.1
     assert summary["refined"]["mean"] < 0.1
     assert summary["echoes"]["mode"] == "MATCHED_FILTER"
+
+
+def test_a_refined_map_has_free_space_between_the_vehicle_and_the_walls(basin):
+    layers = read_map(basin / "map.mlsm").layers
+    vehicle = np.loadtxt(str(basin / "refined.tum"))[:, 1:3]
+    free = {tuple(cell) for cell in layers[Layer.FREE].cells.tolist()}
+    walls = {tuple(cell) for cell in layers[Layer.SHOWN].cells.tolist()}
+    passed = {tuple(cell) for cell in np.floor(vehicle / layers[Layer.FREE].resolution).astype(int).tolist()}
+    assert len(passed & free) > 0.9 * len(passed)
+    assert len(walls & free) < 0.2 * len(walls)
 
 
 def test_each_trajectory_is_a_tum_file_too(basin):

@@ -17,15 +17,27 @@ pytest.importorskip("tf2_py")
 TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
 
 
-def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(tmp_path):
-    done = run(BASIN, BASIN, "--out", tmp_path)
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory):
+    """Return the folder of a run with the same recording twice."""
+    folder = tmp_path_factory.mktemp("twice")
+    done = run(BASIN, BASIN, "--out", folder)
     assert done.returncode == 0, done.stderr
-    summary = summary_of(tmp_path)
+    return folder
+
+
+def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(twice):
+    summary = summary_of(twice)
     (second,) = summary["sessions"]
     assert (second["found_after_scans"], second["matched"]) == (0, second["scans"])
-    first, second = (np.loadtxt(str(tmp_path / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
+    first, second = (np.loadtxt(str(twice / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
     assert np.hypot(*(first - second)[-20:, 4:6].T).max() < 0.5
-    assert read_map(tmp_path / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
+    assert read_map(twice / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
+
+
+def test_the_report_shows_the_way_of_each_recording(twice):
+    pytest.importorskip("plotly")
+    assert "corrected, basin.bag" in (twice / "report.html").read_text()
 
 
 def test_a_dask_cluster_prepares_further_recordings():
