@@ -1,14 +1,15 @@
 """Fits a whole run at once, starting from what the live solver found."""
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.association import blocks_of, pairs_between
+from mlsm_manager.multi_view.association import pairs_of
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -53,6 +54,7 @@ class _Batch:
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
         self._solution = None
+        self._lists: Optional[NeighbourLists] = None
 
     def step(self) -> float:
         """Take one Gauss-Newton step and return the largest move of a node along x or y [m]."""
@@ -62,7 +64,9 @@ class _Batch:
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
         points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
-        pairs = pairs_between(points, points, blocks_of(points, matching.block_scans), matching.cut, matching)
+        if self._lists is None:
+            self._lists = NeighbourLists(points, matching.block_scans)
+        pairs = pairs_of(self._lists, points, points, matching.cut, matching)
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
         self._solution = solution_of(equations)
         nodes = self._solution.step[: self._layout.run_start].reshape(-1, self._layout.width)
