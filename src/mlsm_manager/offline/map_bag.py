@@ -5,6 +5,7 @@ import time
 from argparse import Namespace
 from dataclasses import replace
 from functools import partial
+from itertools import cycle
 from pathlib import Path
 from typing import Any, Dict, List, Optional
 
@@ -26,6 +27,7 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import (
     CORRECTED,
+    FURTHER_COLORS,
     ODOMETRY,
     REFINED,
     REPORT,
@@ -38,7 +40,7 @@ from mlsm_manager.offline.run_files import (
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.report.mission import Mission
 from mlsm_manager.self_check.north_east_down import suspicions
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
 from recordings.inspection.report import report
@@ -155,7 +157,7 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
 
 def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
     with _bar(None, "", "refine"):
-        return refine(recording.track, replayed.scans, replayed.solver, parameters.resolution)
+        return refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
 
 
 def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Namespace) -> List[Session]:
@@ -189,8 +191,10 @@ def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session]
     counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
     if refined is not None:
         poses[REFINED] = refined.poses
-        stored = replace(stored, layers={Layer.SHOWN: refined.blocks})
-    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored)
+        stored = replace(stored, layers=refined.layers)
+    ways = [session.way(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
+    further = [way for way in ways if len(way.times)]
+    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, further=further)
 
 
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:

@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.live_solver import LiveSolver
