@@ -1,16 +1,15 @@
 """map_bag on the real marina: errors, speed, and what the run says of itself."""
 
 import json
-import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
 from typing import Any, Dict, List
 
+from benchmarks.recorded import ROOT, recorded
 from benchmarks.table import Row
 
-ROOT = Path(__file__).resolve().parents[2]
 NAME = "marina_first.bag"
 TRUTH = "/ground_truth"
 PUBLISHED = "whole run published: 3.99 matching, 1.90 SLAM"
@@ -18,10 +17,9 @@ PUBLISHED = "whole run published: 3.99 matching, 1.90 SLAM"
 
 def rows() -> List[Row]:
     """Return all figures; one line that says so where the recording is absent."""
-    folder = Path(os.environ.get("UMC_DATA", str(ROOT.parent / "shared/data")))
-    bag = folder / NAME
+    bag = recorded(NAME)
     if not bag.is_file():
-        return [("marina", "skipped", f"{NAME} is not in {folder}; set UMC_DATA")]
+        return [("marina", "skipped", f"{NAME} is not in {bag.parent}; set UMC_DATA")]
     plain, refined = _mapped(bag), _mapped(bag, "--refine")
     return [
         ("marina: scans, matched, rejected", f"{plain['scans']}, {plain['matched']}, {plain['rejected']}", ""),

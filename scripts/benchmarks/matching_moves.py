@@ -34,6 +34,12 @@ def odometry_path(times: np.ndarray) -> np.ndarray:
     return true_path(times) / [_SCALE, _SCALE, 1.0]
 
 
+def session_track() -> Track:
+    """Return the odometry of the moves."""
+    times = np.linspace(-1.0, _VEHICLE.duration, 2400)
+    return Track(times, odometry_path(times))
+
+
 def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
     """Return one scan per turn of the head; every second one sees a whole move."""
     return [
@@ -42,14 +48,20 @@ def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
     ]
 
 
+def session_mapper(name: MatcherName) -> Mapper:
+    """Return a mapper that matches with default parameters and knows how wrong the odometry may be."""
+    kind = MATCHERS[name]
+    mapper = Mapper(SETTINGS, ODOMETRY, kind.build(kind.parameters()))
+    mapper.matching = True
+    return mapper
+
+
 def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
     """Return (scans - 1, 5): accepted, distance [m] and angle [rad] from the truth, squared Mahalanobis distance, s.
 
     Where a match was not accepted, the pose is the one that the matcher offered.
     """
-    kind = MATCHERS[name]
-    mapper = Mapper(SETTINGS, ODOMETRY, kind.build(kind.parameters()))
-    mapper.matching = True
+    mapper = session_mapper(name)
     rows = []
     for scan in scans:
         update = mapper.take_echoes(scan)
@@ -65,8 +77,7 @@ def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
 def sessions(kind: SonarKind, first_seed: int = 0) -> Dict[MatcherName, np.ndarray]:
     """Return (SEEDS, scans, 5) of `session_errors` for each matcher; both see the same scans."""
     maker = ScanMaker("basin", kind)
-    times = np.linspace(-1.0, _VEHICLE.duration, 2400)
-    track = Track(times, odometry_path(times))
+    track = session_track()
     scans = [session_scans(maker, seed, track) for seed in range(first_seed, first_seed + SEEDS)]
     return {name: np.array([session_errors(session, name) for session in scans]) for name in MatcherName}
 

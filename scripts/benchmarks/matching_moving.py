@@ -8,15 +8,15 @@ from benchmarks.matching_moves import SETTINGS
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, still
 from benchmarks.table import Row
 from mlsm_manager.localisation.mapper import Mapper
-from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.problem.scan import Scan, Track
 from node_support.geometry.planar import wrapped
 
 SEEDS = 30
 TURNS = 5
-_SPEED, _TURN_RATE, _WRONG = 0.3, np.radians(2.0), 0.7
+SPEED, TURN_RATE, WRONG = 0.3, np.radians(2.0), 0.7
 _START = 16.0
 _ERRORS = OdometryErrors(scale_deviation=0.3, turn_rate_deviation=0.01, rate_time=600.0)
 
@@ -29,41 +29,62 @@ def circle(speed: float, turn_rate: float, times: np.ndarray) -> np.ndarray:
     return np.column_stack([radius * np.sin(yaw), radius * (1.0 - np.cos(yaw)), yaw])
 
 
-def run(maker: ScanMaker, seed: int) -> np.ndarray:
-    """Return (n, 3) squared errors of distance, yaw and speed at every beam of the matched scans; NaN if rejected."""
+def true_path(times: np.ndarray) -> np.ndarray:
+    """Return the true poses (n, 3)."""
+    return circle(SPEED, TURN_RATE, times)
 
-    def truth(times: np.ndarray) -> np.ndarray:
-        return circle(_SPEED, _TURN_RATE, times)
 
-    def odometry(times: np.ndarray) -> np.ndarray:
-        return circle(_SPEED * _WRONG, _TURN_RATE * _WRONG, times)
+def odometry_path(times: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) as the odometry has them."""
+    return circle(SPEED * WRONG, TURN_RATE * WRONG, times)
 
+
+def moving_scans(maker: ScanMaker, seed: int) -> List[Scan]:
+    """Return a scan at rest and those of the circle."""
     times = np.linspace(-1.0, 16.0 * (TURNS + 1), 2400)
-    track = Track(times, odometry(times))
-    mapper = Mapper(SETTINGS, _ERRORS, DistributionMatcher(DistributionMatcherParameters()))
+    track = Track(times, odometry_path(times))
+    first = maker.scan(still(np.zeros(3)), still(np.zeros(3)), 100 * seed, 0, track=track)
+    return [first] + [
+        maker.scan(true_path, odometry_path, 100 * seed + turn, turn, moving=True, track=track)
+        for turn in range(1, TURNS)
+    ]
+
+
+def moving_mapper(name: MatcherName) -> Mapper:
+    """Return a mapper that matches with default parameters and knows how wrong the odometry may be."""
+    kind = MATCHERS[name]
+    mapper = Mapper(SETTINGS, _ERRORS, kind.build(kind.parameters()))
     mapper.matching = True
-    mapper.take_echoes(maker.scan(still(np.zeros(3)), still(np.zeros(3)), 100 * seed, 0, track=track))
-    rows = []
-    for turn in range(1, TURNS):
-        scan = maker.scan(truth, odometry, 100 * seed + turn, turn, moving=True, track=track)
-        result = mapper.take_echoes(scan).result
-        if result is None or not result.accepted:
-            rows.append(np.full((1, 3), np.nan))
-            continue
-        difference = result.beam_poses - truth(result.beam_times)
-        speed = np.full(len(difference), np.hypot(*(result.velocity[:2] - [_SPEED, 0.0])))
-        squares = [(difference[:, :2] ** 2).sum(axis=1), wrapped(difference[:, 2]) ** 2, speed**2]
-        rows.append(np.column_stack(squares))
-    return np.concatenate(rows)
+    return mapper
+
+
+def matches(scans: List[Scan], name: MatcherName) -> List[MatchResult]:
+    """Return what came of matching all scans but the first one, which makes the map."""
+    mapper = moving_mapper(name)
+    mapper.take_echoes(scans[0])
+    return [mapper.take_echoes(scan).result for scan in scans[1:]]
+
+
+def squared_errors(result: MatchResult) -> np.ndarray:
+    """Return (n, 3) squared errors of distance, yaw and speed at every beam of a matched scan."""
+    difference = result.beam_poses - true_path(result.beam_times)
+    speed = np.full(len(difference), np.hypot(*(result.velocity[:2] - [SPEED, 0.0])))
+    return np.column_stack([(difference[:, :2] ** 2).sum(axis=1), wrapped(difference[:, 2]) ** 2, speed**2])
+
+
+def root_mean_square(results: List[MatchResult]) -> np.ndarray:
+    """Return (3,) root mean squares of the errors over all beams."""
+    return np.sqrt(np.concatenate([squared_errors(result) for result in results]).mean(axis=0))
 
 
 def moving_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
     """Return the figures of the moving scans."""
     maker = ScanMaker("basin", kind)
-    runs = [run(maker, seed) for seed in range(first_seed, first_seed + SEEDS)]
-    rejected = sum(int(np.isnan(squares[:, 0]).sum()) for squares in runs)
-    matched = [squares[np.isfinite(squares[:, 0])] for squares in runs]
-    errors = np.array([np.sqrt(squares.mean(axis=0)) for squares in matched if len(squares)])
+    seeds = range(first_seed, first_seed + SEEDS)
+    runs = [matches(moving_scans(maker, seed), MatcherName.DISTRIBUTIONS) for seed in seeds]
+    accepted = [[result for result in results if result.accepted] for results in runs]
+    rejected = sum(map(len, runs)) - sum(map(len, accepted))
+    errors = np.array([root_mean_square(results) for results in accepted if results])
     position, yaw, speed = np.median(errors, axis=0) if len(errors) else np.full(3, np.nan)
     title = f"moving 0.3 m/s, 2 deg/s, velocity 30 % wrong, basin, {kind}"
     return [

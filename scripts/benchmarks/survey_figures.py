@@ -2,7 +2,8 @@
 
 import itertools
 from pathlib import Path
-from typing import Dict, List
+from types import MappingProxyType
+from typing import List, Mapping
 
 import numpy as np
 import yaml
@@ -25,9 +26,11 @@ from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
 from sonar_simulator.world.sdf import load_sdf
+from sonar_simulator.world.world import World
 
 ROOT = Path(__file__).resolve().parents[2]
 RESOLUTION = 0.5
+NO_CHANGES: Mapping[str, object] = MappingProxyType({})
 FAN_BEAM = {"vertical_opening_deg": 22.0}
 T_WORLD_SONAR = pose_matrix((40.4, 8.0, -1.8))
 WORLD = load_sdf(ROOT / "worlds/basin.sdf").world
@@ -36,12 +39,16 @@ WORLD = load_sdf(ROOT / "worlds/basin.sdf").world
 class Survey:
     """One sweep of the servo in the default steps, through the default chain into a map; the vehicle stands still."""
 
-    def __init__(self, changes: Dict[str, object]) -> None:
-        """`changes`: of the head's parameters in yaml/sonar_simulator_survey.yaml."""
+    def __init__(
+        self, changes: Mapping[str, object], world: World = WORLD, T_world_sonar: np.ndarray = T_WORLD_SONAR,
+        echo_changes: Mapping[str, object] = NO_CHANGES,
+    ) -> None:  # fmt: skip
+        """`changes`, `echo_changes`: of the head and the echo model in yaml/sonar_simulator_survey.yaml."""
         settings = yaml.safe_load((ROOT / "yaml/sonar_simulator_survey.yaml").read_text())
         parameters = SonarParameters.from_mapping({**settings["sonar"], **changes})
-        model = make_echo_model("laser_cone", settings["laser_cone"])
-        self._sonar = Sonar(RayCaster(WORLD), parameters.pattern(), model, np.random.default_rng(1))
+        model = make_echo_model("laser_cone", {**settings["laser_cone"], **echo_changes})
+        self._sonar = Sonar(RayCaster(world), parameters.pattern(), model, np.random.default_rng(1))
+        self._T_world_sonar = T_world_sonar
         self._head = SonarHead(parameters.beams_per_turn, parameters.seconds_per_turn)
         self._servo = Servo(ServoParameters())
         health = Health("sonar_control", lambda _: None)
@@ -61,7 +68,7 @@ class Survey:
         return self._map.blocks
 
     def _take_beam(self, time: float, angle: float, tilt: float) -> None:
-        pose = tilted(T_WORLD_SONAR, tilt)
+        pose = tilted(self._T_world_sonar, tilt)
         strengths = self._sonar.ping(pose, angle)
         beam = Beam(round(1e9 * (1000.0 + time)), "sonar", angle, strengths, self._sonar.range_resolution, tilt)
         cloud = self._assembler.add(PlacedBeam(beam, pose, is_moving=False))
@@ -71,12 +78,12 @@ class Survey:
             self._map.insert(cloud.points[cloud.valid])
 
 
-def block_errors(blocks: Blocks) -> np.ndarray:
+def block_errors(blocks: Blocks, world: World = WORLD) -> np.ndarray:
     """Return (n,) the distance [m] from the world's surfaces of the worst of each block's mean, top and bottom."""
     middle = blocks.mean[:, :3]
     top, bottom = middle.copy(), middle.copy()
     top[:, 2], bottom[:, 2] = blocks.height, blocks.bottom
-    return np.max([distances(WORLD, points) for points in (middle, top, bottom)], axis=0)
+    return np.max([distances(world, points) for points in (middle, top, bottom)], axis=0)
 
 
 def share_rows(name: str, blocks: Blocks, wanted: str) -> List[Row]:

@@ -1,20 +1,18 @@
 """The tank of the real recording micron_static.bag, simulated, and how far the strengths of both are apart."""
 
-import os
-from pathlib import Path
 from typing import NamedTuple, Optional
 
 import numpy as np
-import rosbag
 import yaml
 
+from benchmarks.recorded import ROOT, recorded, recorded_beams
 from node_support.geometry.matrices import pose_matrix
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
 from sonar_simulator.world.world_file import load_world
 
-ROOT = Path(__file__).resolve().parents[2]
+RECORDING = "micron_static.bag"
 # The range bands whose histograms are compared. Nearer than half a metre stands a part of the vehicle.
 BANDS = np.arange(0.5, 10.01, 0.5)
 BEAMS_PER_TURN = 200
@@ -31,13 +29,10 @@ class Beams(NamedTuple):
 
 def recording() -> Optional[Beams]:
     """Return the recorded beams, None where the recording is not."""
-    path = Path(os.environ.get("UMC_DATA", str(ROOT.parent / "shared/data"))) / "micron_static.bag"
-    if not path.is_file():
+    if not recorded(RECORDING).is_file():
         return None
-    with rosbag.Bag(str(path)) as bag:
-        messages = [message for _, message, _ in bag.read_messages(["/sonar/raw"])]
-    strengths = np.array([np.frombuffer(message.intensities, dtype=np.uint8) for message in messages])
-    return Beams(np.array([message.angle for message in messages]), strengths)
+    beams = recorded_beams(RECORDING).beams
+    return Beams(np.array([beam.angle for beam in beams]), np.array([beam.intensities for beam in beams]))
 
 
 def simulated(angles: np.ndarray, model_name: str = "physical", seed: int = 1) -> Beams:

@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from benchmarks.triangle_distance import triangle_distances
 from sonar_simulator.world.world import Shape, World
 
 
@@ -16,6 +17,9 @@ def nearest_shape(world: World, points: np.ndarray) -> np.ndarray:
 
 
 def _distance(shape: Shape, points: np.ndarray) -> np.ndarray:
+    if shape.kind == "mesh":
+        vertices, faces = shape.triangles()
+        return triangle_distances(vertices[faces], points)
     local = (points - shape.pose[:3, 3]) @ shape.pose[:3, :3]
     if shape.kind == "sphere":
         return np.abs(np.linalg.norm(local, axis=1) - shape.size[0])

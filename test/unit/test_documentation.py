@@ -1,6 +1,8 @@
 """The documentation names only files, folders, headings and messages that exist."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -48,6 +50,16 @@ def test_every_link_of_a_page_leads_somewhere(page):
     assert broken == []
 
 
+def test_the_pages_build_to_a_site_without_a_warning(tmp_path):
+    for name in ("sphinx", "myst_parser", "furo"):
+        pytest.importorskip(name, reason=f"{name} is not installed")
+    options = ["-q", "-W", "--keep-going", "-n", "-b", "html", "-c", "docs", "-d", str(tmp_path / "cache")]
+    command = [sys.executable, "-m", "sphinx", *options, ".", str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=str(ROOT), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
+    assert (done.returncode, done.stdout) == (0, "")
+    assert {path.stem for path in (tmp_path / "site" / "docs").glob("*.html")} == {path.stem for path in DOCS}
+
+
 def test_the_readme_links_to_every_page():
     linked = set(LINK.findall((ROOT / "README.md").read_text()))
     assert {path.relative_to(ROOT).as_posix() for path in DOCS} - linked == set()
@@ -58,8 +70,8 @@ def test_the_readme_stays_short():
 
 
 def test_every_picture_is_shown():
-    shown = {Path(link).name for path in PAGES for link in LINK.findall(path.read_text())}
-    assert {path.name for path in (ROOT / "docs" / "pictures").iterdir()} - shown == set()
+    shown = {(path.parent / link).resolve() for path in PAGES for link in LINK.findall(path.read_text())}
+    assert set((ROOT / "docs" / "pictures").rglob("*.png")) - shown == set()
 
 
 @pytest.mark.parametrize(

@@ -83,6 +83,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)
     replayed = _replayed(recording, scans, parameters)
+    _tell_of_refused(replayed, options)
     refined = _refined(recording, replayed, parameters) if options.refine else None
     found = None if replayed.solver is None else Found.of(replayed, refined)
     known = parameters if found is None else found.calibration.applied(parameters)
@@ -151,6 +152,14 @@ def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParamet
         return replay(recording, scans, parameters, bar.update)
 
 
+def _tell_of_refused(replayed: Replayed, options: Namespace) -> None:
+    """Say which scans were left out. Raises RecordingError where no scan is left."""
+    for reason, count in replayed.refused.items():
+        print(f"map_bag: {options.bags[0]}: left out {count} {reason}", file=sys.stderr)
+    if not replayed.updates:
+        raise RecordingError(f"{options.bags[0]}: not one of {sum(replayed.refused.values())} scans could be used")
+
+
 def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
     return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
 
@@ -188,7 +197,12 @@ def _poses(replayed: Replayed) -> Dict[str, np.ndarray]:
 def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
     poses = _poses(replayed)
     stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
-    counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
+    counts = {
+        "scans": len(replayed.scans),
+        "matched": replayed.matched,
+        "rejected": replayed.rejected,
+        "left_out": dict(replayed.refused),
+    }
     if refined is not None:
         poses[REFINED] = refined.poses
         stored = replace(stored, layers=refined.layers)

@@ -19,6 +19,8 @@ from mlsm_manager.surface_map.files.map_file import StoredMap
 from recordings.errors import RecordingError
 from sonar_processing.beams.beam_correction import BeamCorrection
 
+# A cluster in the same network answers within a second, a busy one within a few.
+CLUSTER_TIMEOUT = 10.0
 Prepared = Tuple[Recording, List[Scan]]
 Reader = Callable[[Path], Recording]
 """Reads a recording; a function at the top of a module or a partial of one, so that other processes can call it."""
@@ -97,7 +99,7 @@ def executor_for(jobs: int, scheduler: Optional[str]) -> Iterator[Executor]:
     except ImportError:
         raise RecordingError("--scheduler needs Dask; install it with: apt install python3-distributed") from None
     try:
-        client = Client(scheduler, timeout=10)
+        client = Client(scheduler, timeout=CLUSTER_TIMEOUT)
     except (OSError, ValueError) as error:
         raise RecordingError(f"--scheduler {scheduler}: {error or 'cannot be reached'}") from None
     with client, client.get_executor() as executor:

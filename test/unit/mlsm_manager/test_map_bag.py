@@ -10,7 +10,8 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 import yaml
-from map_bag_runs import BASIN, COMMAND, ROOT, run, summary_of
+from heading_only import reduce_bag
+from map_bag_runs import BASIN, COMMAND, run, summary_of
 
 from mlsm_manager.surface_map.files.map_file import Layer, read_map
 
@@ -92,7 +93,7 @@ def test_what_it_found_is_what_another_run_knows_beforehand(basin, tmp_path):
 
 def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path):
     bag, folder = tmp_path / "heading.bag", tmp_path / "out"
-    subprocess.run([str(ROOT / "scripts/heading_only"), str(BASIN), str(bag)], check=True)
+    reduce_bag(BASIN, bag, odom_frame="odom", base_frame="base_link")
     done = run(bag, "--out", folder)
     assert done.returncode == 0, done.stderr
     assert "odometry: heading, because the position never changes, the heading by" in done.stdout

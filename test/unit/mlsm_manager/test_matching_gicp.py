@@ -11,6 +11,7 @@ from made_scans import harbour, map_of, prior_of_pose, scan_of, still
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.matchers.parameters import GicpMatcherParameters
 from mlsm_manager.matching.problem.result import MatchStatus, corrected_points
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed
 from node_support.parameters import ParameterError
 
@@ -49,6 +50,14 @@ def test_the_covariance_is_that_of_a_pose_and_shrinks_with_the_points():
     for result in (first, second):
         assert (np.linalg.eigvalsh(result.covariance[:3, :3]) > 0.0).all()
     assert np.trace(second.covariance[:2, :2]) < np.trace(first.covariance[:2, :2])
+
+
+def test_a_map_that_grows_is_matched_like_a_copy_of_its_blocks():
+    growing = MultiLevelSurfaceMap(0.5)
+    growing.insert(scan_of(harbour(), still()).points)
+    scan = scan_of(harbour(), still())
+    ours, wanted = (match(scan, target, [0.5, -0.3, 0.04]) for target in (growing, growing.blocks))
+    np.testing.assert_array_equal(ours.pose, wanted.pose)
 
 
 def test_too_few_points_leave_the_prior():

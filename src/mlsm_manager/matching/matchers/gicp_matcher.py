@@ -14,7 +14,7 @@ from mlsm_manager.matching.matchers.parameters import GicpMatcherParameters
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.matching.problem.state import POSE
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 from node_support.open3d_library import HOW_TO_INSTALL
 from node_support.parameters import ParameterError
@@ -40,9 +40,10 @@ class GicpMatcher:
         except ImportError:
             raise ParameterError(f"matcher = GICP: needs Open3D; install it with: {HOW_TO_INSTALL}") from None
 
-    def match(self, scan: Scan, target: Blocks, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
+        target = all_of(target)
         fewest = self.parameters.min_points
         if len(scan) < fewest or len(target) < fewest:
             reason = f"{len(scan)} points and {len(target)} blocks, must be {fewest} or more"

@@ -1,0 +1,180 @@
+"""7.4: the thesis's three moves, with an odometry that is 30 % off."""
+
+from dataclasses import dataclass
+from typing import Dict, List, Sequence, Tuple
+
+import numpy as np
+from benchmarks.basin_scans import ROOT
+from benchmarks.matching_moves import (
+    SEEDS,
+    odometry_path,
+    session_errors,
+    session_mapper,
+    session_scans,
+    session_track,
+    true_path,
+)
+from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
+from matplotlib.axes import Axes
+
+from mlsm_manager.matching.matchers.matcher_table import MatcherName
+from mlsm_manager.matching.problem.result import MatchResult, corrected_points
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.blocks import Blocks
+from sonar_simulator.world.world import World
+from sonar_simulator.world.world_file import load_world
+from thesis_results.block_views import draw_from_above
+from thesis_results.markdown import joined, prose, table
+from thesis_results.pictures import Pictures, new_figure, to_scale
+from thesis_results.world_views import draw_outlines
+
+MOVES = ("4 m on x", "4 m on x and 3 m on y", "then -8 m on x")
+"""As the odometry sees them."""
+PUBLISHED = ((1.348, 0.001), (0.851, 0.781), (-1.197, 0.618))
+"""The corrections [m] of figures 7.7 to 7.9 of the thesis."""
+AT_REST = (2, 4, 6)
+"""Turns of the head during which the vehicle rests after each move."""
+SHOWN = MatcherName.DISTRIBUTIONS
+_SHARP, _THESIS = KINDS[0], KINDS[2]
+_REACH = 29.0  # m: both long walls and the gate are in the picture
+_BEFORE, _AFTER = "#d32f2f", "#2e7d32"
+_GATE = (9.0, 15.0), (-1.7, 1.7)  # m, what the inset shows
+_ARROW = 1.0  # m
+
+
+@dataclass(frozen=True)
+class Fix:
+    """One match after a move, and the map that the scan was matched with."""
+
+    scan: Scan
+    result: MatchResult
+    target: Blocks
+
+    @property
+    def correction(self) -> np.ndarray:
+        """(3,) T_map_odom that the matcher found, accepted or not."""
+        return self.result.correction(self.scan)
+
+
+def wanted(scan: Scan) -> np.ndarray:
+    """Return the correction (2,) m that would be right: from where the odometry is to where the vehicle is."""
+    time = np.array([scan.reference_time])
+    return (true_path(time) - odometry_path(time))[0, :2]
+
+
+def fixes(scans: Sequence[Scan], name: MatcherName) -> List[Fix]:
+    """Return the matches after each of the moves."""
+    mapper, found = session_mapper(name), []
+    for turn, scan in enumerate(scans):
+        target = mapper.matched.blocks
+        update = mapper.take_echoes(scan)
+        if turn in AT_REST:
+            found.append(Fix(scan, update.result, target))
+    return found
+
+
+def make(pictures: Pictures) -> str:
+    """Return the section."""
+    track, sessions = session_track(), {}
+    for kind in (_SHARP, _THESIS):
+        maker = ScanMaker("basin", kind)
+        sessions[kind] = [session_scans(maker, seed, track) for seed in range(SEEDS)]
+    found = {name: fixes(sessions[_SHARP][0], name) for name in MatcherName}
+    return joined(
+        prose("""The vehicle makes the moves of the thesis in the basin: 4 m on x, 3 m on y and -8 m on x as the
+        odometry sees them, and 30 % more in truth. After each move the vehicle rests for a scan, which is matched
+        with the map of the scans before. `DISTRIBUTIONS` is the default, `SEGMENTS` the thesis's own matcher
+        without the faults of its code, `GICP` Open3D's. The thesis published one run."""),
+        _picture(pictures, found[SHOWN]),
+        "Corrections of one run, x and y in metres, and how far they are from the wanted ones:",
+        table(["move", "wanted", "thesis", *(f"`{name.value}`" for name in MatcherName)], _corrections(found)),
+        prose(f"""All scans after the first one, also those taken during the moves, of {SEEDS} runs with other
+        noise: how many were accepted, and how far the positions were off, median and 95 % (of all matches where
+        none was accepted):"""),
+        table(["", *(f"`{name.value}`" for name in MatcherName)], _many_runs(sessions)),
+    )
+
+
+def _corrections(found: Dict[MatcherName, List[Fix]]) -> List[List[str]]:
+    rows = []
+    for number, move in enumerate(MOVES):
+        right = wanted(found[SHOWN][number].scan)
+        cells = [_cell(one[number].correction[:2], right, one[number].result.accepted) for one in found.values()]
+        rows.append([move, f"{right[0]:.2f}, {right[1]:.2f}", _cell(np.array(PUBLISHED[number]), right, True), *cells])
+    return rows
+
+
+def _cell(correction: np.ndarray, right: np.ndarray, accepted: bool) -> str:
+    off = np.hypot(*(correction - right))
+    return f"{correction[0]:.2f}, {correction[1]:.2f}: {off:.2f} m off" + ("" if accepted else ", rejected")
+
+
+def _many_runs(sessions: Dict[SonarKind, List[List[Scan]]]) -> List[List[str]]:
+    return [
+        [
+            str(kind),
+            *(_summary(runs, name) for name in MatcherName),
+        ]
+        for kind, runs in sessions.items()
+    ]
+
+
+def _summary(runs: List[List[Scan]], name: MatcherName) -> str:
+    errors = np.concatenate([session_errors(scans, name) for scans in runs])
+    accepted = errors[errors[:, 0] > 0]
+    median, most = np.quantile((accepted if len(accepted) else errors)[:, 1], [0.5, 0.95])
+    return f"{len(accepted)} of {len(errors)}; {median:.2f} m, {most:.2f} m"
+
+
+def _picture(pictures: Pictures, found: List[Fix]) -> str:
+    world = load_world(ROOT / "worlds/basin.sdf").world
+    figure, axes = new_figure(12.5, 12.0, 2, 2)
+    for cell, fix, move in zip(axes.ravel(), found, MOVES):
+        _draw_fix(cell, fix, world, move)
+    _draw_frames(axes[1, 1], found[0])
+    axes[0, 0].legend(loc="upper left", fontsize="small", markerscale=3.0)
+    return pictures.save(
+        "three_moves",
+        figure,
+        """The map before each scan (red cells), the echoes of the scan where the odometry puts them and where the match
+        puts them, and the true outlines (blue). Last: the frames `map` and `odom` after the first move, with the
+        vehicle as both see it. Compare with figures 7.7 to 7.10 of the thesis.""",
+    )
+
+
+def _draw_fix(axes: Axes, fix: Fix, world: World, move: str) -> None:
+    gate = axes.inset_axes((0.55, 0.18, 0.44, 0.24))
+    for part, size in ((axes, 3.0), (gate, 7.0)):
+        _draw_echoes(part, fix, world, size)
+    x, y = fix.correction[:2]
+    title = f"{move}: correction {x:.3f}, {y:.3f} m; residual {fix.result.error:.3f} m"
+    to_scale(axes, title, _REACH, (fix.result.pose[0], 0.0))
+    gate.set(aspect="equal", title="the gate", xlim=_GATE[0], ylim=_GATE[1], xticks=[], yticks=[])
+
+
+def _draw_echoes(axes: Axes, fix: Fix, world: World, size: float) -> None:
+    draw_outlines(axes, world, "truth")
+    draw_from_above(axes, fix.target, alpha=0.5)
+    matched = corrected_points(fix.scan, fix.result)
+    axes.plot(*fix.scan.points[:, :2].T, ".", color=_BEFORE, markersize=size, label="as by the odometry")
+    axes.plot(*matched[:, :2].T, ".", color=_AFTER, markersize=size, label="as matched")
+
+
+def _draw_frames(axes: Axes, fix: Fix) -> None:
+    odometry, correction = fix.scan.reference_pose, fix.correction
+    _draw_axes(axes, np.zeros(3), "map", "k")
+    _draw_axes(axes, correction, "odom", "#777777")
+    _draw_axes(axes, odometry, "base_link, by the odometry in map", _BEFORE)
+    _draw_axes(axes, fix.result.pose, "base_link, matched", _AFTER)
+    axes.annotate("", correction[:2], (0.0, 0.0), arrowprops={"arrowstyle": "->", "color": "#c2185b", "linewidth": 2.0})
+    axes.legend(loc="upper left", fontsize="small")
+    to_scale(axes, "the correction is the transform from odom to map", 4.0, (3.0, 0.0))
+
+
+def _draw_axes(axes: Axes, pose: np.ndarray, name: str, colour: str) -> None:
+    ends: Tuple[np.ndarray, ...] = tuple(
+        _ARROW * np.array([np.cos(pose[2] + turn), np.sin(pose[2] + turn)]) for turn in (0.0, np.pi / 2.0)
+    )
+    for number, end in enumerate(ends):
+        axes.plot(*np.array([pose[:2], pose[:2] + end]).T, color=colour, label=name if number == 0 else None)
+    axes.plot(*pose[:2], "o", color=colour)
