@@ -8,7 +8,8 @@ from scipy.stats import chi2
 
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind
 from benchmarks.table import Row
-from mlsm_manager.localisation.mapper import Mapper, MapSettings
+from mlsm_manager.localisation.map_layers import MapSettings
+from mlsm_manager.localisation.mapper import Mapper
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Scan, Track

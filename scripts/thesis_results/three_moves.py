@@ -147,7 +147,7 @@ def _draw_fix(axes: Axes, fix: Fix, world: World, move: str) -> None:
     for part, size in ((axes, 3.0), (gate, 7.0)):
         _draw_echoes(part, fix, world, size)
     x, y = fix.correction[:2]
-    title = f"{move}: correction {x:.3f}, {y:.3f} m, error {fix.result.error:.3f} m"
+    title = f"{move}: correction {x:.3f}, {y:.3f} m; residual {fix.result.error:.3f} m"
     to_scale(axes, title, _REACH, (fix.result.pose[0], 0.0))
     gate.set(aspect="equal", title="the gate", xlim=_GATE[0], ylim=_GATE[1], xticks=[], yticks=[])
 

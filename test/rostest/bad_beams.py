@@ -83,7 +83,7 @@ class BadBeams(unittest.TestCase):
         self.expect_a_scan()
 
     def test_3_beams_whose_transform_never_comes_are_dropped(self) -> None:
-        """At most 120 wait; the rest is counted, and other frames go on."""
+        """After 5 s all but 120 are counted, and other frames go on."""
         for _ in range(150):
             self.send(frame="nowhere")
         self.diagnostics.wait_for("sonar_to_cloud", "beams without transform", 30)

@@ -8,16 +8,15 @@ import unittest
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import Field
 from enum import Enum
-from pathlib import Path
 from typing import Any, Dict, List, Tuple
 
 import rospy
 import rostest
 from dynamic_reconfigure.client import Client
-from graph import Diagnostics
+from graph import PACKAGE_ROOT, Diagnostics
 
 PACKAGE = "underwater_map_construction"
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
 
 from document import LIVE_NODES  # noqa: E402
 
@@ -67,7 +66,7 @@ def bad_values(field: Field) -> List[Any]:
 def start(case: Tuple[int, Tuple[str, str]]) -> "subprocess.CompletedProcess[str]":
     """Run a node that must end by itself."""
     number, (node, parameter) = case
-    command = ["rosrun", PACKAGE, node, f"__name:=bad_start_{number}", f"_{parameter}"]
+    command = [str(PACKAGE_ROOT / "nodes" / node), f"__name:=bad_start_{number}", f"_{parameter}"]
     if node in HOSTS:
         # Else it would take the services of the nodes that it hosts from those that run.
         command.append("__ns:=elsewhere")

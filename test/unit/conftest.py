@@ -1,5 +1,9 @@
+import os
 import sys
 from pathlib import Path
+
+# As the programs do, before anything loads numpy: the matrices are small, and threads would wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from hypothesis import settings
 
@@ -7,7 +11,8 @@ ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
 # Last, so that none of the rostests' modules hides another module.
 sys.path.append(str(ROOT / "test" / "rostest"))
-# What the tests of several drivers share.
+# What tests of several packages share, and those of several drivers.
+sys.path.append(str(Path(__file__).resolve().parent))
 sys.path.append(str(ROOT / "test" / "unit" / "sonar_driver"))
 
 settings.register_profile("repeatable", derandomize=True, deadline=None)

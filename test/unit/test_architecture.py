@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+from functools import lru_cache
 from pathlib import Path
 
 import pytest
@@ -56,10 +57,16 @@ def _modules(package):
     return {".".join(name.parts).replace(".__init__", ""): path for name, path in zip(names, paths)}
 
 
+@lru_cache(maxsize=None)
+def _import_statements(path):
+    tree = ast.parse(path.read_text(), feature_version=(3, 8))
+    return [node for node in ast.walk(tree) if isinstance(node, (ast.Import, ast.ImportFrom))]
+
+
 def _imported(path):
     """Return the top-level names that a file imports, wherever in it."""
     names = set()
-    for node in ast.walk(ast.parse(path.read_text(), feature_version=(3, 8))):
+    for node in _import_statements(path):
         if isinstance(node, ast.Import):
             names |= {alias.name.split(".")[0] for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:
@@ -70,7 +77,7 @@ def _imported(path):
 def _imported_modules(path):
     """Return the names of our modules that a file imports, wherever in it."""
     found = set()
-    for node in ast.walk(ast.parse(path.read_text(), feature_version=(3, 8))):
+    for node in _import_statements(path):
         if isinstance(node, ast.Import):
             found |= {alias.name for alias in node.names}
         elif isinstance(node, ast.ImportFrom) and not node.level:

@@ -4,24 +4,23 @@ import dataclasses
 import os
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 from document import LIVE_NODES, START_UP_NODES
+from programs import ROOT, run_program
 
 from node_support.node_help import WIDTH
 from node_support.node_table import HOSTS, NODES
 from sonar_simulator.simulation.simulation_setup import GROUPS
 
-ROOT = Path(__file__).resolve().parents[2]
 EXECUTABLES = sorted(path.name for path in (ROOT / "nodes").iterdir())
 PARAMETERS = {**{name: node.parameters for name, node in LIVE_NODES.items()}, **START_UP_NODES}
 
 
 def _help(node, *arguments):
-    environment = {**os.environ, "ROS_MASTER_URI": "http://localhost:1"}
-    command = [sys.executable, str(ROOT / "nodes" / node), *arguments]
-    return subprocess.run(command, env=environment, capture_output=True, text=True, timeout=30, check=True)
+    done = run_program(node, *arguments, ROS_MASTER_URI="http://localhost:1")
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 @pytest.fixture(scope="module", params=EXECUTABLES)

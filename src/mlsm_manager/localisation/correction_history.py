@@ -19,14 +19,14 @@ _SLACK = 0.5
 
 @dataclass(frozen=True)
 class _Stretch:
-    """times: (b,) s. corrections: (b, 3) T_map_odom. positions: (b, 2) m, of base_link in map.
+    """times: (b,) s. corrections: (b, 3) T_map_odom. poses: (b, 3) T_map_base.
 
     holds: whether the scan of this time was placed in the map.
     """
 
     times: np.ndarray
     corrections: np.ndarray
-    positions: np.ndarray
+    poses: np.ndarray
     holds: bool
 
 
@@ -53,7 +53,7 @@ class CorrectionHistory:
     def add(self, times: np.ndarray, poses: np.ndarray, track: Track, holds: bool) -> None:
         """Add the path T_map_base `poses` (b, 3) at increasing `times` (b,)."""
         corrections = composed(poses, inverse(track.at(times)))
-        self._stretches.append(_Stretch(times, corrections, poses[:, :2], holds))
+        self._stretches.append(_Stretch(times, corrections, poses, holds))
 
     def placed(self, cloud: TimedPoints) -> PlacedPoints:
         """Return the points of `cloud` in map, without those whose time has no place.
@@ -71,12 +71,16 @@ class CorrectionHistory:
         path = np.column_stack([np.interp(chosen, times, corrections[:, axis]) for axis in range(3)])
         return PlacedPoints(transformed(path, cloud.points[keep]), chosen, int(np.count_nonzero(~keep)))
 
-    def positions(self, times: np.ndarray) -> Optional[np.ndarray]:
-        """Return where the vehicle was in map at `times` (n,), (n, 2) m; None where not all of them are known."""
+    def origins(self, times: np.ndarray, sonar_in_base: np.ndarray) -> Optional[np.ndarray]:
+        """Return where a sonar at (2,) m in base_link was in map at `times` (n,), (n, 2) m.
+
+        None where not all of them are known.
+        """
         if not self._stretches or not len(times):
             return None
         known = np.concatenate([stretch.times for stretch in self._stretches])
         if times.min() < known[0] - _SLACK or times.max() > known[-1] + _SLACK:
             return None
-        positions = np.concatenate([stretch.positions for stretch in self._stretches])
-        return np.column_stack([np.interp(times, known, positions[:, axis]) for axis in range(2)])
+        poses = np.concatenate([stretch.poses for stretch in self._stretches])
+        places = transformed(poses, np.broadcast_to(sonar_in_base, (len(poses), 2)))
+        return np.column_stack([np.interp(times, known, places[:, axis]) for axis in range(2)])

@@ -7,38 +7,38 @@ from typing import Deque, List, Mapping, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
-from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.localisation.keyframe_map import Drawn, KeyframeMap
-from mlsm_manager.localisation.mapper import (
-    MOST_WAITING,
-    NOTHING_INSERTED,
-    CloudUpdate,
-    LayerCopies,
-    MapSettings,
-    ScanUpdate,
+from mlsm_manager.localisation.joint_belief import (
+    belief_at,
+    belief_of,
+    belief_of_match,
+    correction_of,
+    match_of,
+    path_times,
 )
+from mlsm_manager.localisation.joint_maps import JointMaps
+from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.localisation.keyframe_map import Drawn
+from mlsm_manager.localisation.map_layers import MapSettings
+from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of
-from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
+from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
-from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.matching.problem.state import POSE
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS
+from mlsm_manager.multi_view.state import POSE_COLUMNS
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed, inverse, transformed, wrapped
+from node_support.geometry.planar import composed, transformed
 
-# Points of the path within a scan: about one per second of a slow head's revolution.
-_PATH_POINTS = 17
 # Scans of a run that are stored with each save: some hours, and some tens of megabytes.
 _MOST_STORED = 500
 _ORIGIN = np.zeros(3)
@@ -69,16 +69,10 @@ class JointMapper:
         self._session: Optional[JointSession] = None
         self.clear()
 
-    def _new_maps(self) -> Tuple[KeyframeMap, KeyframeMap]:
-        """Return the map that is shown and the one that is matched with, which shows nobody what may still change."""
-        own = self.settings
-        shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.kernel, own.carver)
-        return shown, KeyframeMap(own.match_resolution, own.limit, 0, own.kernel, own.carver, most_followed=0)
-
     def clear(self) -> None:
         """Forget the map and the place in it."""
         self._session = None
-        self._shown, self._matched = self._new_maps()
+        self._maps = JointMaps(self.settings)
         self.forget_place()
 
     def forget_place(self) -> None:
@@ -119,44 +113,38 @@ class JointMapper:
     @property
     def blocks(self) -> Blocks:
         """The map that is shown."""
-        return self._shown.map.blocks
+        return self._maps.shown.map.blocks
 
     @property
     def block_count(self) -> int:
         """Number of blocks of the map that is shown."""
-        return len(self._shown.map)
+        return len(self._maps.shown.map)
 
     @property
     def target(self) -> BlockSource:
         """The map in which a lost vehicle is searched."""
-        return self._matched.map
+        return self._maps.matched.map
 
     @property
     def layers(self) -> Mapping[Layer, Blocks]:
         """Copies of all maps, to be stored, each made when it is asked for."""
-        maps = {Layer.SHOWN: self._shown.map, Layer.MATCHED: self._matched.map, Layer.FREE: self._shown.free}
-        return LayerCopies(maps)
+        return self._maps.layers
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
-        return self._shown.map.in_box(low, high)
+        return self._maps.shown.map.in_box(low, high)
 
     def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
         """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
-        tiles = self._shown.map.take_changed_tiles()
-        return tiles, self._shown.map.in_tiles(tiles)
+        return self._maps.changed_tiles()
 
     @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
         """What `restore` needs to go on with the present run, as arrays; none without a run or after a long one."""
-        session, shown = self._session, self._shown
+        session = self._session
         if session is None or len(session.scans) > _MOST_STORED:
             return {}
-        run = StoredRun(
-            session.T_map_odom, session.scans, session.solver.stored(), shown.moving, shown.covered,
-            self._matched.covered,
-        )  # fmt: skip
-        return run.arrays()
+        return self._maps.stored(session).arrays()
 
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
         """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
@@ -174,29 +162,16 @@ class JointMapper:
             self._take(layers)
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
-        shown, matched = self._new_maps()
-        blocks = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
-        shown.map.insert_blocks(blocks)
-        matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
-        if Layer.FREE in layers:
-            shown.free.restore(layers[Layer.FREE])
+        maps = JointMaps.of_layers(self.settings, layers)
         self.forget_place()
-        self._shown, self._matched = shown, matched
+        self._maps = maps
 
     def _resume_run(self, run: StoredRun) -> None:
         """Go on with a stored run in the maps that were stored with it."""
         session = JointSession.resumed(self.parameters, self._sonar_in_base, run.T_map_odom, run.scans, run.solver)
-        run.shown.uncover(self._shown.map)
-        run.matched.uncover(self._matched.map)
-        for scan in run.scans:
-            if scan.reference_time > session.settled_until:
-                self._matched.add(TimedPoints.of_scan(scan))
-        for cloud in run.clouds:
-            self._shown.add(cloud)
+        self._maps.resume(run, session)
         self._session = session
-        self._shown.draw(session, session.settled_until)
-        self._matched.draw(session, session.settled_until)
-        self._know(run.scans[-1], session.solver.estimates[-1])
+        self._know(run.scans[-1], session)
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
         """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
@@ -213,7 +188,7 @@ class JointMapper:
         """Go on with a scan that fits to the map about where it is expected; any other is rejected."""
         theta = np.concatenate([composed(self.correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
         prior = prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
-        result = self.matcher.match(scan, self._matched.map, prior)
+        result = self.matcher.match(scan, self._maps.matched.map, prior)
         if not result.accepted:
             return ScanUpdate(scan, result, False, self.belief)
         if self._session is None:
@@ -228,10 +203,7 @@ class JointMapper:
         self._found_at = scan.start
         self.correction = result.correction(scan)
         self._start = np.sqrt(np.diag(result.covariance)[POSE])
-        theta = np.concatenate([result.pose, np.zeros(STATES - POSE_COLUMNS)])
-        covariance = self.errors.covariance()
-        covariance[POSE, POSE] = result.covariance[POSE, POSE]
-        self.belief = Belief(scan.reference_time, theta, covariance)
+        self.belief = belief_of_match(scan, result, self.errors)
         return ScanUpdate(scan, result, True, self.belief)
 
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
@@ -240,7 +212,7 @@ class JointMapper:
         One from before the place was found is left out: nobody knows how far the odometry strayed until then.
         """
         if not self.matching:
-            return self._show(cloud, self.correction, self._history.positions(cloud.times))
+            return self._show(cloud, self.correction, self._history.origins(cloud.times, self._sonar_in_base))
         if cloud.end <= self._found_at:
             return CloudUpdate(NOTHING_INSERTED, False, len(cloud))
         if self._session is not None and cloud.end <= self._session.start:
@@ -248,16 +220,16 @@ class JointMapper:
         if self._session is None or cloud.end > self._session.solver.log.node_times[-1]:
             self._waiting.append(cloud)
             return CloudUpdate(NOTHING_INSERTED, True, 0)
-        self._shown.add(cloud)
-        return _cloud_update(self._shown.draw(self._session, self._session.settled_until))
+        self._maps.shown.add(cloud)
+        return _cloud_update(self._maps.shown.draw(self._session, self._session.settled_until))
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""
-        return CloudUpdate(self._shown.insert(points), False, 0)
+        return CloudUpdate(self._maps.shown.insert(points), False, 0)
 
     def _show(self, cloud: TimedPoints, T_map_odom: np.ndarray, origins: Optional[np.ndarray]) -> CloudUpdate:
         points = transformed(T_map_odom, cloud.points)
-        return _cloud_update(self._shown.insert_cloud(points, cloud.times, origins))
+        return _cloud_update(self._maps.shown.insert_cloud(points, cloud.times, origins))
 
     def take_waiting(self) -> Optional[CloudUpdate]:
         """Insert the next cloud that waited, if its time is known now; None when there is none."""
@@ -281,75 +253,40 @@ class JointMapper:
         session = self._session or self._new_session()
         estimate = session.add(scan)
         self._session = session
-        self._matched.add(TimedPoints.of_scan(scan))
-        self._matched.draw(session, session.settled_until)
-        self._know(scan, estimate)
+        self._maps.matched.add(TimedPoints.of_scan(scan))
+        self._maps.matched.draw(session, session.settled_until)
+        self._know(scan, session)
         if not estimate.comparisons:
             return ScanUpdate(scan, None, True, self.belief)
-        return ScanUpdate(scan, self._result(scan, estimate, perf_counter() - start), True, self.belief)
+        result = match_of(scan, estimate, self.belief, session, perf_counter() - start)
+        return ScanUpdate(scan, result, True, self.belief)
 
-    def _know(self, scan: Scan, estimate: LiveEstimate) -> None:
-        self.correction = _correction(estimate.T_map_base, scan)
-        self.belief = self._belief(estimate)
+    def _know(self, scan: Scan, session: JointSession) -> None:
+        newest = session.solver.estimates[-1]
+        self.correction = correction_of(newest.T_map_base, scan)
+        self.belief = belief_of(newest, self.errors)
 
     def _place(self, scan: Scan) -> ScanUpdate:
         self._end_session()
         pose = composed(self.correction, scan.reference_pose)
-        theta = np.concatenate([pose, np.zeros(STATES - POSE_COLUMNS)])
-        self.belief = Belief(scan.reference_time, theta, self.errors.covariance())
-        times = np.linspace(scan.start, scan.reference_time, _PATH_POINTS)
+        self.belief = belief_at(scan.reference_time, pose, self.errors)
+        times = path_times(scan.start, scan.reference_time)
         self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
-        points = transformed(self.correction, scan.points)
-        self._matched.insert_cloud(points, scan.times, self._history.positions(scan.times))
+        origins = self._history.origins(scan.times, self._sonar_in_base)
+        self._maps.matched.insert_cloud(transformed(self.correction, scan.points), scan.times, origins)
         return ScanUpdate(scan, None, True, self.belief)
 
     def _new_session(self) -> JointSession:
-        known = KnownSurfaces(self._matched.map.blocks.mean[:, :2]) if len(self._matched.map) else None
+        matched = self._maps.matched.map
+        known = KnownSurfaces(matched.blocks.mean[:, :2]) if len(matched) else None
         solver = LiveSolver(self.parameters, self._sonar_in_base, self._start, known)
         return JointSession(solver, self.correction.copy())
 
     def _end_session(self) -> None:
         if self._session is not None:
-            self._shown.settle(self._session)
-            self._matched.settle(self._session)
+            self._maps.settle(self._session)
         self._session = None
         self._start = None
-
-    def _belief(self, estimate: LiveEstimate) -> Belief:
-        """Return pose and odometry errors; of errors that the model does not estimate, what is known beforehand."""
-        drift = estimate.drift
-        slopes = np.zeros((STATES, estimate.node.size))
-        slopes[:POSE_COLUMNS, :POSE_COLUMNS] = np.eye(POSE_COLUMNS)
-        slopes[ERRORS] = drift.slopes
-        of_node = estimate.covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
-        covariance = slopes @ of_node @ slopes.T
-        unknown = ~slopes.any(axis=1)
-        covariance[unknown, unknown] = np.diag(self.errors.covariance())[unknown]
-        return Belief(estimate.time, np.append(estimate.T_map_base, drift.values), covariance)
-
-    def _result(self, scan: Scan, estimate: LiveEstimate, seconds: float) -> MatchResult:
-        belief = self.belief
-        times = np.linspace(min(scan.start, estimate.time - 1e-3), estimate.time, _PATH_POINTS)
-        return MatchResult(
-            status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
-            covariance=_fix_covariance(estimate), rate=belief.theta[RATE], motion=belief.theta[MOTION],
-            state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
-            iterations=self.parameters.window.live_iterations, seconds=seconds, beam_times=times,
-            beam_poses=self._session.path(times),
-        )  # fmt: skip
-
-
-def _fix_covariance(estimate: LiveEstimate) -> np.ndarray:
-    """Return the covariance (6, 6) of pose and velocity; what both share is left out."""
-    covariance = np.zeros((6, 6))
-    covariance[:3, :3], covariance[3:, 3:] = estimate.pose_covariance, estimate.velocity_covariance
-    return covariance
-
-
-def _correction(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
-    correction = composed(T_map_base, inverse(scan.reference_pose))
-    correction[2] = wrapped(correction[2])
-    return correction
 
 
 def _cloud_update(drawn: Drawn) -> CloudUpdate:

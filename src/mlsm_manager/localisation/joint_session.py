@@ -5,13 +5,12 @@ from typing import List, Mapping, Sequence
 
 import numpy as np
 
+from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.drawing import corrected_path, drawn
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.state import DELAY
 from node_support.geometry.planar import composed, transformed
 
 
@@ -49,19 +48,21 @@ class JointSession:
         """Learn the odometry up to `time` [s], which `track` holds."""
         self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
 
+    @property
+    def _placement(self) -> SolvedPlacement:
+        return SolvedPlacement(self.solver.log, self.solver.odometry, self.solver.state)
+
     def points(self, cloud: TimedPoints) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
-        points = transformed(self.T_map_odom, cloud.points)
-        return drawn(self.solver.log, self.solver.odometry, self.solver.state, points, cloud.times)
+        return self._placement.points(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
 
     def origins(self, cloud: TimedPoints) -> np.ndarray:
         """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
-        path = self.path(cloud.times + self.solver.state.run[DELAY])
-        return transformed(path, np.broadcast_to(self.solver.log.sonar_in_base, (len(path), 2)))
+        return self._placement.origins(cloud)
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
-        return corrected_path(self.solver.log, self.solver.odometry, self.solver.state, times)
+        return self._placement.path(times)
 
     @property
     def start(self) -> float:

@@ -9,7 +9,7 @@ from typing import Any, Callable, List, Mapping, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.localisation.live_correction import LiveCorrection
-from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.scan_mapper import ScanMapper

@@ -1,12 +1,13 @@
 """Matches scan by scan with the map of the scans before, and keeps that map and the pose in it (thesis 6.5.6)."""
 
 from collections import deque
-from dataclasses import dataclass
-from typing import Deque, Dict, Iterator, List, Mapping, Optional, Protocol, Tuple
+from typing import Deque, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
+from mlsm_manager.localisation.map_layers import LayerCopies, MapSettings
+from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
@@ -17,84 +18,8 @@ from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
-from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
-from mlsm_manager.surface_map.insertion import InsertionKernel
-from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
-
-# Clouds: with one per scan, more than a matcher is ever behind.
-MOST_WAITING = 8
-NOTHING_INSERTED = InsertReport(0, 0, 0)
-
-
-@dataclass(frozen=True)
-class MapSettings:
-    """The grids of the map that is shown and of the map that is matched with.
-
-    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
-    of blocks to reserve memory for. fewest_blocks: of a map that can be matched with.
-    carver: what marks free space in the map that is shown; None where that is not wanted.
-    """
-
-    resolution: float
-    match_resolution: float
-    limit: float
-    expected_blocks: int
-    fewest_blocks: int
-    carver: Optional[Carver] = None
-    kernel: InsertionKernel = InsertionKernel.NUMPY
-
-
-@dataclass(frozen=True)
-class ScanUpdate:
-    """What was done with a scan.
-
-    result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
-    """
-
-    scan: Scan
-    result: Optional[MatchResult]
-    accepted: bool
-    belief: Belief
-
-
-@dataclass(frozen=True)
-class CloudUpdate:
-    """What was done with a cloud.
-
-    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
-    not inserted because the scan of their time was rejected.
-    carved: what its beams said about free space, None where nobody asked or the vehicle's position is not known.
-    """
-
-    report: InsertReport
-    waiting: bool
-    unplaced: int
-    carved: Optional[CarveReport] = None
-
-
-class HasBlocks(Protocol):
-    """What has blocks: a map, or the free space of keyframes."""
-
-    @property
-    def blocks(self) -> Blocks:
-        """A copy of all of them."""
-
-
-class LayerCopies(Mapping[Layer, Blocks]):
-    """The blocks of maps, copied when they are asked for."""
-
-    def __init__(self, maps: Dict[Layer, HasBlocks]) -> None:
-        self._maps = maps
-
-    def __getitem__(self, layer: Layer) -> Blocks:
-        return self._maps[layer].blocks
-
-    def __iter__(self) -> Iterator[Layer]:
-        return iter(self._maps)
-
-    def __len__(self) -> int:
-        return len(self._maps)
 
 
 class Mapper:
@@ -105,7 +30,12 @@ class Mapper:
     odometry as corrected so far and inserted; its pose is then certain.
     """
 
-    def __init__(self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher) -> None:
+    def __init__(
+        self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher,
+        sonar_in_base: Sequence[float] = (0.0, 0.0),
+    ) -> None:  # fmt: skip
+        """`sonar_in_base`: (2,) m; `mount` changes it."""
+        self._sonar_in_base = np.array(sonar_in_base, dtype=np.float64)
         self.settings = settings
         self.errors = errors
         self.matcher = matcher
@@ -148,7 +78,7 @@ class Mapper:
         other resolutions than those of the settings.
         """
         shown = layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
-        restored = Mapper(self.settings, self.errors, self.matcher)
+        restored = Mapper(self.settings, self.errors, self.matcher, self._sonar_in_base)
         restored.shown.insert_blocks(shown)
         restored.matched.insert_blocks(layers.get(Layer.MATCHED, shown))
         if Layer.FREE in layers:
@@ -175,7 +105,8 @@ class Mapper:
         return 0.0
 
     def mount(self, sonar_in_base: np.ndarray) -> None:
-        """Points are matched wherever the sonar is."""
+        """Learn where the sonar is in base_link, (2,) m, from where free space is seen."""
+        self._sonar_in_base = sonar_in_base
 
     def verdicts(self) -> List[Verdict]:
         """Each match is judged alone: its status says it."""
@@ -209,8 +140,8 @@ class Mapper:
         theta = np.concatenate([result.pose, result.rate, result.motion])
         self.belief = Belief(scan.reference_time, theta, result.state_covariance)
         self.correction = result.correction(scan)
-        self.matched.insert(corrected_points(scan, result))
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
+        self._note(corrected_points(scan, result), scan.times)
         return ScanUpdate(scan, result, True, self.belief)
 
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
@@ -240,17 +171,29 @@ class Mapper:
 
     def _show(self, points: np.ndarray, times: np.ndarray, unplaced: int) -> CloudUpdate:
         """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is shown, and carve them."""
-        report, carver = self.shown.insert(points), self.settings.carver
-        positions = None if carver is None else self._history.positions(times)
-        if positions is None:
-            return CloudUpdate(report, False, unplaced)
-        carved = carver.carve(self.shown, self.free, FirstEchoes.of_level(points, times, positions), points)
+        report, beams = self.shown.insert(points), self._beams(points, times)
+        carved = None if beams is None else self.settings.carver.carve(self.shown, self.free, beams, points)
         return CloudUpdate(report, False, unplaced, carved)
+
+    def _note(self, points: np.ndarray, times: np.ndarray) -> None:
+        """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is matched with; clear it."""
+        self.matched.insert(points)
+        beams = self._beams(points, times)
+        if beams is not None:
+            self.settings.carver.clear(self.matched, beams, points)
+
+    def _beams(self, points: np.ndarray, times: np.ndarray) -> Optional[FirstEchoes]:
+        """Return the beams of points (n, 4) in map; None where nothing is carved or the sonar's place is not known."""
+        if self.settings.carver is None:
+            return None
+        origins = self._history.origins(times, self._sonar_in_base)
+        return None if origins is None else FirstEchoes.of_level(points, times, origins)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)
         self._history.add(times, poses, scan.track, holds=True)
-        self.matched.insert(self._history.placed(TimedPoints.of_scan(scan)).points)
+        placed = self._history.placed(TimedPoints.of_scan(scan))
+        self._note(placed.points, placed.times)
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
         # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
         if belief.theta[ERRORS].any():

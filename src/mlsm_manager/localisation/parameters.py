@@ -10,7 +10,8 @@ import numpy as np
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
-from mlsm_manager.localisation.mapper import Mapper, MapSettings
+from mlsm_manager.localisation.map_layers import MapSettings
+from mlsm_manager.localisation.mapper import Mapper
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.localisation.scan_mapper import ScanMapper
@@ -66,7 +67,7 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
     def _build_mapper(self, matcher: Matcher, sonar_in_base: np.ndarray) -> ScanMapper:
         errors = self.part(OdometryErrors)
         if self.estimator is Estimator.SCAN_BY_SCAN:
-            return Mapper(self.map_settings(), errors, matcher)
+            return Mapper(self.map_settings(), errors, matcher, sonar_in_base)
         solver = self.solver_parameters(errors, self.range_scale_deviation)
         return JointMapper(self.map_settings(), errors, solver, matcher, sonar_in_base)
 
@@ -84,7 +85,7 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
 
     @property
     def carver(self) -> Optional[Carver]:
-        """What marks free space in the map that is shown; None where that is not wanted."""
+        """What marks free space and takes blocks away that beams go through; None where that is not wanted."""
         return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
 
     @property

@@ -1,10 +1,16 @@
 """Where clouds are in map."""
 
+from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
 from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.multi_view.drawing import corrected_path, drawn
+from mlsm_manager.multi_view.odometry_model import OdometryModel
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import DELAY, State
+from node_support.geometry.planar import transformed
 
 
 class Placement(Protocol):
@@ -15,3 +21,25 @@ class Placement(Protocol):
 
     def origins(self, cloud: TimedPoints) -> np.ndarray:
         """Return where the sonar was in map when it heard each of them, (n, 2) m."""
+
+
+@dataclass(frozen=True)
+class SolvedPlacement:
+    """Places clouds where the unknowns `state` of the joint solver say that they lie."""
+
+    log: RunLog
+    odometry: OdometryModel
+    state: State
+
+    def points(self, cloud: TimedPoints) -> np.ndarray:
+        """Return the points (n, 4) of a cloud in map."""
+        return drawn(self.log, self.odometry, self.state, cloud.points, cloud.times)
+
+    def origins(self, cloud: TimedPoints) -> np.ndarray:
+        """Return where the sonar was in map when it heard each of them, (n, 2) m."""
+        path = self.path(cloud.times + self.state.run[DELAY])
+        return transformed(path, np.broadcast_to(self.log.sonar_in_base, (len(path), 2)))
+
+    def path(self, times: np.ndarray) -> np.ndarray:
+        """Return T_map_base (m, 3) at `times` (m,) [s]."""
+        return corrected_path(self.log, self.odometry, self.state, times)

@@ -4,7 +4,7 @@ from typing import List, Mapping, Optional, Protocol, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors

@@ -2,7 +2,7 @@
 
 from typing import Sequence
 
-from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health
 

@@ -15,6 +15,7 @@ from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
 from recordings.reading.arguments import add_reading_arguments, request_of, set_values
 from recordings.reading.parameters import ReadingParameters
+from recordings.vehicle.motion import MotionSource
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
@@ -57,6 +58,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         parser.error("the following arguments are required: --out")
     if options.vehicle and len(options.bags) > 1:
         parser.error("--vehicle belongs to one recording, not to several")
+    _check_motion(parser, options)
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(set_values(parser, options.set))
     if options.matcher:
@@ -73,6 +75,18 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     if options.refine and options.parameters.estimator is not Estimator.JOINT:
         raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
     return options
+
+
+def _check_motion(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Refuse what is said of the motion where it contradicts itself; nothing known means odometry none."""
+    none, declared = OdometryKind.NONE.value.lower(), options.declared
+    if declared is MotionSource.STANDING and options.odometry == none:
+        parser.error(f"--standing says that the vehicle did not move; --odometry {none} of one that moved is now "
+                     "--unknown-motion")  # fmt: skip
+    if declared is MotionSource.UNKNOWN:
+        if options.odometry not in (None, none):
+            parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")
+        options.odometry = none
 
 
 def _from_file(path: Path) -> Dict[str, Any]:

@@ -4,7 +4,7 @@ from typing import Any, Dict, List, Mapping, Optional
 
 import numpy as np
 
-from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.drawing import drawn
 from mlsm_manager.offline.evaluation import aligned_truth
@@ -39,6 +39,7 @@ def mission_of(
         parameters=parameters,
         uncertainty=None if found is None else _uncertainty(found),
         errors=errors,
+        further=run.further,
     )
 
 

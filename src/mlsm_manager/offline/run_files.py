@@ -3,7 +3,7 @@
 import json
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional
+from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from mlsm_manager.offline.picture_contents import Doubts, Path2d
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.trust import Trust
 from mlsm_manager.offline.tum_files import tum_files
+from mlsm_manager.report.mission import Path as Way
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
 from mlsm_manager.surface_map.storage import write_ply
@@ -26,6 +27,7 @@ LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"
 COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
 TRUTH_COLOR = "#111111"
+FURTHER_COLORS = ("#8833aa", "#cc6611", "#2299aa", "#996655", "#556b2f")
 # More would hide the path.
 _MOST_ELLIPSES = 40
 
@@ -33,7 +35,7 @@ _MOST_ELLIPSES = 40
 @dataclass(frozen=True)
 class Run:
     """times: (m,) s. poses: name -> (m, 3) x y yaw, the last one is the best. counts: what goes into the summary.
-    stored: the final map. trust: what the checks say; None where there are none.
+    stored: the final map. trust: what the checks say; None where there are none. further: ways of further recordings.
     """
 
     times: np.ndarray
@@ -41,6 +43,7 @@ class Run:
     counts: Dict[str, Any]
     stored: StoredMap
     trust: Optional[Trust] = None
+    further: Sequence[Way] = ()
 
     @property
     def blocks(self) -> Blocks:
@@ -103,6 +106,7 @@ def _doubts(run: Run) -> Optional[Doubts]:
 def _paths(run: Run, recording: Recording) -> List[Path2d]:
     paths = [Path2d(poses[:, :2], LABELS[name], COLORS[name]) for name, poses in run.poses.items()]
     truth = _truth_path(run, recording)
+    paths += [Path2d(way.poses[:, :2], way.name, way.color) for way in run.further]
     return paths if truth is None else [*paths, truth]
 
 

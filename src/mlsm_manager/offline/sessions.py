@@ -7,14 +7,20 @@ from multiprocessing import cpu_count, get_context
 from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
+import numpy as np
+
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.run_files import CORRECTED
+from mlsm_manager.report.mission import Path as Way
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from recordings.errors import RecordingError
 from sonar_processing.beams.beam_correction import BeamCorrection
 
+# A cluster in the same network answers within a second, a busy one within a few.
+CLUSTER_TIMEOUT = 10.0
 Prepared = Tuple[Recording, List[Scan]]
 Reader = Callable[[Path], Recording]
 """Reads a recording; a function at the top of a module or a partial of one, so that other processes can call it."""
@@ -36,6 +42,13 @@ class Session:
             "rejected": self.replayed.rejected,
             "found_after_scans": self.scans_until_found,
         }
+
+    def way(self, color: str) -> Way:
+        """Return the way of the vehicle from the first scan on that was found in the map; empty where none was."""
+        found, replayed = self.scans_until_found, self.replayed
+        start = np.inf if found is None else replayed.updates[found].scan.reference_time
+        known = replayed.times >= start
+        return Way(f"{CORRECTED}, {self.bag.name}", color, replayed.times[known], replayed.corrected[known])
 
     @property
     def scans_until_found(self) -> Optional[int]:
@@ -86,7 +99,7 @@ def executor_for(jobs: int, scheduler: Optional[str]) -> Iterator[Executor]:
     except ImportError:
         raise RecordingError("--scheduler needs Dask; install it with: apt install python3-distributed") from None
     try:
-        client = Client(scheduler, timeout=10)
+        client = Client(scheduler, timeout=CLUSTER_TIMEOUT)
     except (OSError, ValueError) as error:
         raise RecordingError(f"--scheduler {scheduler}: {error or 'cannot be reached'}") from None
     with client, client.get_executor() as executor:

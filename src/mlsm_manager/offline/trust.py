@@ -107,14 +107,15 @@ def _batch_deviations(refined: Refined) -> Deviations:
 
 
 def _halves(scans: List[Scan], solver: LiveSolver) -> Optional[Verdict]:
-    """Compare the calibration of each half of the run, made without the other one."""
+    """Compare the calibration of each half of the run, made without the other one.
+
+    What was known after the first half came from that half alone; the second is solved anew.
+    """
     middle = len(scans) // 2
-    found = []
-    for half in (scans[:middle], scans[middle:]):
-        if len(half) < _FEWEST_SCANS:
-            return None
-        found.append(_calibrated(half, solver.parameters, solver.log.sonar_in_base))
-    first, second = found
+    if middle < _FEWEST_SCANS:
+        return None
+    first = Calibration.of_estimate(solver, solver.estimates[middle - 1])
+    second = _calibrated(scans[middle:], solver.parameters, solver.log.sonar_in_base)
     return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
 
 

@@ -32,7 +32,7 @@ def map_from_above(mission: Mission) -> go.Figure:
             sizing="stretch", layer="below",
         )  # fmt: skip
         _add_line(figure, [left, right], [bottom, top], "", "rgba(0,0,0,0)", hidden=True)
-    for path in mission.paths:
+    for path in [*mission.paths, *mission.further]:
         shown = thinned(path)
         _add_line(figure, shown.poses[:, 0], shown.poses[:, 1], path.name, path.color)
     if mission.uncertainty is not None:

@@ -1,7 +1,7 @@
 """What a report tells of a mission, as plain arrays."""
 
 from dataclasses import dataclass, field
-from typing import Any, Dict, List, Mapping, Optional, Tuple
+from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -51,7 +51,8 @@ class Mission:
 
     title: names of the recordings. paths: the first is the odometry, the last one the best. scans: oldest first, at
     least one. verdicts: of all checks; none where none was made. calibration: name -> (value, deviation).
-    facts: name -> value, for the head of the page. parameters: name -> value.
+    facts: name -> value, for the head of the page. parameters: name -> value. further: ways of further recordings,
+    which are shown in the map only.
     """
 
     title: str
@@ -64,6 +65,7 @@ class Mission:
     parameters: Mapping[str, Any]
     uncertainty: Optional[Uncertainty] = None
     errors: Dict[str, Dict[str, float]] = field(default_factory=dict)
+    further: Sequence[Path] = ()
 
     @property
     def best(self) -> Path:

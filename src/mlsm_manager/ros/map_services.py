@@ -8,7 +8,7 @@ import rospy
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.mapper import ScanUpdate
+from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.ros.map_messages import map_cloud
 from mlsm_manager.surface_map.export.map_folder import MapFolder

@@ -7,7 +7,7 @@ import rospy
 from std_msgs.msg import Bool
 
 from mlsm_manager.localisation.localiser import MapInput
-from mlsm_manager.localisation.mapper import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_verdicts

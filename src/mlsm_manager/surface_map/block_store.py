@@ -6,7 +6,8 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, MOST_CROSSINGS, ROW_WIDTH, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
-from mlsm_manager.surface_map.linkage import Intervals
+from mlsm_manager.surface_map.large_array import LargeArray
+from mlsm_manager.surface_map.linkage import Extents, Intervals
 
 _MIN_ROWS = 1024
 """Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
@@ -16,15 +17,28 @@ class BlockStore:
     """Rows, the chain of each cell and the rows that are free. All access is by whole arrays."""
 
     def __init__(self, expected_blocks: int) -> None:
-        self._rows = np.empty((max(expected_blocks, _MIN_ROWS), ROW_WIDTH))
-        self._next = np.empty(len(self._rows), dtype=np.int32)
-        self._crossed = np.empty(len(self._rows), dtype=np.uint16)
+        reserved = max(expected_blocks, _MIN_ROWS)
+        self._row_array = LargeArray(reserved, (ROW_WIDTH,), np.float64)
+        self._next_array = LargeArray(reserved, (), np.int32)
+        self._crossed_array = LargeArray(reserved, (), np.uint16)
         self._index = CellIndex(expected_blocks)
         self._used = 0
         self._free = np.empty(0, dtype=np.int64)
 
     def __len__(self) -> int:
         return self._used - len(self._free)
+
+    @property
+    def _rows(self) -> np.ndarray:
+        return self._row_array.values
+
+    @property
+    def _next(self) -> np.ndarray:
+        return self._next_array.values
+
+    @property
+    def _crossed(self) -> np.ndarray:
+        return self._crossed_array.values
 
     @property
     def nbytes(self) -> int:
@@ -45,9 +59,18 @@ class BlockStore:
         """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
         return self._index.slots(cells)
 
-    def stored(self, cells: np.ndarray, slots: np.ndarray) -> Intervals:
-        """Return all blocks of cells with keys `cells` (n,) at `slots` (n,)."""
-        return self._intervals(*self._followed(cells, self._index.heads[slots]))
+    def extents(self, cells: np.ndarray, slots: np.ndarray) -> Extents:
+        """Return those of all blocks of cells with keys `cells` (n,) at `slots` (n,)."""
+        owners, rows = self._followed(cells, self._index.heads[slots])
+        return Extents(owners, self._rows[rows, BOTTOM], self._rows[rows, TOP], rows)
+
+    def intervals(self, extents: Extents) -> Intervals:
+        """Return the blocks whose extents are known, with the statistics of their points."""
+        data = self._rows[extents.row]
+        return Intervals(
+            extents.cell, extents.bottom, extents.top, extents.row, data[:, COUNT], data[:, MEAN], data[:, SQUARES],
+            self._crossed[extents.row],
+        )  # fmt: skip
 
     def chains(self, slots: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return views of all rows and of the row that follows each in its cell, and the first rows of cells (n,)."""
@@ -67,11 +90,8 @@ class BlockStore:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
         reused, self._free = self._free[:number], self._free[number:]
         first, self._used = self._used, self._used + number - len(reused)
-        if self._used > len(self._rows):
-            capacity = max(2 * len(self._rows), self._used)
-            self._rows = _grown(self._rows, first, capacity)
-            self._next = _grown(self._next, first, capacity)
-            self._crossed = _grown(self._crossed, first, capacity)
+        for array in (self._row_array, self._next_array, self._crossed_array):
+            array.reserve(self._used)
         return np.concatenate([reused, np.arange(first, self._used)])
 
     def write(self, rows: np.ndarray, intervals: Intervals) -> None:
@@ -116,14 +136,3 @@ class BlockStore:
             found_rows.append(row)
             found_owners.append(owners)
             row = self._next[row].astype(np.int64)
-
-    def _intervals(self, cells: np.ndarray, rows: np.ndarray) -> Intervals:
-        data = self._rows[rows]
-        mean, squares = data[:, MEAN], data[:, SQUARES]
-        return Intervals(cells, data[:, BOTTOM], data[:, TOP], data[:, COUNT], mean, squares, rows, self._crossed[rows])
-
-
-def _grown(array: np.ndarray, used: int, capacity: int) -> np.ndarray:
-    result = np.empty((capacity, *array.shape[1:]), dtype=array.dtype)
-    result[:used] = array[:used]
-    return result

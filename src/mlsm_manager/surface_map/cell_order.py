@@ -19,8 +19,10 @@ def cell_order(cell: np.ndarray, height: np.ndarray) -> np.ndarray:
     largest = (int(x.max()) + 1) * rows - 1
     if largest >> (_DIGIT_BITS * _MOST_DIGITS):
         return np.lexsort((height, cell))
-    number, order = x * rows + y, np.argsort(height, kind="stable")
+    number, order = x * rows + y, np.arange(len(cell))
     for shift in range(0, max(largest.bit_length(), 1), _DIGIT_BITS):
         digit = (number >> shift).astype(np.uint16)
         order = order[np.argsort(digit[order], kind="stable")]
-    return order
+    # Complex numbers sort by their real part first; the stable sort is quick where only neighbours change places.
+    by_both = number[order] + 1j * height[order]
+    return order[np.argsort(by_both, kind="stable")]

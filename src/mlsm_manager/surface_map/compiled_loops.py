@@ -112,8 +112,9 @@ def _write_group(points, order, start, end, row):
 def merged(groups, group_cell, stored_rows, following, heads, resolution):
     """Return what the cells hold after the groups (g, ROW_WIDTH) went into cells with first rows `heads` (c,).
 
-    Blocks (m, ROW_WIDTH), their row numbers (m,), -1 where new, the index of their cell (m,), which of them changed
-    (m,), and the row numbers (f,) of stored ones that are part of others now.
+    Blocks (m, ROW_WIDTH), of which only those that changed are filled in, their row numbers (m,), -1 where new, the
+    index of their cell (m,), which of them changed (m,), and the row numbers (f,) of stored ones that are part of
+    others now.
     """
     most = len(groups)
     for cell in range(len(heads)):
@@ -140,7 +141,12 @@ def merged(groups, group_cell, stored_rows, following, heads, resolution):
             if not is_end:
                 bottom = groups[group, BOTTOM] if take_group else stored_rows[stored[next_stored], BOTTOM]
             if length and (is_end or bottom - max(new_top, old_top) >= resolution):
-                gone = _write_run(run, run_rows, length, blocks[made], numbers, made, fused, gone)
+                if length > 1:
+                    gone = _write_run(run, run_rows, length, blocks[made], numbers, made, fused, gone)
+                else:
+                    numbers[made] = run_rows[0]
+                    if run_rows[0] < 0:
+                        blocks[made] = run[0]
                 owner[made] = cell
                 changed[made] = length > 1 or run_rows[0] < 0
                 made += 1

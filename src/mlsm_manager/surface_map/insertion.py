@@ -6,7 +6,7 @@ from typing import Callable
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore
-from mlsm_manager.surface_map.linkage import Intervals, concatenated, group_points, link, merge
+from mlsm_manager.surface_map.linkage import Extents, Intervals, concatenated, group_points, joined, link, merge
 
 PointInserter = Callable[[BlockStore, np.ndarray, np.ndarray, float], np.ndarray]
 """Takes store, points (n, 4), n > 0, the keys of their cells (n,) and the resolution; returns these keys, sorted."""
@@ -37,27 +37,54 @@ def insert_groups(store: BlockStore, groups: Intervals, resolution: float) -> np
     """Insert sorted intervals that lie at least the resolution apart; return the keys of their cells, sorted."""
     cells = groups.cell[np.flatnonzero(np.append(True, groups.cell[1:] != groups.cell[:-1]))]
     slots = store.slots(cells)
-    if not len(store):
-        rows = store.take(len(groups))
-        store.write(rows, groups)
+    if len(store):
+        rows, owner = _write_merged(store, groups, store.extents(cells, slots), resolution)
     else:
-        elements = concatenated(groups, store.stored(cells, slots))
-        rows, groups = _write_merged(store, elements, resolution)
-    store.chain(rows, groups.cell, slots)
+        rows, owner = store.take(len(groups)), groups.cell
+        store.write(rows, groups)
+    store.chain(rows, owner, slots)
     return cells
 
 
-def _write_merged(store: BlockStore, elements: Intervals, resolution: float) -> tuple:
-    """Write what new and stored intervals make together; return rows and intervals of all that their cells hold now."""
+def _write_merged(store: BlockStore, groups: Intervals, stored: Extents, resolution: float) -> tuple:
+    """Write what new and stored intervals make together; return rows and cells of all that their cells hold now.
+
+    Most of what lies in the cells of a scan stays as it is, or is new and touches nothing: it is never read.
+    """
+    elements = concatenated(groups.extents, stored)
     starts = link(elements, resolution)
-    merged = merge(elements, starts)
     size = np.diff(np.append(starts, len(elements)))
-    fused = (elements.row >= 0) & (elements.row != np.repeat(merged.row, size))
+    alone, several = (elements.row[starts] < 0) & (size == 1), size > 1
+    number = np.cumsum(elements.row < 0) - 1
+    single = groups.take(number[starts[alone]])
+    together = _merged(store, groups, elements, number, size) if several.any() else None
+    rows = _rows_of_runs(store, elements, starts, size)
+    store.write(rows[alone], single)
+    if together is not None:
+        store.write(rows[several], together)
+    return rows, elements.cell[starts]
+
+
+def _rows_of_runs(store: BlockStore, elements: Extents, starts: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return the row (m,) of each run: the highest of its stored blocks, the others are given back, or else a new one.
+
+    What was stored must have been read before.
+    """
+    rows = np.maximum.reduceat(elements.row, starts)
+    fused = (elements.row >= 0) & (elements.row != np.repeat(rows, size))
     if fused.any():
         store.release(elements.row[fused])
-    rows = merged.row.copy()
     new = rows < 0
     rows[new] = store.take(int(np.count_nonzero(new)))
-    changed = new | (size > 1)
-    store.write(rows[changed], merged.take(changed))
-    return rows, merged
+    return rows
+
+
+def _merged(store: BlockStore, groups: Intervals, elements: Extents, number: np.ndarray, size: np.ndarray) -> Intervals:
+    """Return what runs of several elements make together. number: (n,) of the group that each new element is."""
+    several = size > 1
+    members = np.flatnonzero(np.repeat(several, size))
+    is_new = elements.row[members] < 0
+    held = store.intervals(elements.take(members[~is_new]))
+    parts = joined(groups.take(number[members[is_new]]), held)
+    place = np.where(is_new, np.cumsum(is_new) - 1, len(parts) - len(held) + np.cumsum(~is_new) - 1)
+    return merge(parts.take(place), np.cumsum(size[several]) - size[several])

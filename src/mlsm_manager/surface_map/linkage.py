@@ -6,47 +6,63 @@ the end does not depend on the order in which the points came. So a whole scan i
 """
 
 from dataclasses import dataclass
+from typing import Tuple, TypeVar
 
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.cell_order import cell_order
 
+AnyExtents = TypeVar("AnyExtents", bound="Extents")
+
 
 @dataclass(frozen=True)
-class Intervals:
-    """Vertical intervals with the statistics of the points inside, sorted by cell, then by bottom.
+class Extents:
+    """Vertical intervals in cells: what decides which of them belong together.
 
-    cell: (n,) int64 key of the cell. bottom, top: (n,) m. count: (n,) points.
-    mean, squares: (n, 4) mean of x y z strength and sum of squared deviations from it.
-    row: (n,) int64 number of the stored block, -1 for what is new.
-    crossed: (n,) uint16 number of beams that crossed it since a point last fell into it.
+    cell: (n,) int64 key of the cell. bottom, top: (n,) m. row: (n,) int64 number of the stored block, -1 for what is
+    new.
     """
 
     cell: np.ndarray
     bottom: np.ndarray
     top: np.ndarray
-    count: np.ndarray
-    mean: np.ndarray
-    squares: np.ndarray
     row: np.ndarray
-    crossed: np.ndarray
 
     def __len__(self) -> int:
         return len(self.cell)
 
-    def take(self, index: np.ndarray) -> "Intervals":
-        """Return the intervals at `index`, in its order."""
-        return Intervals(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
+    def take(self: AnyExtents, index: np.ndarray) -> AnyExtents:
+        """Return those at `index`, in its order."""
+        return type(self)(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
 
-def joined(first: Intervals, second: Intervals) -> Intervals:
+@dataclass(frozen=True)
+class Intervals(Extents):
+    """Vertical intervals with the statistics of the points inside.
+
+    count: (n,) points. mean, squares: (n, 4) mean of x y z strength and sum of squared deviations from it.
+    crossed: (n,) uint16 number of beams that crossed it since a point last fell into it.
+    """
+
+    count: np.ndarray
+    mean: np.ndarray
+    squares: np.ndarray
+    crossed: np.ndarray
+
+    @property
+    def extents(self) -> Extents:
+        """The same without the statistics."""
+        return Extents(self.cell, self.bottom, self.top, self.row)
+
+
+def joined(first: AnyExtents, second: AnyExtents) -> AnyExtents:
     """Return those of the first, then those of the second."""
     names = first.__dataclass_fields__
-    return Intervals(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
+    return type(first)(*(np.concatenate([getattr(first, name), getattr(second, name)]) for name in names))
 
 
-def concatenated(first: Intervals, second: Intervals) -> Intervals:
+def concatenated(first: AnyExtents, second: AnyExtents) -> AnyExtents:
     """Return both, sorted by cell, then by bottom."""
     both = joined(first, second)
     return both.take(cell_order(both.cell, both.bottom))
@@ -57,7 +73,7 @@ def intervals_of(blocks: Blocks, cell: np.ndarray) -> Intervals:
     rows = blocks.rows
     new = np.full(len(rows), -1, dtype=np.int64)
     return Intervals(
-        cell, rows[:, BOTTOM], rows[:, TOP], rows[:, COUNT], rows[:, MEAN], rows[:, SQUARES], new, blocks.crossed
+        cell, rows[:, BOTTOM], rows[:, TOP], new, rows[:, COUNT], rows[:, MEAN], rows[:, SQUARES], blocks.crossed
     )
 
 
@@ -72,17 +88,29 @@ def group_points(points: np.ndarray, cell: np.ndarray, resolution: float) -> Int
     starts = np.flatnonzero(is_start)
     ends = np.append(starts[1:], len(points)) - 1
     count = (ends - starts + 1).astype(np.float64)
-    group = np.cumsum(is_start) - 1
-    # From one of the points on: a plain sum rounds, and the mean of points on a border would leave their cell.
-    mean = points[starts] + _sums(points - points[starts][group], group, len(starts)) / count[:, np.newaxis]
-    squares = _sums((points - mean[group]) ** 2, group, len(starts))
+    mean, squares = _statistics(points, starts, ends - starts + 1)
     new = np.full(len(starts), -1, dtype=np.int64)
     return Intervals(
-        cell[starts], z[starts], z[ends], count, mean, squares, new, np.zeros(len(starts), dtype=np.uint16)
+        cell[starts], z[starts], z[ends], new, count, mean, squares, np.zeros(len(starts), dtype=np.uint16)
     )
 
 
-def link(intervals: Intervals, resolution: float) -> np.ndarray:
+def _statistics(points: np.ndarray, starts: np.ndarray, sizes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return mean and sum of squared deviations, (g, 4) each, of points (n, 4) in groups from `starts` (g,) on."""
+    mean, squares = points[starts], np.zeros((len(starts), points.shape[1]))
+    several = sizes > 1
+    if not several.any():
+        return mean, squares
+    points, sizes = points[np.repeat(several, sizes)], sizes[several]
+    group = np.repeat(np.arange(len(sizes)), sizes)
+    # From one of the points on: a plain sum rounds, and the mean of points on a border would leave their cell.
+    first = mean[several]
+    means = first + _sums(points - first[group], group, len(sizes)) / sizes[:, np.newaxis].astype(np.float64)
+    mean[several], squares[several] = means, _sums((points - means[group]) ** 2, group, len(sizes))
+    return mean, squares
+
+
+def link(intervals: Extents, resolution: float) -> np.ndarray:
     """Return the positions, (m,), at which a new block starts in sorted `intervals` (n > 0).
 
     In one cell the stored blocks must lie at least the resolution apart from each other, and so must the new ones.
@@ -108,12 +136,12 @@ def linked_alone(intervals: Intervals, resolution: float) -> Intervals:
         intervals = merge(intervals, starts)
 
 
-def _is_sorted(intervals: Intervals) -> bool:
+def _is_sorted(intervals: Extents) -> bool:
     cell, bottom = intervals.cell, intervals.bottom
     return bool(((cell[1:] > cell[:-1]) | ((cell[1:] == cell[:-1]) & (bottom[1:] >= bottom[:-1]))).all())
 
 
-def _last_top(intervals: Intervals, chosen: np.ndarray) -> np.ndarray:
+def _last_top(intervals: Extents, chosen: np.ndarray) -> np.ndarray:
     """Return, for each interval, the top of the last chosen one up to it in its cell, -inf where there is none.
 
     The chosen ones lie apart from each other, so the last of them is the highest.
@@ -143,10 +171,10 @@ def merge(intervals: Intervals, starts: np.ndarray) -> Intervals:
         intervals.cell[starts],
         intervals.bottom[starts],
         np.maximum.reduceat(intervals.top, starts),
+        np.maximum.reduceat(intervals.row, starts),
         count,
         mean,
         squares,
-        np.maximum.reduceat(intervals.row, starts),
         np.maximum.reduceat(np.where(intervals.row < 0, intervals.crossed, 0), starts),
     )
 

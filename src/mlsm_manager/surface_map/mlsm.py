@@ -107,7 +107,7 @@ class MultiLevelSurfaceMap:
             return
         cells = np.unique(cell_keys(self._store.blocks(rows, self.resolution).cells))
         slots = self._store.slots(cells)
-        held = self._store.stored(cells, slots)
+        held = self._store.extents(cells, slots)
         kept = held.take(np.flatnonzero(~np.isin(held.row, rows)))
         kept = kept.take(cell_order(kept.cell, kept.bottom))
         self._store.release(rows)

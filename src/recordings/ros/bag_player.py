@@ -17,7 +17,8 @@ from recordings.ros.upright import turn_up
 
 _CLOCK_PERIOD = 0.01  # s of wall time: as rosbag play does
 _WAIT_STEP = 0.05  # s: soon enough for a person
-_LAST_MESSAGES_LEAVE = 0.5  # s: rospy sends from a queue, which is lost when the process ends
+_LATECOMERS = 5.0  # s: a node that the master still lists may have died, and will never connect
+_LAST_MESSAGES_ARRIVE = 3.0  # s: when a connection ends, rospy drops what a listener that stood still has not yet read
 _QUEUE_SIZE = 1000
 
 
@@ -44,7 +45,7 @@ class BagPlayer:
         self._health = make_health("play_bag")
         self.healths = [self._health]
         self._messages = read_messages(options)
-        self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=10)
+        self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
         self._publishers = self._advertised()
         self._ended = threading.Event()
         rospy.on_shutdown(self._ended.set)
@@ -70,7 +71,7 @@ class BagPlayer:
                 return
             self._publishers[played.topic].publish(played.message)
             self._health.count("messages")
-        self._ended.wait(_LAST_MESSAGES_LEAVE)
+        self._ended.wait(_LAST_MESSAGES_ARRIVE)
         rospy.signal_shutdown("the bag has ended")
 
     def _tick(self, pace: Pace, since_start: float) -> None:
@@ -82,12 +83,24 @@ class BagPlayer:
         self._clock.publish(Clock(genpy.Time.from_sec(self._messages[0].time + since_start)))
 
     def _wait_for_subscribers(self) -> None:
-        """Keep the first messages from being played to nobody."""
+        """Keep the first messages from being played to nobody, or only to those that connect fast."""
         while not self._ended.wait(_WAIT_STEP):
             missing = [topic for topic, publisher in self._publishers.items() if not publisher.get_num_connections()]
             self._health.show("topics without subscriber", " ".join(missing))
             if not missing:
+                break
+        for _ in range(int(_LATECOMERS / _WAIT_STEP)):
+            if self._are_all_connected() or self._ended.wait(_WAIT_STEP):
                 return
+
+    def _are_all_connected(self) -> bool:
+        """Return whether every subscriber that the master knows of is connected."""
+        _, _, (_, subscribers, _) = rospy.get_master().getSystemState()
+        known = {topic: len(nodes) for topic, nodes in subscribers}
+        return all(
+            publisher.get_num_connections() >= known.get(publisher.resolved_name, 0)
+            for publisher in self._publishers.values()
+        )
 
 
 def read_messages(options: Namespace) -> List[Played]:

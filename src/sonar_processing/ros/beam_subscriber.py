@@ -13,8 +13,7 @@ from sonar_processing.messages.reader import BeamReader, Reading, beam_type
 from sonar_processing.messages.type_table import BEAM_TYPES, LASER_SCAN
 from sonar_processing.ros.message_classes import MessageClasses
 
-_BUFFER_BYTES = 2**20  # hundreds of beams: rospy reads a whole buffer before it drops any
-_QUEUE = 200  # more than the 120 that wait for tf
+_BUFFER_BYTES = 2**20  # thousands of beams: what comes while the process stands still for some seconds
 
 
 class BeamSubscriber:
@@ -40,7 +39,8 @@ class BeamSubscriber:
             topics.BEAMS,
             rospy.AnyMsg,
             guarded(health, self._take_message),
-            queue_size=_QUEUE,
+            # Of a buffer with more messages than a queue has places, rospy would drop the oldest without a word.
+            queue_size=None,
             buff_size=_BUFFER_BYTES,
             tcp_nodelay=True,
         )

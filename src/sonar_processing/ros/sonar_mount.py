@@ -25,9 +25,14 @@ class SonarMount:
         self._missing_since: Dict[str, float] = {}
         self._broadcaster: Optional[tf2_ros.StaticTransformBroadcaster] = None
 
+    @property
+    def is_wanted(self) -> bool:
+        """Whether a frame may still have to be mounted."""
+        return bool(self._parameters.mounted_in) and self._broadcaster is None
+
     def look_at(self, waiting: Dict[str, int], transforms: TfBuffer) -> None:
         """Mount a frame of which many beams have been waiting for a while. waiting: beams by frame."""
-        if not self._parameters.mounted_in or self._broadcaster is not None:
+        if not self.is_wanted:
             return
         now = time.monotonic()
         for frame, beams in waiting.items():

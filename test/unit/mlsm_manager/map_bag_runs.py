@@ -1,17 +1,16 @@
-"""map_bag as it is run, a process of its own."""
+"""map_bag as it is run: with a command line, and what it leaves and says."""
 
 import json
-import subprocess
 import sys
-from pathlib import Path
 
-ROOT = Path(__file__).resolve().parents[3]
+from programs import ROOT, run_program
+
 BASIN = ROOT / "test/data/basin.bag"
 COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
 
 
 def run(*arguments):
-    return subprocess.run([*COMMAND, *map(str, arguments)], capture_output=True, text=True, check=False)
+    return run_program("map_bag", *arguments)
 
 
 def refused(*arguments):

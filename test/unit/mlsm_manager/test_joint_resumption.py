@@ -38,6 +38,13 @@ def killed():
     return localiser, map_of_bytes(map_bytes(localiser.stored("map", {}, 0.0, "run")))
 
 
+@pytest.fixture(scope="module")
+def whole():
+    """Return a localiser that was never killed, and what it found at each scan."""
+    localiser = new_localiser()
+    return localiser, taken(localiser, HARBOUR.scans)
+
+
 def resumed(stored, same_odometry=True):
     localiser = new_localiser()
     localiser.restore(stored, same_odometry)
@@ -54,11 +61,10 @@ def without_a_run(stored):
     return replace(stored, arrays=place)
 
 
-def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed):
+def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed, whole):
     _, stored = killed
-    whole, halves = new_localiser(), resumed(stored)
-    wanted = taken(whole, HARBOUR.scans)[KILLED_AFTER:]
-    for one, other in zip(taken(halves, HARBOUR.scans[KILLED_AFTER:]), wanted):
+    halves, (whole, wanted) = resumed(stored), whole
+    for one, other in zip(taken(halves, HARBOUR.scans[KILLED_AFTER:]), wanted[KILLED_AFTER:]):
         np.testing.assert_allclose(one.belief.theta, other.belief.theta, atol=1e-9)
         np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-9)
     assert halves.block_count == whole.block_count
@@ -100,15 +106,13 @@ def test_a_vehicle_that_is_elsewhere_writes_nothing_before_it_is_found(killed, h
 
 
 @pytest.mark.parametrize("has_run", [True, False])
-def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, has_run):
-    before, stored = killed
+def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, whole, has_run):
+    (before, stored), (whole, wanted) = killed, whole
     localiser = resumed(displaced(stored if has_run else without_a_run(stored), [12.0, -9.0, 0.4]))
     updates = taken(localiser, HARBOUR.scans[KILLED_AFTER:])
-    whole = new_localiser()
-    wanted = taken(whole, HARBOUR.scans)[-1]
     assert updates[3].accepted
     assert not localiser.is_lost
-    np.testing.assert_allclose(updates[-1].belief.theta[:2], wanted.belief.theta[:2], atol=0.5)
+    np.testing.assert_allclose(updates[-1].belief.theta[:2], wanted[-1].belief.theta[:2], atol=0.5)
     walls = {tuple(cell) for cell in whole.blocks.cells.tolist()}
     beside = sum(tuple(cell) not in walls for cell in localiser.blocks.cells.tolist())
     assert beside < 0.2 * before.block_count

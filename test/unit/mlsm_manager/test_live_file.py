@@ -1,15 +1,16 @@
 """live.yaml takes what map_bag did to the live nodes, and back."""
 
 import dataclasses
-import subprocess
 from enum import Enum
 from functools import lru_cache
 from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
+from roslaunch.config import ROSLaunchConfig
+from roslaunch.xmlloader import XmlLoader
 
 from mlsm_manager.localisation.parameters import MapInput
 from mlsm_manager.offline.live_file import NODES, live_text, live_values, replay_values, write_live
@@ -75,6 +76,7 @@ def default_values(node):
     return yaml.safe_load((ROOT / f"yaml/{node}_default.yaml").read_text())
 
 
+@settings(max_examples=40)
 @given(ANY_PARAMETERS, ANY_FRAME, ANY_FRAME)
 def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     """Over their default files, as launch files load it."""
@@ -105,8 +107,9 @@ def test_what_a_node_would_refuse_is_refused_by_its_name(group):
 
 def launched(launch, *arguments):
     """Return the parameters that a launch file would set."""
-    command = ["roslaunch", "--dump-params", str(ROOT / "launch" / launch), *arguments]
-    return yaml.safe_load(subprocess.run(command, capture_output=True, text=True, check=True).stdout)
+    config = ROSLaunchConfig()
+    XmlLoader().load(str(ROOT / "launch" / launch), config, argv=list(arguments), verbose=False)
+    return {name: parameter.value for name, parameter in config.params.items()}
 
 
 LAUNCHES = [

@@ -10,7 +10,10 @@ from importlib.util import find_spec
 import numpy as np
 import pytest
 import yaml
-from map_bag_runs import BASIN, COMMAND, ROOT, run, summary_of
+from heading_only import reduce_bag
+from map_bag_runs import BASIN, COMMAND, run, summary_of
+
+from mlsm_manager.surface_map.files.map_file import Layer, read_map
 
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
@@ -59,6 +62,16 @@ def test_a_simulated_basin_is_mapped_where_it_is(basin):
     assert summary["echoes"]["mode"] == "MATCHED_FILTER"
 
 
+def test_a_refined_map_has_free_space_between_the_vehicle_and_the_walls(basin):
+    layers = read_map(basin / "map.mlsm").layers
+    vehicle = np.loadtxt(str(basin / "refined.tum"))[:, 1:3]
+    free = {tuple(cell) for cell in layers[Layer.FREE].cells.tolist()}
+    walls = {tuple(cell) for cell in layers[Layer.SHOWN].cells.tolist()}
+    passed = {tuple(cell) for cell in np.floor(vehicle / layers[Layer.FREE].resolution).astype(int).tolist()}
+    assert len(passed & free) > 0.9 * len(passed)
+    assert len(walls & free) < 0.2 * len(walls)
+
+
 def test_each_trajectory_is_a_tum_file_too(basin):
     """As evo takes them: time, x y z, quaternion x y z w."""
     table = np.genfromtxt(basin / "trajectory.csv", delimiter=",", names=True)
@@ -80,7 +93,7 @@ def test_what_it_found_is_what_another_run_knows_beforehand(basin, tmp_path):
 
 def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path):
     bag, folder = tmp_path / "heading.bag", tmp_path / "out"
-    subprocess.run([str(ROOT / "scripts/heading_only"), str(BASIN), str(bag)], check=True)
+    reduce_bag(BASIN, bag, odom_frame="odom", base_frame="base_link")
     done = run(bag, "--out", folder)
     assert done.returncode == 0, done.stderr
     assert "odometry: heading, because the position never changes, the heading by" in done.stdout

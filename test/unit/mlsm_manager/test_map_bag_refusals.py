@@ -4,6 +4,8 @@ import pytest
 import rosbag
 from map_bag_runs import BASIN, refused, run
 
+from mlsm_manager.offline import sessions
+
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 
@@ -49,7 +51,8 @@ def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
     assert refused(BASIN, tmp_path / "no.bag", "--out", tmp_path).startswith(f"map_bag: {tmp_path / 'no.bag'}")
 
 
-def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path):
+def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
     pytest.importorskip("distributed")
+    monkeypatch.setattr(sessions, "CLUSTER_TIMEOUT", 0.5)
     line = refused(BASIN, BASIN, "--out", tmp_path, "--scheduler", "tcp://127.0.0.1:9")
     assert line.startswith("map_bag: --scheduler tcp://127.0.0.1:9: ")

@@ -3,7 +3,8 @@
 import numpy as np
 from made_scans import at_velocity, harbour, scan_of, still, wall
 
-from mlsm_manager.localisation.mapper import Mapper, MapSettings
+from mlsm_manager.localisation.map_layers import MapSettings
+from mlsm_manager.localisation.mapper import Mapper
 from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName

@@ -36,6 +36,29 @@ def test_it_grows_and_still_finds_every_cell():
     assert index.heads[slots].tolist() == list(range(len(cells)))
 
 
+def test_a_large_table_grows_in_pieces_and_loses_nothing():
+    rng = np.random.RandomState(3)
+    keys = np.unique(_keys(rng.randint(-(2**31) + 1, 2**31 - 1, (200_000, 2), dtype=np.int64)))
+    rng.shuffle(keys)
+    index, sizes = CellIndex(0), []
+    for start in range(0, len(keys), 1000):
+        part = keys[start : start + 1000]
+        slots = index.slots(part)
+        index.heads[slots] = np.arange(start, start + len(part))
+        sizes.append(index.nbytes)
+    assert index.find(keys).tolist() == list(range(len(keys)))
+    growth = np.diff(sizes) / sizes[:-1]
+    assert growth[100:].max() < 0.1
+
+
+def test_a_table_that_takes_many_cells_at_once_finds_them_all():
+    keys = _keys([(x, y) for x in range(300) for y in range(300)])
+    index = CellIndex(0)
+    slots = index.slots(keys)
+    index.heads[slots] = np.arange(len(keys))
+    assert index.find(keys).tolist() == list(range(len(keys)))
+
+
 def test_cells_have_slots_of_their_own():
     slots = CellIndex(0).slots(_keys([(x * 1024, y * 1024) for x in range(50) for y in range(50)]))
     assert len(set(slots.tolist())) == 2500

@@ -1,6 +1,7 @@
 """Odometry models: derivatives, what they expect, and that they use of the odometry only what they say."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -122,6 +123,12 @@ def made():
     return tour(20, path=ahead)
 
 
+@pytest.fixture(scope="module")
+def solver_of(made):
+    """Return a call that gives the solver of a kind of odometry, after the whole tour."""
+    return lru_cache(maxsize=None)(lambda kind: followed(made.scans, kind))
+
+
 def errors_of(solver, made):
     ends = np.array([estimate.time for estimate in solver.estimates])
     truth = made.truth.at(ends) - made.truth.at(0.0) * [1.0, 1.0, 0.0]
@@ -130,13 +137,13 @@ def errors_of(solver, made):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_each_model_follows_a_vehicle_in_a_harbour(kind, made):
-    error = errors_of(followed(made.scans, kind), made)
+def test_each_model_follows_a_vehicle_in_a_harbour(kind, made, solver_of):
+    error = errors_of(solver_of(kind), made)
     assert np.hypot(*error[8:, :2].T).max() < 1.5
 
 
-def test_a_velocity_that_nobody_reported_is_found_with_its_deviation(made):
-    solver = followed(made.scans, OdometryKind.HEADING)
+def test_a_velocity_that_nobody_reported_is_found_with_its_deviation(made, solver_of):
+    solver = solver_of(OdometryKind.HEADING)
     for estimate in solver.estimates[10:]:
         true = made.truth.velocity_at(estimate.time, 4.0)
         deviation = np.sqrt(np.diag(estimate.velocity_covariance)[:2])

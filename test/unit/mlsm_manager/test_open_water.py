@@ -5,7 +5,7 @@ from benchmarks.open_water import bubbles, outcome
 
 from mlsm_manager.localisation.joint_parameters import Estimator
 
-SCANS = 100
+SCANS = 50
 
 
 @pytest.mark.parametrize("estimator", Estimator)

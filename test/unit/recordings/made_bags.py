@@ -3,10 +3,26 @@
 from contextlib import closing
 
 from mcap.writer import Writer as McapWriter
-from rosbags.rosbag1 import Reader
+from rosbags.rosbag1 import Reader, Writer
 from rosbags.rosbag2 import Writer as SqliteWriter
 
 from recordings.bags.message_types import ros2_types
+
+
+def write_ros1_bag(source, path, topics):
+    """Write a .bag with some topics of another."""
+    with Reader(source) as bag, closing(Writer(path)) as writer:
+        writer.open()
+        connections = {}
+        for connection, time, raw in bag.messages():
+            if connection.topic not in topics:
+                continue
+            if connection.id not in connections:
+                connections[connection.id] = writer.add_connection(
+                    connection.topic, connection.msgtype, msgdef=connection.msgdef, md5sum=connection.digest
+                )
+            writer.write(connections[connection.id], time, raw)
+    return path
 
 
 def write_sqlite_bag(source, folder, topics=None):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_bags import write_mcap, write_sqlite_bag
+from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
 
 from mlsm_manager.offline.bag_recording import read_recording
 from recordings.bags.bag import Bag
@@ -104,7 +104,8 @@ def small(tmp_path_factory):
     home = tmp_path_factory.mktemp("damaged")
     topics = {"/tf_static", "/sonar_simulator/settings"}
     (database,) = write_sqlite_bag(BASIN, home / "folder", topics).glob("*.db3")
-    return {".bag": BASIN, ".db3": database, ".mcap": write_mcap(BASIN, home / "whole.mcap", topics)}, home
+    bag, mcap = write_ros1_bag(BASIN, home / "whole.bag", topics), write_mcap(BASIN, home / "whole.mcap", topics)
+    return {".bag": bag, ".db3": database, ".mcap": mcap}, home
 
 
 def refusal(path):

@@ -16,6 +16,8 @@ _SCALE = 50.0
 _INFEASIBLE = 1e-7
 _ROUND = 1e-5
 _TURN = np.arange(12) * math.pi / 6.0
+# Where the first tangent planes of a round surface touch it, in its axes: around the third one, and at both its ends.
+_AROUND = np.vstack([np.column_stack([np.cos(_TURN), np.sin(_TURN), np.zeros(12)]), [[0, 0, 1], [0, 0, -1]]])
 
 
 def nearest_range(world, T_world_beam, planes, max_range):
@@ -59,7 +61,7 @@ def _solid(shape, T_beam_world):
     if shape.kind in ("box", "plane"):
         return _flat_solid(shape, centre, axes)
     reach = math.hypot(shape.size[0], shape.size[1] / 2.0) if shape.kind == "cylinder" else shape.size[0]
-    return max(0.0, np.linalg.norm(centre) - reach), lambda: _round_solid(shape, centre, axes, reach)
+    return max(0.0, np.linalg.norm(centre) - reach), lambda: _round_solid(shape, centre, axes)
 
 
 def _flat_solid(shape, centre, axes):
@@ -71,7 +73,7 @@ def _flat_solid(shape, centre, axes):
     return bound, lambda: (_slabs(centre, axes, half), lambda point: None)
 
 
-def _round_solid(shape, centre, axes, reach):
+def _round_solid(shape, centre, axes):
     radius = shape.size[0]
     along = axes[2] if shape.kind == "cylinder" else np.zeros(3)
     caps = _slabs(centre, axes[2:], [shape.size[1] / 2.0]) if shape.kind == "cylinder" else []
@@ -84,10 +86,8 @@ def _round_solid(shape, centre, axes, reach):
             return None
         return -outward / distance, -(outward / distance @ centre + radius)
 
-    around = [tangent(centre + 2.0 * reach * (math.cos(t) * axes[0] + math.sin(t) * axes[1])) for t in _TURN]
-    if shape.kind == "sphere":
-        around += [tangent(centre + sign * 2.0 * radius * axes[2]) for sign in (1.0, -1.0)]
-    return caps + around, tangent
+    outward = _AROUND @ axes if shape.kind == "sphere" else _AROUND[:-2] @ axes
+    return caps + list(zip(-outward, -(outward @ centre + radius))), tangent
 
 
 def _slabs(centre, axes, halves):

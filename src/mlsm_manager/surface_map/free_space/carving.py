@@ -95,6 +95,10 @@ class Carver:
         note_free(free, findings.free)
         return CarveReport(len(findings.free), len(findings.rows), removed)
 
+    def clear(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> int:
+        """As `carve` for a map whose free space nobody wants to know; return how many blocks went."""
+        return self.charge(occupied, self.findings(occupied, beams, points))
+
     def findings(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> BeamFindings:
         """Return what a scan says whose points (n, >= 3) are in `occupied` already.
 

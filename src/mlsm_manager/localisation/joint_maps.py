@@ -1,0 +1,73 @@
+"""The two maps of a joint run, drawn from its keyframes."""
+
+from typing import Mapping, Tuple
+
+import numpy as np
+
+from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.map_layers import LayerCopies, MapSettings
+from mlsm_manager.localisation.stored_run import StoredRun
+from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.files.map_file import Layer
+
+
+class JointMaps:
+    """shown: the map of clouds that is shown and saved. matched: the map of echoes in which a lost vehicle is searched.
+
+    The matched map is carved by settled scans only: it shows nobody what may still change.
+    """
+
+    def __init__(self, settings: MapSettings) -> None:
+        own = settings
+        self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.kernel, own.carver)
+        self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.kernel, own.carver, most_followed=0)
+
+    @classmethod
+    def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks]) -> "JointMaps":
+        """Return stored maps; one without a matched layer is matched with as it is shown.
+
+        Raises ValueError for other resolutions than those of the settings.
+        """
+        maps, blocks = cls(settings), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        maps.shown.map.insert_blocks(blocks)
+        maps.matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
+        if Layer.FREE in layers:
+            maps.shown.free.restore(layers[Layer.FREE])
+        return maps
+
+    @property
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of all maps, to be stored, each made when it is asked for."""
+        maps = {Layer.SHOWN: self.shown.map, Layer.MATCHED: self.matched.map, Layer.FREE: self.shown.free}
+        return LayerCopies(maps)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        tiles = self.shown.map.take_changed_tiles()
+        return tiles, self.shown.map.in_tiles(tiles)
+
+    def stored(self, session: JointSession) -> StoredRun:
+        """Return the run with what the maps hold of it."""
+        return StoredRun(
+            session.T_map_odom, session.scans, session.solver.stored(), self.shown.moving, self.shown.covered,
+            self.matched.covered,
+        )  # fmt: skip
+
+    def resume(self, run: StoredRun, session: JointSession) -> None:
+        """Draw a stored run, which goes on as `session`, in the maps that were stored with it."""
+        run.shown.uncover(self.shown.map)
+        run.matched.uncover(self.matched.map)
+        for scan in run.scans:
+            if scan.reference_time > session.settled_until:
+                self.matched.add(TimedPoints.of_scan(scan))
+        for cloud in run.clouds:
+            self.shown.add(cloud)
+        self.shown.draw(session, session.settled_until)
+        self.matched.draw(session, session.settled_until)
+
+    def settle(self, session: JointSession) -> None:
+        """Draw all keyframes of a run for the last time."""
+        self.shown.settle(session)
+        self.matched.settle(session)

@@ -1,0 +1,42 @@
+"""What became of a scan or a cloud that a mapper took."""
+
+from dataclasses import dataclass
+from typing import Optional
+
+from mlsm_manager.matching.problem.prediction import Belief
+from mlsm_manager.matching.problem.result import MatchResult
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.free_space.carving import CarveReport
+from mlsm_manager.surface_map.mlsm import InsertReport
+
+MOST_WAITING = 8
+"""Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""
+NOTHING_INSERTED = InsertReport(0, 0, 0)
+
+
+@dataclass(frozen=True)
+class ScanUpdate:
+    """What was done with a scan.
+
+    result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
+    """
+
+    scan: Scan
+    result: Optional[MatchResult]
+    accepted: bool
+    belief: Belief
+
+
+@dataclass(frozen=True)
+class CloudUpdate:
+    """What was done with a cloud.
+
+    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
+    not inserted because the scan of their time was rejected.
+    carved: what its beams said about free space, None where nobody asked or the vehicle's position is not known.
+    """
+
+    report: InsertReport
+    waiting: bool
+    unplaced: int
+    carved: Optional[CarveReport] = None

@@ -1,0 +1,96 @@
+"""Beams that wait until somebody knows where they were taken."""
+
+import time
+from collections import Counter, deque
+from dataclasses import dataclass
+from typing import Callable, Deque, Dict, List, Optional
+
+from sonar_processing.beams.beam import Beam
+
+NEWER_BEAMS = 120  # One revolution of the usual head: tf may be late by a scan, not by more
+PATIENCE = 5.0  # s of wall time: more than twice as long as a busy machine lets a process stand still
+_MEMORY = 10  # times the beams that may wait in peace: a recording played that fast fills them within PATIENCE
+
+
+@dataclass(frozen=True)
+class WaitingBeam:
+    """A beam, whether the vehicle moved when it came, and when that was [s of the queue's clock]."""
+
+    beam: Beam
+    is_moving: bool
+    since: float
+
+
+@dataclass(frozen=True)
+class Departure:
+    """A beam that leaves the queue; `obstacle` says why it cannot be placed, empty when it can."""
+
+    waiting: WaitingBeam
+    obstacle: str
+
+
+class BeamQueue:
+    """Holds beams in the order of their stamps.
+
+    A beam has waited too long once it has done so for `PATIENCE` seconds and `NEWER_BEAMS` beams or those of a whole
+    message wait behind it. Neither of the two is enough: a recording may be played at many times its speed, and a slow
+    head sends a beam a second.
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        """`clock` returns wall time, s."""
+        self._clock = clock
+        self._most = NEWER_BEAMS
+        self._waiting: Deque[WaitingBeam] = deque()
+
+    def __len__(self) -> int:
+        return len(self._waiting)
+
+    def make_room(self, beams: int) -> None:
+        """Let so many beams wait that come at once: those of a whole turn in one message."""
+        self._most = max(NEWER_BEAMS, 2 * beams)
+
+    def clear(self) -> None:
+        """Forget all beams."""
+        self._waiting.clear()
+
+    def frames(self) -> Dict[str, int]:
+        """Return the number of waiting beams of each frame."""
+        return Counter(entry.beam.frame_id for entry in self._waiting)
+
+    def add(self, beam: Beam, is_moving: bool) -> Optional[WaitingBeam]:
+        """Add the newest beam; return the oldest one where it has waited too long, which is then forgotten."""
+        self._waiting.append(WaitingBeam(beam, is_moving, self._clock()))
+        return self._waiting.popleft() if self._oldest_waited_too_long() else None
+
+    def pop(self, obstacle: Callable[[Beam], str]) -> List[Departure]:
+        """Return and forget the beams that need not wait any more, the oldest first.
+
+        These are all that can be placed now; those older than one of the same frame that can, since tf knows nothing
+        more of the past; and those that have waited too long. `obstacle` says why a beam cannot be placed, or "".
+        """
+        entries = list(self._waiting)
+        newest = self._newest_placeable(entries, obstacle)
+        leaves = [index <= newest.get(entry.beam.frame_id, -1) for index, entry in enumerate(entries)]
+        self._waiting = deque(entry for entry, leave in zip(entries, leaves) if not leave)
+        departing = [entry for entry, leave in zip(entries, leaves) if leave]
+        while self._waiting and self._oldest_waited_too_long():
+            departing.append(self._waiting.popleft())
+        return [Departure(entry, obstacle(entry.beam)) for entry in departing]
+
+    @staticmethod
+    def _newest_placeable(entries: List[WaitingBeam], obstacle: Callable[[Beam], str]) -> Dict[str, int]:
+        """Return the index of the newest beam of each frame that can be placed."""
+        found: Dict[str, int] = {}
+        # From the newest back: what tf brings meanwhile can then only help the older ones.
+        for index in reversed(range(len(entries))):
+            beam = entries[index].beam
+            if beam.frame_id not in found and not obstacle(beam):
+                found[beam.frame_id] = index
+        return found
+
+    def _oldest_waited_too_long(self) -> bool:
+        behind = len(self._waiting) - 1
+        if behind >= _MEMORY * self._most:
+            return True
+        return behind >= self._most and self._clock() - self._waiting[0].since > PATIENCE

@@ -1,0 +1,61 @@
+"""Where the free space of a map begins, and which of its maps lose what beams go through, with either estimator."""
+
+import numpy as np
+import pytest
+from made_scans import harbour, scan_of, still, wall
+
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.surface_map.files.map_file import Layer
+
+SONAR_IN_BASE = (5.0, 0.0)
+GHOST = np.array([[2.1, 5.1]])
+"""An echo between the vehicle and the harbour's wall that is heard once."""
+
+
+def localiser_of(estimator, **changes):
+    parameters = MlsmCoreParameters(estimator=estimator, map_input=MapInput.MATCHED, **changes)
+    return parameters.build_localiser(SONAR_IN_BASE)
+
+
+def with_a_ghost(estimator, **changes):
+    """Return the localiser after a scan with the ghost and eight without it."""
+    localiser = localiser_of(estimator, crossings_least=2, crossings_per_point=1.0, free_scans=2, **changes)
+    localiser.mount(np.zeros(2))
+    for turn in range(9):
+        places = np.vstack([harbour(), GHOST]) if turn == 0 else harbour()
+        localiser.take_scan(scan_of(places, still(), start=16.0 * turn))
+    return localiser
+
+
+def has_ghost(blocks):
+    return bool((np.hypot(*(blocks.mean[:, :2] - GHOST).T) < 0.3).any())
+
+
+@pytest.mark.parametrize("estimator", list(Estimator))
+@pytest.mark.parametrize("matching", [False, True])
+def test_free_space_begins_at_the_sonar_and_not_at_the_vehicles_origin(estimator, matching):
+    localiser = localiser_of(estimator, start_matching=matching)
+    localiser.take_scan(scan_of(wall((12.0, -2.0), (12.0, 2.0)), still()))
+    cells = localiser.free.centers
+    assert cells[:, 0].min() == pytest.approx(SONAR_IN_BASE[0], abs=0.5)
+
+
+@pytest.mark.parametrize("matching", [False, True])
+def test_a_sonar_that_is_placed_later_counts_from_then_on(matching):
+    localiser = localiser_of(Estimator.SCAN_BY_SCAN, start_matching=matching)
+    localiser.mount(np.array([8.0, 0.0]))
+    localiser.take_scan(scan_of(wall((12.0, -2.0), (12.0, 2.0)), still()))
+    assert localiser.free.centers[:, 0].min() == pytest.approx(8.0, abs=0.5)
+
+
+@pytest.mark.parametrize("estimator", list(Estimator))
+@pytest.mark.parametrize("layer", [Layer.SHOWN, Layer.MATCHED])
+@pytest.mark.parametrize("matching", [False, True])
+def test_a_block_that_beams_go_through_leaves_both_maps(estimator, layer, matching):
+    kept = with_a_ghost(estimator, start_matching=matching, carve=False).mapper.layers[layer]
+    carved = with_a_ghost(estimator, start_matching=matching).mapper.layers[layer]
+    assert has_ghost(kept)
+    assert not has_ghost(carved)
+    assert len(carved) > 0.9 * len(kept)
