@@ -9,7 +9,7 @@ import pytest
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.recording import scans_of
 from recordings.reading.reader import Request
-from recordings.vehicle.motion import MotionNames
+from recordings.vehicle.motion import MotionNames, MotionSource
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -21,7 +21,7 @@ def micron():
     bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "micron_scanline.bag"
     if not bag.is_file():
         pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
-    return read_recording(bag, Request(motion=MotionNames(is_standing=True)))
+    return read_recording(bag, Request(motion=MotionNames(declared=MotionSource.STANDING)))
 
 
 def test_no_beam_is_lost(micron):

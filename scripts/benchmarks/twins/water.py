@@ -42,6 +42,11 @@ def made_water(path: np.ndarray, parameters: TwinParameters, rng: np.random.Rand
         _fill_disc(kept, origin, place, _CLEARANCE)
     for _ in range(parameters.objects):
         _add_object(free, kept, origin, path[rng.randint(len(path))] + rng.normal(0.0, 16.0, 2), rng)
+    return water_of(free, origin)
+
+
+def water_of(free: np.ndarray, origin: np.ndarray) -> Water:
+    """Return the water of a raster (rows, columns) bool whose first cell is at `origin` (2,) [m]."""
     blurred = gaussian_filter(free.astype(np.float32), 4.0)
     return Water(free, origin, np.stack(np.gradient(blurred)))
 

@@ -42,6 +42,10 @@ class JointParameters(OdometryChoice):
         unit="m", low=0.01, high=10.0, tunable=False,
     )  # fmt: skip
     free_scans: int = parameter(40, "newest scans whose poses may still change", low=2, high=200, tunable=False)
+    normal_deviation: float = parameter(
+        0.0, "standard deviation of the surfaces' normals; above 0, straight walls tell nothing of the way along them",
+        unit="rad", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
     )
@@ -63,7 +67,11 @@ class JointParameters(OdometryChoice):
                 world_scale_deviation=of_world,
                 sonar_delay_deviation=self.sonar_delay_deviation,
             ),
-            matching=SurfaceMatching(range_deviation=self.echo_deviation, block_scans=self.block_scans),
+            matching=SurfaceMatching(
+                range_deviation=self.echo_deviation,
+                normal_deviation=self.normal_deviation,
+                block_scans=self.block_scans,
+            ),
             window=SolverWindow(
                 free_nodes=self.free_scans,
                 lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),

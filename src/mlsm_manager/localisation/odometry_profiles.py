@@ -22,6 +22,9 @@ _COMPASS = (
 )
 _JOINT = Setting("estimator", Estimator.JOINT.value, "the newest scans find their poses together")
 _NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
+_NORMALS = Setting(
+    "normal_deviation", 0.3, "rad: of walls that are heard in a canal; they must not seem to stand still"
+)
 _UNREPORTED = (
     Setting("scale_deviation", 0.0, "no distances are reported"),
     Setting("direction_deviation", 0.0, "no directions of motion are reported"),
@@ -32,6 +35,7 @@ _UNREPORTED = (
     Setting("slip_deviation", 0.07, "m/s: vehicles go ahead; they slip in turns and in a slow current"),
     Setting("slip_time", 20.0, "s: a turn"),
     _NEIGHBOURS,
+    _NORMALS,
 )
 
 PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
@@ -54,6 +58,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("current_deviation", 0.05, "m/s: a current in sheltered water"),
         Setting("current_walk", 0.002, "m/s per root second: the current may change by 0.05 m/s in ten minutes"),
         _NEIGHBOURS,
+        _NORMALS,
         *_COMPASS,
     ),
     OdometryKind.HEADING: (_JOINT, *_UNREPORTED, *_COMPASS),

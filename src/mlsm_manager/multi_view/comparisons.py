@@ -9,8 +9,10 @@ from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.state import BEFORE_THE_RUN, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout
+from mlsm_manager.multi_view.weak_directions import discounted
 
 _PAIR_COLUMNS = 4 * POSE_COLUMNS + RUN_COLUMNS
+_PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
 _MOST_SCANS = 10**8  # two scan numbers fit into one integer key
 
 
@@ -33,10 +35,11 @@ def add_comparisons(
     residual, jacobian = linearised(pairs, sources, targets)
     weight = weights(residual, sources.slants[pairs.rows], targets.slants[pairs.neighbours], matching, cut)
     weight = weight * pairs.importance * np.broadcast_to(importance, len(targets))[pairs.neighbours]
-    columns, information, gradient = _summed(
-        sources.scans[pairs.rows], targets.scans[pairs.neighbours], residual, jacobian, weight, layout
+    scans, other_scans, information, gradient = _summed(
+        sources.scans[pairs.rows], targets.scans[pairs.neighbours], residual, jacobian, weight
     )
-    equations.add_blocks(columns, information, gradient)
+    information, gradient = discounted(information, gradient, scans, _PLACES, matching.normal_deviation)
+    equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
     return len(residual)
 
 
@@ -87,9 +90,8 @@ def _summed(
     residual: np.ndarray,
     jacobian: np.ndarray,
     weight: np.ndarray,
-    layout: Layout,
-) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return columns, information and gradient of each pair of scans."""
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return both scans, information and gradient of each pair of scans."""
     keys = scans * _MOST_SCANS + other_scans - BEFORE_THE_RUN
     order = np.argsort(keys, kind="stable")
     keys, jacobian = keys[order], jacobian[order]
@@ -100,7 +102,7 @@ def _summed(
     for group, (start, end) in enumerate(zip(bounds[:-1], bounds[1:])):
         np.dot(weighted[start:end].T, jacobian[start:end], out=information[group])
     first = keys[bounds[:-1]]
-    return _columns(first // _MOST_SCANS, first % _MOST_SCANS + BEFORE_THE_RUN, layout), information, gradient
+    return first // _MOST_SCANS, first % _MOST_SCANS + BEFORE_THE_RUN, information, gradient
 
 
 def _columns(scans: np.ndarray, other_scans: np.ndarray, layout: Layout) -> np.ndarray:

@@ -55,6 +55,10 @@ class SurfaceMatching(ParameterSet):
     min_cosine: float = parameter(
         0.75, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99
     )
+    normal_deviation: float = parameter(
+        0.0, "standard deviation of surface normals: what a scan may seem to say of the way along a straight wall",
+        unit="rad", low=0.0, high=1.0,
+    )  # fmt: skip
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50
     )
@@ -81,7 +85,7 @@ class SolverWindow(ParameterSet):
     live_iterations: int = parameter(3, "Gauss-Newton steps per scan", low=1, high=50)
     batch_iterations: int = parameter(25, "Gauss-Newton steps at most for a whole run", low=1, high=500)
     tolerance: float = parameter(
-        0.01, "a step below this in every position ends the iteration", unit="m", low=1e-9, high=1.0
+        0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
 
 

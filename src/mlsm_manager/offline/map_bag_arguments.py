@@ -15,6 +15,7 @@ from node_support.command_line import CommandLine
 from node_support.parameters import ParameterError
 from recordings.reading.arguments import add_reading_arguments, request_of, set_values
 from recordings.reading.parameters import ReadingParameters
+from recordings.vehicle.motion import MotionSource
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
@@ -38,6 +39,11 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     )
     parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
     parser.add_argument(
+        "--check", action="store_true",
+        help="with --refine: smooth five times more, with other settings and from another start, and say how far the "
+        "paths lie apart",
+    )  # fmt: skip
+    parser.add_argument(
         "--no-calibrate",
         dest="calibrate",
         action="store_false",
@@ -53,10 +59,13 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.refine and len(options.bags) > 1:
         parser.error("--refine smooths one recording, not several")
+    if options.check and not options.refine:
+        parser.error("--check repeats the smoothing of --refine; give both")
     if options.out is None and not options.inspect:
         parser.error("the following arguments are required: --out")
     if options.vehicle and len(options.bags) > 1:
         parser.error("--vehicle belongs to one recording, not to several")
+    _check_motion(parser, options)
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(set_values(parser, options.set))
     if options.matcher:
@@ -73,6 +82,18 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     if options.refine and options.parameters.estimator is not Estimator.JOINT:
         raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
     return options
+
+
+def _check_motion(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Refuse what is said of the motion where it contradicts itself; nothing known means odometry none."""
+    none, declared = OdometryKind.NONE.value.lower(), options.declared
+    if declared is MotionSource.STANDING and options.odometry == none:
+        parser.error(f"--standing says that the vehicle did not move; --odometry {none} of one that moved is now "
+                     "--unknown-motion")  # fmt: skip
+    if declared is MotionSource.UNKNOWN:
+        if options.odometry not in (None, none):
+            parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")
+        options.odometry = none
 
 
 def _from_file(path: Path) -> Dict[str, Any]:

@@ -32,7 +32,7 @@ def odometry_of(track: Track) -> OdometryFound:
     if turned > _TURNS:
         degrees = np.degrees(turned)
         return OdometryFound(OdometryKind.HEADING, f"the position never changes, the heading by {degrees:.0f} degrees")
-    reason = "neither position nor heading changes, so the vehicle stands still; if it moved, say --odometry none"
+    reason = "neither position nor heading changes, so the vehicle stands still; if it moved, say --unknown-motion"
     return OdometryFound(OdometryKind.DVL, reason)
 
 

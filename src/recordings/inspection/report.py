@@ -7,8 +7,10 @@ from recordings.inspection.survey import Survey
 from recordings.messages.roles import Role
 from recordings.reading.reader import Request
 from recordings.transforms.pose_track import PoseTrack
+from recordings.vehicle.motion import MotionSource
 
 _NOTHING = "none"
+_DECLARED = {MotionSource.STANDING: "--standing", MotionSource.UNKNOWN: "--unknown-motion"}
 _SHOWN = (Role.BEAMS, Role.ODOMETRY, Role.HEADING, Role.DEPTH, Role.VELOCITY, Role.POSITION)
 
 
@@ -43,7 +45,7 @@ def _command(survey: Survey, request: Request) -> str:
     motion = request.motion
     words = ["map_bag", str(survey.path), "--out", f"{survey.path.stem}_map", "--beams", survey.beams or ""]
     words += ["--odometry-topic", motion.odometry] if motion.odometry else []
-    words += ["--standing"] if motion.is_standing else []
+    words += [_DECLARED[motion.declared]] if motion.declared is not None else []
     words += ["--ned"] if motion.z_is_down else []
     words += ["--odom-frame", motion.odom_frame] if motion.odom_frame != "odom" else []
     words += ["--base-frame", motion.base_frame] if motion.base_frame != "base_link" else []

@@ -46,7 +46,8 @@ def survey(path: Path, request: Request) -> Survey:
     """Return what a bag holds and lacks for a request. Raises RecordingError only for a file that cannot be read."""
     if is_makers_log(path):
         raise RecordingError(
-            f"{path}: the log of a sonar holds beams only; give the motion with --vehicle, or --standing"
+            f"{path}: the log of a sonar holds beams only; give the motion with --vehicle, or "
+            "--standing, or --unknown-motion"
         )
     with Bag(path) as bag:
         tree = frame_tree(bag)

@@ -8,7 +8,7 @@ import yaml
 
 from recordings.reading.parameters import ReadingParameters
 from recordings.reading.reader import Request
-from recordings.vehicle.motion import MotionNames
+from recordings.vehicle.motion import MotionNames, MotionSource
 
 
 def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
@@ -18,7 +18,18 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--odometry-topic", metavar="TOPIC", help="poses to use instead of tf (default: the likeliest, if tf has none)"
     )
-    parser.add_argument("--standing", action="store_true", help="the vehicle did not move")
+    known = parser.add_mutually_exclusive_group()
+    known.add_argument(
+        "--standing",
+        dest="declared",
+        action="store_const",
+        const=MotionSource.STANDING,
+        help="the vehicle did not move",
+    )
+    known.add_argument(
+        "--unknown-motion", dest="declared", action="store_const", const=MotionSource.UNKNOWN,
+        help="the vehicle moved, and nothing tells how: no position, no heading",
+    )  # fmt: skip
     parser.add_argument(
         "--vehicle", type=Path, metavar="FILE", help="bag or table with the motion, if the recording has none"
     )
@@ -33,7 +44,7 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
 
 def request_of(options: argparse.Namespace, parameters: ReadingParameters) -> Request:
     """Return what the arguments ask for."""
-    motion = MotionNames(options.odom_frame, options.base_frame, options.odometry_topic, options.standing, options.ned)
+    motion = MotionNames(options.odom_frame, options.base_frame, options.odometry_topic, options.declared, options.ned)
     return Request(options.beams, options.truth, motion, options.vehicle, options.offset, parameters)
 
 

@@ -15,7 +15,7 @@ from recordings.reading.parameters import ReadingParameters
 from recordings.transforms.frame_tree import FrameTree
 from recordings.transforms.pose_track import PoseTrack
 from recordings.vehicle.csv_file import is_table, motion_of_csv
-from recordings.vehicle.motion import Motion, MotionNames, motion_of_bag, standing
+from recordings.vehicle.motion import Motion, MotionNames, declared_motion, motion_of_bag
 from recordings.vehicle.mount import mounted
 
 _Found = TypeVar("_Found")
@@ -86,10 +86,11 @@ def _motion(bag: Optional[Bag], request: Request) -> Motion:
         return motion_of_csv(request.vehicle, request.motion)
     if bag is not None:
         return motion_of_bag(bag, request.motion, request.truth)
-    if request.motion.is_standing:
-        return standing(FrameTree(), request.motion)
+    if request.motion.declared is not None:
+        return declared_motion(FrameTree(), request.motion)
     raise RecordingError(
-        "the log of a sonar does not tell where the vehicle was: give a bag or a table with --vehicle, or --standing"
+        "the log of a sonar does not tell where the vehicle was: give a bag or a table with --vehicle, or --standing, "
+        "or --unknown-motion"
     )
 
 

@@ -22,6 +22,7 @@ class MotionSource(Enum):
     POSES = "poses"
     HEADING = "heading only"
     STANDING = "declared as standing"
+    UNKNOWN = "declared as unknown"
 
 
 @dataclass(frozen=True)
@@ -29,14 +30,14 @@ class MotionNames:
     """How the motion is called in a recording.
 
     odometry: topic with poses, to be used instead of tf; None: tf, and where it does not link the frames the likeliest
-    topic. is_standing: the vehicle did not move. z_is_down: poses count x north, y east, z down; they are turned into
-    x, y left, z up (REP-103).
+    topic. declared: STANDING or UNKNOWN where the user says so; then no poses of the recording are used. z_is_down:
+    poses count x north, y east, z down; they are turned into x, y left, z up (REP-103).
     """
 
     odom_frame: str = "odom"
     base_frame: str = "base_link"
     odometry: Optional[str] = None
-    is_standing: bool = False
+    declared: Optional[MotionSource] = None
     z_is_down: bool = False
 
 
@@ -52,8 +53,8 @@ class Motion:
 def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> Motion:
     """Return the motion that a bag tells; its topic `truth` is not used. Raises RecordingError where it tells none."""
     tree = frame_tree(bag)
-    if names.is_standing:
-        return standing(tree, names)
+    if names.declared is not None:
+        return declared_motion(tree, names)
     if names.odometry is None and tree.way(names.odom_frame, names.base_frame) is not None:
         return Motion(_upward(tree, names), MotionSource.POSES)
     topic = names.odometry or _likeliest(bag, Role.ODOMETRY, truth)
@@ -65,9 +66,9 @@ def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> 
     raise RecordingError(_nothing(bag, tree, names))
 
 
-def standing(tree: FrameTree, names: MotionNames) -> Motion:
-    """Return the motion of a vehicle that did not move."""
-    return Motion(linked(tree, names, PoseTrack.fixed(_NO_SHIFT, _NO_TURN)), MotionSource.STANDING)
+def declared_motion(tree: FrameTree, names: MotionNames) -> Motion:
+    """Return the motion of a vehicle that did not move, or of whose motion nothing is known: one pose for ever."""
+    return Motion(linked(tree, names, PoseTrack.fixed(_NO_SHIFT, _NO_TURN)), names.declared)
 
 
 def linked(tree: FrameTree, names: MotionNames, track: PoseTrack) -> FrameTree:
@@ -130,5 +131,5 @@ def _nothing(bag: Bag, tree: FrameTree, names: MotionNames) -> str:
     tf = f"tf does not tell: {reason}" if tree.tracks else "no /tf"
     return (
         f"{tf}; and no topic holds odometry (Odometry, PoseStamped), so nothing tells where the beams were taken; "
-        f"there are {topics}; if the vehicle stood still, give --standing"
+        f"there are {topics}; if the vehicle stood still, give --standing; if it moved, --unknown-motion"
     )

@@ -12,7 +12,7 @@ from ping360_driver.protocol.messages import MessageId, packed
 from recordings.beams.makers_logs import is_makers_log, makers_beams
 from recordings.errors import RecordingError
 from recordings.reading.reader import Request, read
-from recordings.vehicle.motion import MotionNames
+from recordings.vehicle.motion import MotionNames, MotionSource
 
 TICKS = 400
 SAMPLES = 300
@@ -81,7 +81,7 @@ def test_it_is_known_by_its_first_bytes(turn, tmp_path):
 
 
 def test_it_is_read_as_a_recording_of_a_standing_vehicle(turn):
-    held = read(turn, Request(motion=MotionNames(is_standing=True), offset=1e9))
+    held = read(turn, Request(motion=MotionNames(declared=MotionSource.STANDING), offset=1e9))
     assert held.found.beams[0].stamp_ns == pytest.approx((1e9 + 5.0) * 1e9, abs=1e7)
 
 

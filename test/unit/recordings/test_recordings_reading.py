@@ -83,7 +83,7 @@ def test_with_an_imu_alone_the_heading_is_known(tmp_path):
 def test_a_vehicle_that_is_declared_as_standing_needs_nothing(tmp_path):
     with foreign.written(tmp_path / "a.bag") as bag:
         foreign.add_beams(bag)
-    recording = read_recording(tmp_path / "a.bag", Request(motion=MotionNames(is_standing=True)))
+    recording = read_recording(tmp_path / "a.bag", Request(motion=MotionNames(declared=MotionSource.STANDING)))
     assert all(np.array_equal(one.T_target_sonar, np.eye(4)) for one in recording.beams)
 
 

@@ -1,0 +1,146 @@
+"""Prints how honest the joint solver is in straight canals, whose walls do not tell the way along them.
+
+PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.canals [--posts N ...] [--seeds N] [--odometry heading]
+
+A vehicle with a compass alone goes from one basin through a canal, 200 m long and 20 m wide, into another basin.
+"""
+
+import argparse
+from typing import List, NamedTuple, Tuple
+
+import numpy as np
+
+from benchmarks.twins.odometry import lasting, reported
+from benchmarks.twins.parameters import TwinParameters
+from benchmarks.twins.sonar import heard
+from benchmarks.twins.water import RESOLUTION, Water, water_of
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.offline.echo_shape import EchoShape, suited
+from mlsm_manager.offline.odometry_kind import with_odometry
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.geometry.planar import matrices
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+
+LENGTH, WIDTH = 200.0, 20.0  # m of the canal, which goes along +x from x = 0
+_BASIN = np.array([70.0, 60.0])  # m, length and width of each basin
+_MARGIN = 5.0  # m of land around the water
+_SHORE, _WALL = (3.0, 5.0), (0.15, 1.0)  # m, relief and its length: of the basins' shores, and of sheet piles
+_POST, _BESIDE = 0.4, 8.0  # m: radius of a post, and its distance from the canal's axis
+_WAYPOINTS = ((-35, 12), (-55, 0), (-35, -12), (-15, 0), (-35, 12), (-55, 0), (-35, -8), (-8, 0), (100, 0), (230, 0))
+_STEP, _NEAR, _TURN_RATE = 0.1, 3.0, 0.1  # s between poses; m from a waypoint where the next one counts; rad/s
+_SPEED, _SPEED_NOISE, _SPEED_TIME = 0.28, 0.05, 40.0  # m/s, m/s, s: of the recorded vehicle
+_WEAVE, _WEAVE_TIME = 0.25, 7.0  # rad, s: by which the recorded vehicle leaves its course
+_BEAM_SECONDS, _BEAM_ANGLE, _BIN = 0.069, np.radians(1.8), 0.1  # of the recorded head: a turn in 13.8 s
+_START_NS = 10**12
+
+
+class Figures(NamedTuple):
+    """From the canal on. mean, most: error [m]. told: largest deviation [m]. within: share within three of them."""
+
+    mean: float
+    most: float
+    told: float
+    within: float
+    nees: float
+
+
+def made_canal(posts: int, rng: np.random.RandomState) -> Water:
+    """Return two basins with a canal between them, and `posts` posts along its walls."""
+    origin = np.array([-_BASIN[0], -_BASIN[1] / 2.0]) - _MARGIN
+    size = np.array([LENGTH + 2.0 * _BASIN[0], _BASIN[1]]) + 2.0 * _MARGIN
+    x, y = (np.arange(0.0, extent, RESOLUTION) + start for extent, start in zip(size, origin))
+    shore, wall = (height * lasting(rng, np.full(len(x), RESOLUTION), length) for height, length in (_SHORE, _WALL))
+    in_canal = (x > -1.0) & (x < LENGTH + 1.0)
+    in_basins = (x > -_BASIN[0]) & (x < LENGTH + _BASIN[0]) & ((x < 0.0) | (x > LENGTH))
+    half = np.maximum(np.where(in_canal, WIDTH / 2.0 + wall, 0.0), in_basins * (_BASIN[1] / 2.0 - np.abs(shore)))
+    free = np.abs(y) < half[:, np.newaxis]
+    for _ in range(posts):
+        place = rng.uniform(10.0, LENGTH - 10.0), rng.choice([-_BESIDE, _BESIDE])
+        free &= np.hypot(x[:, np.newaxis] - place[0], y - place[1]) > _POST
+    return water_of(free, origin)
+
+
+def made_path(rng: np.random.RandomState) -> Track:
+    """Return the path of a vehicle that goes ahead, from waypoint to waypoint, not quite straight."""
+    left, poses = list(_WAYPOINTS), [np.array([-20.0, 8.0, 2.0])]
+    count = 20000
+    speeds = _SPEED + _SPEED_NOISE * lasting(rng, np.full(count, _STEP), _SPEED_TIME)
+    weave = _WEAVE * lasting(rng, np.full(count, _STEP), _WEAVE_TIME)
+    for speed, aside in zip(speeds, weave):
+        x, y, yaw = poses[-1]
+        if np.hypot(left[0][0] - x, left[0][1] - y) < _NEAR:
+            left.pop(0)
+        if not left:
+            break
+        turn = np.angle(np.exp(1j * (np.arctan2(left[0][1] - y, left[0][0] - x) + aside - yaw)))
+        yaw += np.clip(turn, -_TURN_RATE * _STEP, _TURN_RATE * _STEP)
+        poses.append(np.array([x + speed * _STEP * np.cos(yaw), y + speed * _STEP * np.sin(yaw), yaw]))
+    return Track(_START_NS * 1e-9 + _STEP * np.arange(len(poses)), np.array(poses))
+
+
+def recording(posts: int, seed: int, binary: bool) -> Tuple[Recording, Track]:
+    """Return what a vehicle with a compass and a scanning sonar records, and its true path."""
+    rng, conditions = np.random.RandomState(seed), TwinParameters(range_scale=0.0, delay=0.0, binary=binary)
+    water, truth = made_canal(posts, rng), made_path(rng)
+    stamps = np.arange(truth.times[0], truth.times[-1] - 2.0, _BEAM_SECONDS)
+    bearings = np.angle(np.exp(1j * _BEAM_ANGLE * np.arange(len(stamps))))
+    strengths = heard(water, truth.at(stamps), bearings, np.zeros(2), conditions, rng)
+    compass = Track(truth.times, reported(truth, conditions, rng).poses * [0.0, 0.0, 1.0])
+    places = matrices(compass.at(stamps))
+    beams = [
+        PlacedBeam(Beam(round(1e9 * time), "sonar", bearing, row, _BIN), place, True)
+        for time, bearing, row, place in zip(stamps, bearings, strengths, places)
+    ]
+    return Recording(beams, 0, compass, None), truth
+
+
+def solver_input(made: Recording, kind: OdometryKind, shape: EchoShape) -> Tuple[List[Scan], MultiViewParameters]:
+    """Return scans and parameters as map_bag has them."""
+    parameters = suited(with_odometry(ReplayParameters(), kind, ()), shape, ())
+    errors = parameters.part(OdometryErrors)
+    scans = [scan for scan, _ in scans_of(made, parameters.echoes())]
+    return scans, parameters.solver_parameters(errors, parameters.range_scale_deviation)
+
+
+def figures(solver: LiveSolver, truth: Track) -> Figures:
+    """Return how far the live path was from the truth, and whether it told so."""
+    estimates = [one for one in solver.estimates if truth.at(one.time)[0] > 0.0]
+    path = np.array([one.T_map_base[:2] for one in estimates])
+    error = path - (truth.at(np.array([one.time for one in estimates])) - truth.poses[0])[:, :2]
+    covariances = np.array([one.pose_covariance[:2, :2] for one in estimates])
+    squared = np.einsum("na,na->n", error, np.linalg.solve(covariances, error[..., np.newaxis])[..., 0])
+    distance, told = np.hypot(*error.T), np.sqrt(np.trace(covariances, axis1=1, axis2=2))
+    return Figures(distance.mean(), distance.max(), told.max(), (distance < 3.0 * told).mean(), squared.mean() / 2.0)
+
+
+def main() -> None:
+    """Print one line per run."""
+    parser = argparse.ArgumentParser(prog="benchmarks.canals", description=__doc__)
+    parser.add_argument("--posts", type=int, nargs="+", default=[0, 12], help="along the canal (default: 0 and 12)")
+    parser.add_argument("--seeds", type=int, default=3, help="runs with each number of posts (default: %(default)s)")
+    parser.add_argument("--graded", action="store_true", help="echoes with strengths instead of plateaus")
+    arguments = parser.parse_args()
+    shape = EchoShape.PEAK if arguments.graded else EchoShape.PLATEAU
+    for posts in arguments.posts:
+        for seed in range(arguments.seeds):
+            made, truth = recording(posts, seed, not arguments.graded)
+            scans, parameters = solver_input(made, OdometryKind.HEADING, shape)
+            solver = LiveSolver(parameters, made.sonar_in_base)
+            for scan in scans:
+                solver.add(scan)
+            found = figures(solver, truth)
+            print(
+                f"{posts} posts, seed {seed}: {found.mean:.1f} m in the mean, {found.most:.1f} m at most, told "
+                f"{found.told:.1f} m at most; within three told deviations {100.0 * found.within:.0f} %, NEES per "
+                f"state {found.nees:.2f}", flush=True,
+            )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main()
