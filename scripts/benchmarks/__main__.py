@@ -5,6 +5,7 @@ from functools import partial
 from typing import Callable, Dict, List
 
 from benchmarks import (
+    carving_figures,
     growth_figures,
     large_map_figures,
     map_figures,
@@ -25,6 +26,7 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "growth": growth_figures.rows,
     "map": map_figures.rows,
     "large-map": large_map_figures.rows,
+    "carving": carving_figures.rows,
     "marina": marina_figures.rows,
     "matching": matching_figures.rows,
     "others": lambda: other_libraries.rows() + other_registrations.rows(),
