@@ -70,7 +70,7 @@ def test_it_stops_when_commands_cease():
     state = vehicle.state(15.0)
     assert state.is_still
     assert state.T_world_base[0, 3] - position < 0.8 * (PARAMETERS.command_timeout + 2.0 * PARAMETERS.response_time)
-    np.testing.assert_array_equal(vehicle.state(20.0).T_world_base, state.T_world_base)
+    np.testing.assert_allclose(vehicle.state(20.0).T_world_base, state.T_world_base, rtol=0.0, atol=1e-12)
 
 
 def test_commands_are_in_the_frame_of_the_body():
