@@ -96,6 +96,7 @@ def steps() -> List[Step]:
         *oldest_versions(),
         _pytest("recordings", "test/recordings", load=Load.SPARE),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
+        _pytest("documentation", "test/documentation", load=Load.SPARE),
         _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),
         _pytest("installation", "test/installation", load=Load.SHARED),
         *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"))),
