@@ -106,7 +106,8 @@ class Thresholder:
         return max(float(value), parameters.min_threshold)
 
     def _otsu(self, strengths: np.ndarray) -> float:
-        echoes = strengths[strengths > 0]
+        # By index, because a mask with many changes takes four times as long.
+        echoes = strengths.take(np.flatnonzero(strengths > 0))
         if not echoes.size or echoes.min() == echoes.max():
             return 0.0
         return otsu_threshold(echoes if self.parameters.otsu_nonzero else strengths)
