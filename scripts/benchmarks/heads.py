@@ -3,6 +3,7 @@
 PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.heads [--worlds basin harbour] [--draws N]
 
 Each tour is simulated once per head. Its odometry is then drawn N times, with errors as those of a DVL and a compass.
+Beside what the solver reaches stands how far off any solver must be (benchmarks.information_bound).
 """
 
 import argparse
@@ -11,11 +12,12 @@ from typing import List, Tuple
 import numpy as np
 import yaml
 
+from benchmarks.information_bound import bounds
 from benchmarks.matching_scans import KINDS, RAYS, SonarKind
 from benchmarks.tour_scans import BEAMS_AT_ONCE, ROOT, START_NS
 from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
@@ -24,7 +26,7 @@ from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from node_support.geometry.planar import matrices
+from node_support.geometry.planar import matrices, wrapped
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_simulator.simulation.simulation_setup import Settings, Setup, make_setup
@@ -33,9 +35,9 @@ from sonar_simulator.vehicle.robot_description import RobotDescription
 _STEP = 0.1  # s between poses of the odometry
 
 
-def recordings(world: str, kind: SonarKind, draws: int) -> List[Tuple[Recording, Track]]:
+def recordings(setup: Setup, draws: int) -> List[Tuple[Recording, Track]]:
     """Return recordings of one simulated tour, each with another odometry, and the true path of each."""
-    setup, times, poses, beams = _setup(world, kind), [], [], []
+    times, poses, beams = [], [], []
     for moment in setup.simulation.moments(20.0, BEAMS_AT_ONCE):
         time, pose = START_NS * 1e-9 + moment.time, moment.truth.T_world_base
         if not times or time > times[-1]:
@@ -76,16 +78,25 @@ def _drawn(truth: Track, beams: List[Beam], T_base_sonar: np.ndarray, seed: int)
 
 def figures(recording: Recording, truth: Track) -> np.ndarray:
     """Return (2, 3) of the live and of the batch solver: mean error [m], NEES per state, median deviation [m]."""
-    sigma = echo_sigma([placed.beam for placed in recording.beams])
-    parameters = suited(ReplayParameters(), EchoShape.PEAK, (), sigma)
     solver = LiveSolver(MultiViewParameters(), recording.sonar_in_base)
-    for scan, _ in scans_of(recording, parameters.echoes()):
+    for scan in _scans(recording):
         solver.add(scan)
     batch, times = solved(solver), solver.log.node_times[1:]
     live = np.array([estimate.T_map_base for estimate in solver.estimates])
     fitted = recording.track.at(times) + batch.state.nodes[1:, :3]
     covariances = np.array([estimate.pose_covariance for estimate in solver.estimates]), batch.pose_covariances[1:]
     return np.array([_judged(path, truth.at(times), own) for path, own in zip((live, fitted), covariances)])
+
+
+def _scans(recording: Recording) -> List[Scan]:
+    sigma = echo_sigma([placed.beam for placed in recording.beams])
+    parameters = suited(ReplayParameters(), EchoShape.PEAK, (), sigma)
+    return [scan for scan, _ in scans_of(recording, parameters.echoes())]
+
+
+def _head_step(recording: Recording) -> float:
+    """Return the angle between beams [rad]."""
+    return float(np.median(np.abs(wrapped(np.diff([placed.beam.angle for placed in recording.beams])))))
 
 
 def _judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> Tuple[float, float, float]:
@@ -103,8 +114,12 @@ def main() -> None:
     arguments = parser.parse_args()
     for world in arguments.worlds:
         for kind in KINDS:
-            live, batch = np.mean([figures(*made) for made in recordings(world, kind, arguments.draws)], axis=0)
-            print(f"{world}, {kind}: " + "; ".join(
+            setup = _setup(world, kind)
+            made = recordings(setup, arguments.draws)
+            known, unknown = bounds(_scans(made[0][0]), made[0][1], setup.world, _head_step(made[0][0]))
+            print(f"{world}, {kind}: bound {known:.3f} m with the map known, {unknown:.3f} m without", flush=True)
+            live, batch = np.mean([figures(*one) for one in made], axis=0)
+            print("    " + "; ".join(
                 f"{name} {error:.2f} m, NEES per state {nees:.2f}, deviation {deviation:.2f} m"
                 for name, (error, nees, deviation) in (("live", live), ("batch", batch))
             ), flush=True)  # fmt: skip

@@ -1,24 +1,27 @@
 """Fits a whole run at once, starting from what the live solver found."""
 
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.association import pairs_of
-from mlsm_manager.multi_view.comparisons import add_comparisons
+from mlsm_manager.multi_view.association import Pairs, pairs_of
+from mlsm_manager.multi_view.comparisons import add_comparisons, support
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.loops import Loop, add_loops, loops_of
 from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.placement import place
+from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS, Layout, State
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
+_PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
+_CONVINCING = 10.0  # nats by which a run with loops must fit better
 _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
 
@@ -35,6 +38,44 @@ class BatchResult:
     run_covariance: np.ndarray
     steps: int
     converged: bool
+
+
+@dataclass(frozen=True)
+class Closed:
+    """batch: the fit that the run speaks for. loops: places visited again that it goes back to; none where it does not.
+
+    gain: nats by which the run speaks for the fit with loops, less if below 0; NaN where none was found.
+    """
+
+    batch: BatchResult
+    loops: List[Loop]
+    gain: float
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return it for summary.json."""
+        return {
+            "gain": None if np.isnan(self.gain) else round(self.gain, 1),
+            "found": [loop.line() for loop in self.loops],
+        }
+
+
+def closed(live: LiveSolver, batch: BatchResult) -> Closed:
+    """Return the fit with places visited again that their shape tells, if the run fits better so than in `batch`.
+
+    What was found only pulls the run near; where it ends, comparisons of echoes and the odometry say alone.
+    """
+    loops = loops_of(live.log, live.odometry, batch.state, live.parameters)
+    if not loops:
+        return Closed(batch, [], np.nan)
+    problem = _Batch(live.log, live.odometry, live.parameters, batch.state.copy(), loops)
+    for _ in range(_PULLED_STEPS):
+        problem.step()
+    other = solved(live, start=problem.state)
+    without, with_loops = (
+        _Batch(live.log, live.odometry, live.parameters, some.state.copy()).evidence() for some in (batch, other)
+    )
+    gain = with_loops - without
+    return Closed(other, loops, gain) if gain > _CONVINCING else Closed(batch, [], gain)
 
 
 def solved(
@@ -56,25 +97,27 @@ def solved(
 
 
 class _Batch:
-    def __init__(self, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, state: State) -> None:
+    def __init__(
+        self,
+        log: RunLog,
+        odometry: OdometryModel,
+        parameters: MultiViewParameters,
+        state: State,
+        loops: Sequence[Loop] = (),
+    ) -> None:
         self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
+        self._loops, self._start = list(loops), state.copy()
         self._solution = None
         self._move = np.zeros(self._layout.size)
         self._lists: Optional[NeighbourLists] = None
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
-        equations = NormalEquations(self._layout.size)
-        odometry, sonar, matching = self._odometry, self._parameters.sonar, self._parameters.matching
-        add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
-        add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
-        odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
-        points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
-        if self._lists is None:
-            self._lists = NeighbourLists(points, matching.block_scans)
-        pairs = pairs_of(self._lists, points, points, matching.cut, matching)
+        equations, matching = self._expected(), self._parameters.matching
+        add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
+        points, pairs = self._met()
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
@@ -82,6 +125,29 @@ class _Batch:
         self.state.run += self._move[self._layout.run_start :]
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
+
+    def evidence(self) -> float:
+        """Return how much [nats] comparisons and odometry speak for the state: echoes on surfaces less odd motions."""
+        points, pairs = self._met()
+        on_surfaces = support(pairs, points, points, self._parameters.matching)
+        return on_surfaces - 0.5 * self._expected().cost
+
+    def _expected(self) -> NormalEquations:
+        """Return what is expected of the unknowns without any echo."""
+        equations = NormalEquations(self._layout.size)
+        odometry, sonar = self._odometry, self._parameters.sonar
+        add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
+        add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
+        odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
+        return equations
+
+    def _met(self) -> Tuple[PlacedPoints, Pairs]:
+        """Return all points and their comparisons."""
+        matching = self._parameters.matching
+        points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
+        if self._lists is None:
+            self._lists = NeighbourLists(points, matching.block_scans)
+        return points, pairs_of(self._lists, points, points, matching.cut, matching)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)

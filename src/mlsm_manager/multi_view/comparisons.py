@@ -74,6 +74,14 @@ def weights(
     return matching.weight / variance / (1.0 + residual**2 / variance / widening**2) ** 2
 
 
+def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, matching: SurfaceMatching) -> float:
+    """Return how much [nats] comparisons speak for the places of points: what the kernel leaves of each at most."""
+    i, j = pairs.rows, pairs.neighbours
+    residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
+    ratio = residual**2 / variances(sources.slants[i], targets.slants[j], matching)
+    return float(0.5 * matching.weight * (pairs.importance / (1.0 + ratio)).sum())
+
+
 def variances(slant: np.ndarray, other_slant: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
     """Return the variances (m,) [m^2] of residuals whose points have slants (m,) [m]."""
     return matching.range_deviation**2 + matching.beam_half_width**2 * (slant**2 + other_slant**2)

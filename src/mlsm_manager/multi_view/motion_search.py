@@ -38,9 +38,10 @@ def searched_node(
         return newest
     sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
     shifts = _cells(step[:2, :2])
-    fits = _fits(sources, place(log, odometry, state, before), shifts, matching)
+    moved = sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
+    found = fits(sources, place(log, odometry, state, before), moved, matching)
     costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
-    best = shifts[np.argmax(_NATS * fits - costs)]
+    best = shifts[np.argmax(_NATS * found - costs)]
     return newest + step[:, :2] @ np.linalg.solve(step[:2, :2], best)
 
 
@@ -54,9 +55,8 @@ def _cells(covariance: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros((1, 2)), shifts[distance <= _REACH**2]])
 
 
-def _fits(sources: PlacedPoints, targets: PlacedPoints, shifts: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
-    """Return how many points (k,) lie on surfaces after shifts (k, 2) of the scan's end; nearly counts in part."""
-    moved = sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
+def fits(sources: PlacedPoints, targets: PlacedPoints, moved: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
+    """Return how many points (k,) lie on surfaces when they are `moved` to places (k, n, 2); nearly counts in part."""
     distance, index = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=matching.cut)
     found = np.isfinite(distance)
     index = np.where(found, index, 0).reshape(moved.shape[:2])

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Dict, Optional, Sequence
 
+from mlsm_manager.multi_view.batch_solver import Closed
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
@@ -12,10 +13,11 @@ from mlsm_manager.self_check.verdict import Verdict
 
 @dataclass(frozen=True)
 class Found:
-    """Both come from the fit of the whole run where there is one."""
+    """calibration, trust: of the fit of the whole run where there is one. closing: which places it goes back to."""
 
     calibration: Calibration
     trust: Trust
+    closing: Optional[Closed] = None
 
     @classmethod
     def of(cls, replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Verdict] = ()) -> "Found":
@@ -23,8 +25,14 @@ class Found:
         solver = replayed.solver
         live = Calibration.of_live(solver)
         calibration = live if refined is None else Calibration.of_batch(solver, refined.batch)
-        return cls(calibration, trust(replayed, refined, refitted))
+        return cls(calibration, trust(replayed, refined, refitted), None if refined is None else refined.closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""
-        return {"calibration": self.calibration.to_mapping(), **self.trust.to_mapping(), "trust": self.trust.line}
+        loops = {} if self.closing is None else {"loops": self.closing.to_mapping()}
+        return {
+            "calibration": self.calibration.to_mapping(),
+            **self.trust.to_mapping(),
+            **loops,
+            "trust": self.trust.line,
+        }

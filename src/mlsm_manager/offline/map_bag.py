@@ -51,6 +51,8 @@ from sonar_processing.beams.beam_correction import BeamCorrection
 
 # The frame that live.yaml's nodes call their map by default.
 _MAP_FRAME = "map"
+# Loops that are printed; summary.json has all.
+_MOST_LOOPS = 5
 
 
 def run_map_bag() -> None:
@@ -233,6 +235,8 @@ def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
         found = session["found_after_scans"]
         place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
         lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
+    if "loops" in summary:
+        lines += [f"loop: {line}" for line in summary["loops"]["found"][:_MOST_LOOPS]]
     if "trust" in summary:
         lines.append(summary["trust"])
     files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]

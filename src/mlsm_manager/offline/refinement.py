@@ -10,7 +10,7 @@ from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.batch_solver import BatchResult, solved
+from mlsm_manager.multi_view.batch_solver import BatchResult, Closed, closed, solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.path import solved_path
 from mlsm_manager.surface_map.blocks import Blocks
@@ -19,19 +19,27 @@ from mlsm_manager.surface_map.files.map_file import Layer
 
 @dataclass(frozen=True)
 class Refined:
-    """poses: (m, 3) T_map_base at the recording's odometry times. layers: of the map drawn anew. batch: the fit."""
+    """poses: (m, 3) T_map_base at the recording's odometry times. layers: of the map drawn anew.
+
+    closing: the fit, and the places visited again that it goes back to.
+    """
 
     poses: np.ndarray
     layers: Mapping[Layer, Blocks]
-    batch: BatchResult
+    closing: Closed
+
+    @property
+    def batch(self) -> BatchResult:
+        """The fit."""
+        return self.closing.batch
 
 
 def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
     """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
-    batch = solved(solver)
+    closing = closed(solver, solved(solver))
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(TimedPoints.of_scan(scan))
-    surfaces.settle(SolvedPlacement(solver.log, solver.odometry, batch.state))
-    poses = solved_path(track, solver.odometry, batch.node_times, batch.state.nodes, track.times)
-    return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, batch)
+    surfaces.settle(SolvedPlacement(solver.log, solver.odometry, closing.batch.state))
+    poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
+    return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)

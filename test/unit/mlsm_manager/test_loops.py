@@ -1,0 +1,107 @@
+"""A vehicle comes back far from where its odometry says, and is found by the shape of what it hears."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, tour
+
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.batch_solver import Closed, closed, solved
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.loops import Loop, agreed, loops_of
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from node_support.geometry.planar import inverse, transformed
+
+DEAF = range(15, 25)  # scans that hear nothing, while the odometry goes astray
+RETURNED = slice(26, None)  # nodes of the scans after these
+
+
+def astray(made, drift):
+    """Return the scans of a tour, and its odometry, which drifts by `drift` (2,) [m] while nothing is heard."""
+    start, end = (made.scans[number].reference_time for number in (DEAF[0], DEAF[-1]))
+    share = np.clip((made.odometry.times - start) / (end - start), 0.0, 1.0)[:, np.newaxis]
+    track = Track(made.odometry.times, made.odometry.poses + share * np.append(drift, 0.0))
+    return [_heard_by(scan, number, track) for number, scan in enumerate(made.scans)], track
+
+
+def _heard_by(scan, number, track):
+    points = transformed(track.at(scan.times), transformed(inverse(scan.track.at(scan.times)), scan.points))
+    heard = np.full(len(points), number not in DEAF)
+    return Scan(points[heard], scan.times[heard], scan.moving[heard], track, scan.reference_time)
+
+
+def followed(scans):
+    solver = LiveSolver(MultiViewParameters(), SONAR_IN_BASE)
+    for scan in scans:
+        solver.add(scan)
+    return solver
+
+
+def errors(solver, batch, track, made):
+    times = solver.log.node_times[RETURNED]
+    found = track.at(times) + batch.state.nodes[RETURNED, :3]
+    return np.hypot(*(found - made.truth.at(times))[:, :2].T)
+
+
+@pytest.mark.parametrize("drift", [(12.0, -6.0), (9.0, 9.0)])
+def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift):
+    made = tour(40)
+    scans, track = astray(made, np.array(drift))
+    solver = followed(scans)
+    without = solved(solver)
+    found = closed(solver, without)
+    assert errors(solver, without, track, made).mean() > 5.0
+    assert errors(solver, found.batch, track, made).mean() < 1.0
+    assert found.gain > 100.0
+    assert "of its echoes fit there" in found.to_mapping()["found"][0]
+
+
+def test_a_run_that_is_not_astray_has_no_loops():
+    solver = followed(tour(40).scans)
+    batch = solved(solver)
+    found = closed(solver, batch)
+    assert found.batch is batch
+    assert found.to_mapping() == {"gain": None, "found": []}
+
+
+def test_noise_makes_no_loops():
+    rng = np.random.RandomState(0)
+
+    def noisy(scan):
+        points = scan.points.copy()
+        points[:, :2] = scan.track.at(scan.times)[:, :2] + rng.uniform(-30.0, 30.0, (len(points), 2))
+        return replace(scan, points=points)
+
+    solver = followed([noisy(scan) for scan in tour(40).scans])
+    assert loops_of(solver.log, solver.odometry, solver.state, solver.parameters) == []
+
+
+def test_a_canal_makes_no_loops():
+    """Along straight walls every place fits as well as the next."""
+    rng, made = np.random.RandomState(1), tour(40)
+
+    def between_walls(scan):
+        places = made.truth.at(scan.times)
+        x = places[:, 0] + rng.uniform(-20.0, 20.0, len(scan.points))
+        heard = np.column_stack([x, rng.choice([-12.0, 12.0], len(x)) + rng.normal(0.0, 0.1, len(x))])
+        points = scan.points.copy()
+        points[:, :2] = transformed(scan.track.at(scan.times), transformed(inverse(places), heard))
+        return replace(scan, points=points)
+
+    solver = followed([between_walls(scan) for scan in made.scans])
+    batch = solved(solver)
+    assert loops_of(solver.log, solver.odometry, batch.state, solver.parameters) == []
+
+
+def test_a_loop_that_other_scans_do_not_confirm_is_none():
+    def loop(scan, x):
+        return Loop(scan, 1, np.array([x, 0.0]), 0.9, 0.1, 0.5)
+
+    alike = [loop(30, 8.0), loop(31, 9.0), loop(33, 8.0)]
+    assert agreed([*alike, loop(32, -8.0), loop(50, 8.0)]) == alike
+    assert agreed(alike[:2]) == []
+
+
+def test_a_fit_without_loops_says_so():
+    assert Closed(None, [], np.nan).to_mapping()["gain"] is None
