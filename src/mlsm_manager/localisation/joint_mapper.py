@@ -32,6 +32,7 @@ from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import POSE_COLUMNS
 from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
@@ -103,7 +104,12 @@ class JointMapper:
         times = np.array([estimate.time for estimate in newest])
         radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
         agreements = np.array([estimate.agreement for estimate in newest])
-        return [recent_agreement(times, agreements, _CHECKED_SCANS), told_deviation(times, np.array(radii))]
+        surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
+        return [
+            recent_agreement(times, agreements, _CHECKED_SCANS),
+            told_deviation(times, np.array(radii)),
+            *surfaces_tell(times, surfaces, self.parameters.odometry.distance_deviation),
+        ]
 
     @property
     def solver(self) -> Optional[LiveSolver]:
