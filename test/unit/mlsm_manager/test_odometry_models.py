@@ -12,6 +12,7 @@ from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.normal_equations import NormalEquations
@@ -194,3 +195,11 @@ def test_in_a_straight_canal_the_told_deviation_covers_the_error():
     distance = np.hypot(*errors_of(solver, canal)[:, :2].T)
     assert (distance < 3.0 * told).all()
     assert told[-1] > 5.0
+
+
+def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
+    canal = tour(15, noise=0.3, path=along_canal, corners=CANAL)
+    scans = [unheard_beyond(scan, 30.0) for scan in canal.scans]
+    batch = solved(followed(scans, OdometryKind.HEADING, free_scans=5))
+    assert batch.converged
+    assert batch.steps < 15
