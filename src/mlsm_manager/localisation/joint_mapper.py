@@ -152,20 +152,26 @@ class JointMapper:
             return {}
         return self._maps.stored(session).arrays()
 
-    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
         """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
 
-        A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
-        other resolutions than those of the settings.
+        Return why the stored run cannot go on; nothing where it does, or where there is none. A map without a matched
+        layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for other resolutions than
+        those of the settings.
         """
         self._take(layers)
         run = StoredRun.of_arrays(keyframes)
         if run is None:
-            return
+            return ""
         try:
             self._resume_run(run)
-        except (RefusedInput, KeyError, ValueError):
+        except KeyError as error:
             self._take(layers)
+            return f"no {error} is stored"
+        except (RefusedInput, ValueError) as error:
+            self._take(layers)
+            return str(error)
+        return ""
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
         maps = JointMaps.of_layers(self.settings, layers)
