@@ -1,14 +1,15 @@
 """Fits a whole run at once, starting from what the live solver found."""
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.association import blocks_of, pairs_between
+from mlsm_manager.multi_view.association import pairs_of
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -17,6 +18,7 @@ from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS, Layout, State
 
+_MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
 
@@ -35,10 +37,16 @@ class BatchResult:
     converged: bool
 
 
-def solved(live: LiveSolver) -> BatchResult:
-    """Return the fit of all scans that `live` has taken; its own state stays as it is."""
-    problem = _Batch(live.log, live.odometry, live.parameters, live.state.copy())
-    window = live.parameters.window
+def solved(
+    live: LiveSolver, parameters: Optional[MultiViewParameters] = None, start: Optional[State] = None
+) -> BatchResult:
+    """Return the fit of all scans that `live` has taken; its own state stays as it is.
+
+    parameters, start: others than those of `live`, with the same odometry.
+    """
+    parameters, start = parameters or live.parameters, start or live.state
+    problem = _Batch(live.log, live.odometry, parameters, start.copy())
+    window = parameters.window
     steps, converged = 0, False
     while steps < window.batch_iterations and not converged:
         converged = problem.step() < window.tolerance or problem.step_deviations < window.settled
@@ -53,22 +61,30 @@ class _Batch:
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
         self._solution = None
+        self._move = np.zeros(self._layout.size)
+        self._lists: Optional[NeighbourLists] = None
 
     def step(self) -> float:
-        """Take one Gauss-Newton step and return the largest move of a node along x or y [m]."""
+        """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
         equations = NormalEquations(self._layout.size)
         odometry, sonar, matching = self._odometry, self._parameters.sonar, self._parameters.matching
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
         points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
-        pairs = pairs_between(points, points, blocks_of(points, matching.block_scans), matching.cut, matching)
+        if self._lists is None:
+            self._lists = NeighbourLists(points, matching.block_scans)
+        pairs = pairs_of(self._lists, points, points, matching.cut, matching)
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
         self._solution = solution_of(equations)
-        nodes = self._solution.step[: self._layout.run_start].reshape(-1, self._layout.width)
-        self.state.nodes += nodes
-        self.state.run += self._solution.step[self._layout.run_start :]
-        return float(np.abs(nodes[:, :2]).max())
+        self._move = self._solution.step + _MOMENTUM * self._move
+        self.state.nodes += self._nodes_of(self._move)
+        self.state.run += self._move[self._layout.run_start :]
+        moves = self._nodes_of(self._solution.step)[:, :2]
+        return float(np.sqrt((moves**2).sum(axis=1).mean()))
+
+    def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
+        return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
 
     @property
     def step_deviations(self) -> float:

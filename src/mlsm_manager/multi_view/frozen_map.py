@@ -1,11 +1,9 @@
 """Older scans that no longer move: the nearest blocks of them, what they say and how certain they are."""
 
 from dataclasses import dataclass
-from typing import List
 
 import numpy as np
 
-from mlsm_manager.multi_view.association import BlockIndex, blocks_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import PlacedPoints, place
@@ -21,12 +19,11 @@ _NO_DISTANCE = 1e-9  # m: keeps blocks at one place from dividing by zero
 class FrozenMap:
     """Points of frozen blocks, placed with the run's unknowns at `run` (2,).
 
-    indices: a search tree per block. importance: (n,) factor of each point's weight, 0 at the border of what is near.
+    importance: (n,) factor of each point's weight, 0 at the border of what is near.
     numbers: (b,) the blocks that are near, in the order of time.
     """
 
     points: PlacedPoints
-    indices: List[BlockIndex]
     importance: np.ndarray
     numbers: np.ndarray
     run: np.ndarray
@@ -56,7 +53,7 @@ def nearest_blocks(
     )
     points = place(log, odometry, state, rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
-    return FrozenMap(points, blocks_of(points, scans), per_point, numbers, state.run.copy())
+    return FrozenMap(points, per_point, numbers, state.run.copy())
 
 
 def fading(distances: np.ndarray, most: int) -> np.ndarray:

@@ -5,11 +5,12 @@ from typing import Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.agreement import agreement, surfaces_met
-from mlsm_manager.multi_view.association import blocks_of, pairs_between
+from mlsm_manager.multi_view.association import pairs_of
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.multi_view.odometry_model import OdometryModel, frozen_deviations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -54,6 +55,7 @@ class LiveWindow:
         self._start, self._known = start, known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
+        self._lists: Optional[Tuple[NeighbourLists, NeighbourLists]] = None
         self._met = ()
 
     def _groups(self, first: int) -> np.ndarray:
@@ -113,7 +115,11 @@ class LiveWindow:
         recent = place(self._log, self._odometry, self._state, self._log.rows(self._recent, self._layout.last))
         sources = recent.selected(recent.scans >= self._layout.first)
         frozen = self._frozen.moved_by_run(self._state.run)
-        to_frozen = pairs_between(sources, frozen, self._frozen.indices, cut, matching)
+        if self._lists is None:
+            self._lists = tuple(NeighbourLists(targets, matching.block_scans) for targets in (frozen, recent))
+        to_frozen, to_recent = (
+            pairs_of(lists, sources, targets, cut, matching) for lists, targets in zip(self._lists, (frozen, recent))
+        )
         importance = self._frozen.importance
         self._met = ()
         count = add_comparisons(equations, self._layout, to_frozen, sources, frozen, matching, cut, importance)
@@ -121,7 +127,6 @@ class LiveWindow:
             to_known, known = self._known.compared(sources, cut, matching)
             count += add_comparisons(equations, self._layout, to_known, sources, known, matching, cut)
             self._met += ((to_known, sources, known),)
-        to_recent = pairs_between(sources, recent, blocks_of(recent, matching.block_scans), cut, matching)
         self._met += ((to_frozen, sources, frozen), (to_recent, sources, recent))
         return count + add_comparisons(equations, self._layout, to_recent, sources, recent, matching, cut)
 

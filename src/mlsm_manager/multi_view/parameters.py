@@ -85,7 +85,7 @@ class SolverWindow(ParameterSet):
     live_iterations: int = parameter(3, "Gauss-Newton steps per scan", low=1, high=50)
     batch_iterations: int = parameter(25, "Gauss-Newton steps at most for a whole run", low=1, high=500)
     tolerance: float = parameter(
-        0.01, "a step below this in every position ends the iteration", unit="m", low=1e-9, high=1.0
+        0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
     settled: float = parameter(
         0.0,

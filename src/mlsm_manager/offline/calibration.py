@@ -6,6 +6,7 @@ from typing import Any, Dict, Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.batch_solver import BatchResult
+from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -30,10 +31,15 @@ class Calibration:
     @classmethod
     def of_live(cls, solver: LiveSolver) -> "Calibration":
         """Return what the newest estimate of a run knows; the solver must have taken a scan."""
-        newest, columns = solver.estimates[-1], solver.odometry.calibrated
+        return cls.of_estimate(solver, solver.estimates[-1])
+
+    @classmethod
+    def of_estimate(cls, solver: LiveSolver, estimate: LiveEstimate) -> "Calibration":
+        """Return what one of the estimates of `solver` knows."""
+        columns = solver.odometry.calibrated
         of_node, of_run = list(columns.values()), list(_OF_RUN.values())
-        deviations = np.append(_of_run(newest.run_deviations, solver), newest.node_deviations[of_node])
-        return cls((*_OF_RUN, *columns), np.append(newest.run[of_run], newest.node[of_node]), deviations)
+        deviations = np.append(_of_run(estimate.run_deviations, solver), estimate.node_deviations[of_node])
+        return cls((*_OF_RUN, *columns), np.append(estimate.run[of_run], estimate.node[of_node]), deviations)
 
     @classmethod
     def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":

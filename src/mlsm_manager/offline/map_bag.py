@@ -23,6 +23,7 @@ from mlsm_manager.offline.mission_report import mission_of
 from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
+from mlsm_manager.offline.refitting import refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import (
@@ -40,6 +41,7 @@ from mlsm_manager.offline.run_files import (
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.report.mission import Mission
 from mlsm_manager.self_check.north_east_down import suspicions
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
@@ -83,8 +85,10 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     scans = _scans(recording, parameters, options)
     _warn_of_z_down(recording, scans, options)
     replayed = _replayed(recording, scans, parameters)
+    _tell_of_refused(replayed, options)
     refined = _refined(recording, replayed, parameters) if options.refine else None
-    found = None if replayed.solver is None else Found.of(replayed, refined)
+    refitted = _refitted(replayed, refined) if options.check else []
+    found = None if replayed.solver is None else Found.of(replayed, refined, refitted)
     known = parameters if found is None else found.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known)
@@ -151,6 +155,14 @@ def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParamet
         return replay(recording, scans, parameters, bar.update)
 
 
+def _tell_of_refused(replayed: Replayed, options: Namespace) -> None:
+    """Say which scans were left out. Raises RecordingError where no scan is left."""
+    for reason, count in replayed.refused.items():
+        print(f"map_bag: {options.bags[0]}: left out {count} {reason}", file=sys.stderr)
+    if not replayed.updates:
+        raise RecordingError(f"{options.bags[0]}: not one of {sum(replayed.refused.values())} scans could be used")
+
+
 def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
     return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
 
@@ -158,6 +170,11 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
 def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
     with _bar(None, "", "refine"):
         return refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
+
+
+def _refitted(replayed: Replayed, refined: Refined) -> List[Verdict]:
+    with _bar(None, "", "check"):
+        return refitted_verdicts(replayed.solver, refined.batch)
 
 
 def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Namespace) -> List[Session]:
@@ -188,7 +205,12 @@ def _poses(replayed: Replayed) -> Dict[str, np.ndarray]:
 def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
     poses = _poses(replayed)
     stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
-    counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
+    counts = {
+        "scans": len(replayed.scans),
+        "matched": replayed.matched,
+        "rejected": replayed.rejected,
+        "left_out": dict(replayed.refused),
+    }
     if refined is not None:
         poses[REFINED] = refined.poses
         stored = replace(stored, layers=refined.layers)

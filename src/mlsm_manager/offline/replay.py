@@ -1,7 +1,8 @@
 """Gives a recording to the localiser as the live graph would have given it."""
 
+from collections import Counter
 from dataclasses import dataclass, field
-from typing import Callable, List, Optional, Sequence
+from typing import Callable, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -14,6 +15,7 @@ from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.files.map_file import StoredMap
+from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed
 
 
@@ -22,7 +24,7 @@ class Replayed:
     """What came of a replay.
 
     times: (m,) s of the odometry. odometry, corrected: (m, 3) T_odom_base and T_map_base, the second as it was known
-    at each moment. updates: of all scans, oldest first.
+    at each moment. updates: of all scans that were taken, oldest first. refused: how many were not, by the reason.
     """
 
     times: np.ndarray
@@ -30,10 +32,11 @@ class Replayed:
     corrected: np.ndarray
     mapper: ScanMapper
     updates: List[ScanUpdate] = field(default_factory=list)
+    refused: Mapping[str, int] = field(default_factory=dict)
 
     @property
     def scans(self) -> List[Scan]:
-        """All scans, oldest first."""
+        """All scans that were taken, oldest first."""
         return [update.scan for update in self.updates]
 
     @property
@@ -64,20 +67,24 @@ def replay(
     `known` is a map to start in, at a place in it that has to be found.
 
     A scan is used from the moment on at which its last beam and the odometry that the localiser waits for were known.
+    One that is refused is left out, as the live node leaves it out.
     """
     localiser, track = parameters.build_localiser(recording.sonar_in_base), recording.track
     if known is not None:
         localiser.restore(known, same_odometry=False)
-    corrections, updates = np.empty((len(track.times), 3)), []
+    corrections, updates, refused = np.empty((len(track.times), 3)), [], Counter()
     done = 0
     for scan in scans:
         known = max(done, int(np.searchsorted(track.times, scan.reference_time + localiser.lookahead, side="left")))
         corrections[done:known] = _corrections(localiser, track, done, known)
         done = known
-        updates.append(localiser.take_scan(scan).scan)
+        try:
+            updates.append(localiser.take_scan(scan).scan)
+        except RefusedInput as reason:
+            refused[reason.kind] += 1
         on_scans(1)
     corrections[done:] = _corrections(localiser, track, done, len(track.times))
-    return Replayed(track.times, track.poses, composed(corrections, track.poses), localiser.mapper, updates)
+    return Replayed(track.times, track.poses, composed(corrections, track.poses), localiser.mapper, updates, refused)
 
 
 def _corrections(localiser: Localiser, track: Track, start: int, end: int) -> np.ndarray:

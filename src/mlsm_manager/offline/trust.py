@@ -1,7 +1,7 @@
 """Whether a run can be trusted, told without any truth: the checks of map_bag."""
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -72,8 +72,11 @@ class Trust:
         return {"checks": checks, "deviation_per_minute": told}
 
 
-def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
-    """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
+def trust(replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Verdict] = ()) -> Trust:
+    """Return what the checks say of a run of the joint solver; of the refined path where there is one.
+
+    refitted: what other fits of the run say.
+    """
     solver = replayed.solver
     estimates = solver.estimates
     ends = np.array([estimate.time for estimate in estimates])
@@ -88,7 +91,8 @@ def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
         ),
     ]
     halves = _halves(replayed.scans, solver)
-    return Trust(verdicts if halves is None else [*verdicts, halves], deviations)
+    verdicts += [] if halves is None else [halves]
+    return Trust([*verdicts, *refitted], deviations)
 
 
 def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:
@@ -111,14 +115,15 @@ def _batch_deviations(refined: Refined) -> Deviations:
 
 
 def _halves(scans: List[Scan], solver: LiveSolver) -> Optional[Verdict]:
-    """Compare the calibration of each half of the run, made without the other one."""
+    """Compare the calibration of each half of the run, made without the other one.
+
+    What was known after the first half came from that half alone; the second is solved anew.
+    """
     middle = len(scans) // 2
-    found = []
-    for half in (scans[:middle], scans[middle:]):
-        if len(half) < _FEWEST_SCANS:
-            return None
-        found.append(_calibrated(half, solver.parameters, solver.log.sonar_in_base))
-    first, second = found
+    if middle < _FEWEST_SCANS:
+        return None
+    first = Calibration.of_estimate(solver, solver.estimates[middle - 1])
+    second = _calibrated(scans[middle:], solver.parameters, solver.log.sonar_in_base)
     return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
 
 

@@ -9,11 +9,12 @@ from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.association import BlockIndex, Pairs, blocks_of, pairs_between
+from mlsm_manager.multi_view.association import Pairs, pairs_of
 from mlsm_manager.multi_view.comparisons import linearised, weights
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.frozen_map import fading, joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations, SparseSolution
 from mlsm_manager.multi_view.odometry_motion import Motion
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
@@ -46,22 +47,9 @@ def some_state(log):
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
     placed = place(log, DVL, some_state(log), log.rows(0, 3))
-    pairs = pairs_between(placed, placed, blocks_of(placed, 5), 2.0, SurfaceMatching())
+    pairs = pairs_of(NeighbourLists(placed, 5), placed, placed, 2.0, SurfaceMatching())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
-
-
-def test_a_point_meets_the_nearest_point_of_all_other_scans_of_its_block():
-    places, scans = np.random.RandomState(3).uniform(0.0, 9.0, (60, 2)), np.repeat(np.arange(3), 20)
-    sources, neighbours, distance = BlockIndex(places, np.arange(60), scans).nearest(places, scans, 2.0)
-    apart = np.hypot(*(places[:, np.newaxis] - places).transpose(2, 0, 1))
-    apart[scans[:, np.newaxis] == scans] = np.inf
-    nearest = apart.argmin(axis=1)
-    near = np.flatnonzero(apart.min(axis=1) < 2.0)
-    order = np.argsort(sources)
-    np.testing.assert_array_equal(sources[order], near)
-    np.testing.assert_array_equal(neighbours[order], nearest[near])
-    np.testing.assert_allclose(distance[order], apart.min(axis=1)[near])
 
 
 @pytest.mark.parametrize("unknown", range(2))
