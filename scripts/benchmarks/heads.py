@@ -7,7 +7,7 @@ Beside what the solver reaches stands how far off any solver must be (benchmarks
 """
 
 import argparse
-from typing import List, Tuple
+from typing import List, NamedTuple, Tuple
 
 import numpy as np
 import yaml
@@ -35,8 +35,22 @@ from sonar_simulator.vehicle.robot_description import RobotDescription
 _STEP = 0.1  # s between poses of the odometry
 
 
+class Simulated(NamedTuple):
+    """A tour without any odometry. truth: the vehicle's path. T_base_sonar: (4, 4)."""
+
+    truth: Track
+    beams: List[Beam]
+    T_base_sonar: np.ndarray
+
+
 def recordings(setup: Setup, draws: int) -> List[Tuple[Recording, Track]]:
     """Return recordings of one simulated tour, each with another odometry, and the true path of each."""
+    tour = simulated(setup)
+    return [(_drawn(tour, seed), tour.truth) for seed in range(draws)]
+
+
+def simulated(setup: Setup) -> Simulated:
+    """Return what is heard on a tour."""
     times, poses, beams = [], [], []
     for moment in setup.simulation.moments(20.0, BEAMS_AT_ONCE):
         time, pose = START_NS * 1e-9 + moment.time, moment.truth.T_world_base
@@ -49,31 +63,35 @@ def recordings(setup: Setup, draws: int) -> List[Tuple[Recording, Track]]:
                 Beam(stamp_ns, "sonar", moment.ping.angle, moment.ping.strengths, setup.sonar.range_resolution)
             )
     path, steps = Track(np.array(times), np.array(poses)), np.arange(times[0], times[-1], _STEP)
-    truth = Track(steps, path.at(steps))
-    return [(_drawn(truth, beams, setup.T_base_sonar, seed), truth) for seed in range(draws)]
+    return Simulated(Track(steps, path.at(steps)), beams, setup.T_base_sonar)
 
 
-def _setup(world: str, kind: SonarKind) -> Setup:
+def tour_setup(world: str, tour: str, kind: SonarKind) -> Setup:
+    """Return the simulation of the tour yaml/`world`_`tour`.yaml."""
     values = yaml.safe_load((ROOT / "yaml/sonar_simulator_demo.yaml").read_text())
     rows, columns = RAYS[kind.rays]
     values.update(
         laser_cone={"spread": kind.spread}, sonar={"ray_rows": rows, "ray_columns": columns},
-        world=f"worlds/{world}.sdf", script=f"yaml/{world}_tour.yaml", odometry={"scale_error": 0.0},
+        world=f"worlds/{world}.sdf", script=f"yaml/{world}_{tour}.yaml", odometry={"scale_error": 0.0},
     )  # fmt: skip
     robot = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
     return make_setup(Settings.from_mapping(values), ROOT, robot, lambda warning: None)
 
 
-def _drawn(truth: Track, beams: List[Beam], T_base_sonar: np.ndarray, seed: int) -> Recording:
+def _drawn(tour: Simulated, seed: int) -> Recording:
     """Return the recording with odometry errors drawn from what the solver expects of a DVL and a compass."""
     rng, expected = np.random.RandomState(seed), DvlOdometry()
     errors = TwinParameters(
         direction=rng.normal(0.0, expected.direction_deviation), scale=rng.normal(0.0, expected.scale_deviation)
     )
-    made = reported(truth, errors, rng)
-    odometry = Track(made.times, made.poses + np.append(truth.poses[0, :2], 0.0))
-    places = matrices(odometry.at(np.array([beam.stamp_ns for beam in beams]) * 1e-9)) @ T_base_sonar
-    return Recording([PlacedBeam(beam, place, True) for beam, place in zip(beams, places)], 0, odometry, None)
+    made = reported(tour.truth, errors, rng)
+    return recorded(tour, Track(made.times, made.poses + np.append(tour.truth.poses[0, :2], 0.0)))
+
+
+def recorded(tour: Simulated, odometry: Track) -> Recording:
+    """Return the recording of a tour with an odometry."""
+    places = matrices(odometry.at(np.array([beam.stamp_ns for beam in tour.beams]) * 1e-9)) @ tour.T_base_sonar
+    return Recording([PlacedBeam(beam, place, True) for beam, place in zip(tour.beams, places)], 0, odometry, None)
 
 
 def figures(recording: Recording, truth: Track) -> np.ndarray:
@@ -114,7 +132,7 @@ def main() -> None:
     arguments = parser.parse_args()
     for world in arguments.worlds:
         for kind in KINDS:
-            setup = _setup(world, kind)
+            setup = tour_setup(world, "tour", kind)
             made = recordings(setup, arguments.draws)
             known, unknown = bounds(_scans(made[0][0]), made[0][1], setup.world, _head_step(made[0][0]))
             print(f"{world}, {kind}: bound {known:.3f} m with the map known, {unknown:.3f} m without", flush=True)

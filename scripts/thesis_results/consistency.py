@@ -3,7 +3,7 @@
 from typing import Dict, List
 
 import numpy as np
-from benchmarks.heads import figures, recordings
+from benchmarks.heads import figures, recordings, tour_setup
 from benchmarks.matching_moves import SEEDS, nees_band, session_errors, session_scans, session_track
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
 from matplotlib.axes import Axes
@@ -67,7 +67,7 @@ def _row(kind: SonarKind, squares: np.ndarray) -> List[str]:
 
 
 def _joint(world: str, kind: SonarKind) -> List[str]:
-    runs = np.array([figures(*made) for made in recordings(world, kind, DRAWS)])
+    runs = np.array([figures(*made) for made in recordings(tour_setup(world, "tour", kind), DRAWS)])
     cells = [
         text
         for error, nees, deviation in runs.mean(axis=0)

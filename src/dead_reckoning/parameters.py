@@ -14,6 +14,14 @@ class VelocitySource(Enum):
     COMMANDS = "COMMANDS"
 
 
+class HeadingType(Enum):
+    """What the compass publishes."""
+
+    IMU = "IMU"
+    COMPASS_DEGREES = "COMPASS_DEGREES"
+    COMPASS_RADIANS = "COMPASS_RADIANS"
+
+
 class DepthType(Enum):
     """What the depth sensor publishes."""
 
@@ -41,6 +49,13 @@ class DeadReckoningParameters(StampParameters):
         1.0, "the same for commands, which drivers of thrusters repeat several times a second",
         unit="s", low=0.05, high=3600.0,
     )  # fmt: skip
+    heading_type: HeadingType = parameter(
+        HeadingType.IMU,
+        "messages on the topic imu: IMU (sensor_msgs/Imu with an orientation), COMPASS_DEGREES or COMPASS_RADIANS "
+        "(std_msgs/Float64, clockwise from north, as MAVROS's compass_hdg); the latter have no stamp, no tilt and no "
+        "frame: the vehicle counts as level, the compass as aligned with it",
+        tunable=False,
+    )
     longest_gap: float = parameter(2.0, "warn when no heading comes for longer", unit="s", low=0.01, high=3600.0)
     depth_type: DepthType = parameter(
         DepthType.NONE,

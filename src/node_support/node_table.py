@@ -233,7 +233,11 @@ NODES: Dict[str, NodeDescription] = {
         "Odometry for a vehicle without a DVL: adds up the velocity that the scans tell, or that the thrusters are "
         "told, along the heading of a compass. See [dead_reckoning](dead_reckoning.md).",
         (
-            _subscribes(topics.HEADING, "sensor_msgs/Imu", "orientation, x east or any fixed direction, z up"),
+            _subscribes(
+                topics.HEADING,
+                "sensor_msgs/Imu or Float64",
+                "orientation, x east or any fixed direction, z up; `heading_type` sets the type",
+            ),
             _subscribes(
                 topics.DEPTH,
                 "PoseWithCovarianceStamped, Float64 or FluidPressure",

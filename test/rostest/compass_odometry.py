@@ -95,6 +95,18 @@ class DeadReckoning(unittest.TestCase):
         self.assertAlmostEqual(_yaw(odometry.pose.pose.orientation), _yaw(message.orientation), places=6)
         self.diagnostics.wait_for("dead_reckoning", "headings without a mount", 1)
 
+    def test_5_a_compass_that_publishes_degrees_counts_clockwise_from_north(self) -> None:
+        """East is 90 degrees; what is no heading is counted, and the next one is taken."""
+        odometry, headings = Inbox("/level/odom", Odometry), _publisher("/level/compass", Float64)
+        odometry.wait_for_link()
+        for heading in (math.nan, 90.0):
+            headings.publish(Float64(data=heading))
+        east = odometry.wait_for(lambda _: True)
+        self.assertAlmostEqual(_yaw(east.pose.pose.orientation), 0.0, places=6)
+        headings.publish(Float64(data=135.0))
+        south_east = odometry.wait_for(lambda message: message.header.stamp > east.header.stamp)
+        self.assertAlmostEqual(_yaw(south_east.pose.pose.orientation), -math.pi / 4.0, places=6)
+
 
 def _publisher(topic: str, kind: type) -> rospy.Publisher:
     made = rospy.Publisher(topic, kind, queue_size=1000)

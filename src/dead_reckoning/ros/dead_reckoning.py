@@ -13,7 +13,8 @@ from std_msgs.msg import Float64
 
 from dead_reckoning.dead_reckoner import GAPS, DeadReckoner, Reckoning
 from dead_reckoning.depth import depth_of_pressure
-from dead_reckoning.parameters import DeadReckoningParameters, DepthType, VelocitySource
+from dead_reckoning.heading import rotation_of_heading
+from dead_reckoning.parameters import DeadReckoningParameters, DepthType, HeadingType, VelocitySource
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame
@@ -62,7 +63,8 @@ class DeadReckoning:
             DepthType.ALTITUDE: (Float64, lambda message: -message.data),
             DepthType.PRESSURE: (FluidPressure, self._depth_of_pressure),
         }
-        inputs = [velocities[parameters.velocity_source], (topics.HEADING, Imu, self._take_heading)]
+        heading = (Imu, self._take_imu) if parameters.heading_type is HeadingType.IMU else (Float64, self._take_compass)
+        inputs = [velocities[parameters.velocity_source], (topics.HEADING, *heading)]
         if parameters.depth_type in depths:
             kind, depth_of = depths[parameters.depth_type]
             inputs.append((topics.DEPTH, kind, lambda message: self._take_depth(depth_of(message))))
@@ -91,11 +93,18 @@ class DeadReckoning:
         with self._lock:
             self._reckoner.take_velocity(stamp_ns, np.array([twist.linear.x, twist.linear.y, twist.linear.z]))
 
-    def _take_heading(self, message: Imu) -> None:
+    def _take_imu(self, message: Imu) -> None:
         self.health.count("headings in")
         stamp_ns = message.header.stamp.to_nsec()
         self._transforms.check_stamp(stamp_ns)
-        rotation = self._orientation_of_vehicle(message)
+        self._take_orientation(stamp_ns, self._orientation_of_vehicle(message))
+
+    def _take_compass(self, message: Float64) -> None:
+        self.health.count("headings in")
+        rotation = rotation_of_heading(message.data, self._live.current.heading_type)
+        self._take_orientation(rospy.get_rostime().to_nsec(), rotation)
+
+    def _take_orientation(self, stamp_ns: int, rotation: np.ndarray) -> None:
         with self._lock:
             reckoning = self._reckoner.take_orientation(stamp_ns, rotation)
         if reckoning.gap:

@@ -33,6 +33,7 @@ from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import POSE_COLUMNS
 from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
@@ -104,7 +105,12 @@ class JointMapper:
         times = np.array([estimate.time for estimate in newest])
         radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
         agreements = np.array([estimate.agreement for estimate in newest])
-        return [recent_agreement(times, agreements, _CHECKED_SCANS), told_deviation(times, np.array(radii))]
+        surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
+        return [
+            recent_agreement(times, agreements, _CHECKED_SCANS),
+            told_deviation(times, np.array(radii)),
+            *surfaces_tell(times, surfaces, self.parameters.odometry.distance_deviation),
+        ]
 
     @property
     def solver(self) -> Optional[LiveSolver]:
@@ -147,20 +153,26 @@ class JointMapper:
             return {}
         return self._maps.stored(session).arrays()
 
-    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
         """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
 
-        A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
-        other resolutions than those of the settings.
+        Return why the stored run cannot go on; nothing where it does, or where there is none. A map without a matched
+        layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for other resolutions than
+        those of the settings.
         """
         self._take(layers)
         run = StoredRun.of_arrays(keyframes)
         if run is None:
-            return
+            return ""
         try:
             self._resume_run(run)
-        except (RefusedInput, KeyError, ValueError):
+        except KeyError as error:
             self._take(layers)
+            return f"no {error} is stored"
+        except (RefusedInput, ValueError) as error:
+            self._take(layers)
+            return str(error)
+        return ""
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
         maps = JointMaps.of_layers(self.settings, layers)

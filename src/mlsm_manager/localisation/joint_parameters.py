@@ -15,6 +15,10 @@ _LATE = 3.0
 _LONGEST_LOOKAHEAD = 1.0
 # Older scans that a scan is compared with: more than see one place in a tour.
 _FROZEN_SCANS = 80
+# Relative deviation of reported distances from which on they hardly hold a path where no surface does; and by how many
+# deviations per node such a path may still move when it is as good as it gets.
+_POOR_DISTANCES = 0.1
+_SETTLED = 0.1
 
 
 class Estimator(Enum):
@@ -74,6 +78,7 @@ class JointParameters(OdometryChoice):
             ),
             window=SolverWindow(
                 free_nodes=self.free_scans,
+                settled=0.0 if odometry.distance_deviation < _POOR_DISTANCES else _SETTLED,
                 lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
                 max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),
             ),

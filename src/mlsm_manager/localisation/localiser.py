@@ -262,15 +262,15 @@ class Localiser:
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
         return StoredMap(frame, layers, calibration, made, arrays, run)
 
-    def restore(self, stored: StoredMap, same_odometry: bool) -> None:
-        """Take a stored map in the place of the present one.
+    def restore(self, stored: StoredMap, same_odometry: bool) -> str:
+        """Take a stored map in the place of the present one; return why its run cannot go on, else nothing.
 
         With the odometry under which it was stored the vehicle is expected where the stored correction puts it, and is
         searched everywhere too when three scans do not match there; otherwise it is searched everywhere from the start.
         Raises ValueError, and keeps the present map, for other resolutions than those of the parameters.
         """
         with self._lock:
-            self.mapper.restore(stored.layers, stored.arrays if same_odometry else {})
+            reason = self.mapper.restore(stored.layers, stored.arrays if same_odometry else {})
             self._changes += 1
             self._live.clear()
             self._newest = None
@@ -280,6 +280,7 @@ class Localiser:
                 self.mapper.start_from(place.widened, place.correction)
                 self._live.start_from(place.correction)
                 self._search.expect()
+        return reason
 
     def clear(self) -> int:
         """Forget map and place; return how many blocks the map had."""

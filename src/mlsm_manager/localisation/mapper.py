@@ -71,8 +71,8 @@ class Mapper:
         """None: a pose never changes once its scan is in the map."""
         return {}
 
-    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
-        """Take stored maps in the place of the present ones, and forget the place.
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
+        """Take stored maps in the place of the present ones, and forget the place; there is no run to go on with.
 
         A map without a matched layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for
         other resolutions than those of the settings.
@@ -85,6 +85,7 @@ class Mapper:
             restored.free.insert_blocks(layers[Layer.FREE])
         self.shown, self.matched, self.free = restored.shown, restored.matched, restored.free
         self.forget_place()
+        return ""
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
         """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""

@@ -22,9 +22,7 @@ _COMPASS = (
 )
 _JOINT = Setting("estimator", Estimator.JOINT.value, "the newest scans find their poses together")
 _NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
-_NORMALS = Setting(
-    "normal_deviation", 0.3, "rad: of walls that are heard in a canal; they must not seem to stand still"
-)
+_NORMALS = Setting("normal_deviation", 0.2, "rad: of a straight wall's normals, as a beam of 2.5 degrees hears it")
 _UNREPORTED = (
     Setting("scale_deviation", 0.0, "no distances are reported"),
     Setting("direction_deviation", 0.0, "no directions of motion are reported"),

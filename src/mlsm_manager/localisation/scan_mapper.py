@@ -64,10 +64,11 @@ class ScanMapper(Protocol):
     def keyframes(self) -> Mapping[str, np.ndarray]:
         """What else must be stored to go on with scans whose poses may still change, as arrays by name."""
 
-    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> None:
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
         """Take stored maps in the place of the present ones; raises ValueError for other resolutions.
 
-        keyframes: as stored, where the odometry is still the same; empty else.
+        Return why the stored run cannot go on; nothing where it does, or where there is none. keyframes: as stored,
+        where the odometry is still the same; empty else.
         """
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:

@@ -12,13 +12,23 @@ from mlsm_manager.multi_view.placement import PlacedPoints
 _ON_SURFACE = 1.0  # deviations within which a point lies on a surface
 
 
-def agreement(
-    met: Sequence[Tuple[Pairs, PlacedPoints, PlacedPoints]], scan: int, matching: SurfaceMatching
-) -> Tuple[float, float]:
+Met = Sequence[Tuple[Pairs, PlacedPoints, PlacedPoints]]
+"""Comparisons with the sets of points that they compare."""
+
+
+def surfaces_met(met: Met, scan: int) -> np.ndarray:
+    """Return the sum (2, 2) of the outer products of the normals of all surfaces that a scan was compared with."""
+    total = np.zeros((2, 2))
+    for pairs, sources, targets in met:
+        own = sources.scans[pairs.rows] == scan
+        normals = targets.normals[pairs.neighbours[own]]
+        total += np.einsum("n,na,nb->ab", pairs.importance[own], normals, normals)
+    return total
+
+
+def agreement(met: Met, scan: int, matching: SurfaceMatching) -> Tuple[float, float]:
     """Return the share of a scan's comparisons in which its point lies on its neighbour's surface, and the mean
     distance [m] from it; 0 without any.
-
-    met: comparisons with the sets of points that they compare.
     """
     near = weight = distance = 0.0
     for pairs, sources, targets in met:

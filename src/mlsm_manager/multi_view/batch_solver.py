@@ -27,7 +27,7 @@ _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
 @dataclass(frozen=True)
 class BatchResult:
-    """The whole run. steps: how many were taken. converged: the last one moved the nodes by less than the tolerance.
+    """The whole run. steps: how many were taken. converged: the last one was as short as the parameters ask for.
 
     node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2).
     """
@@ -90,7 +90,7 @@ def solved(
     window = parameters.window
     steps, converged = 0, False
     while steps < window.batch_iterations and not converged:
-        converged = problem.step() < window.tolerance
+        converged = problem.step() < window.tolerance or problem.step_deviations < window.settled
         steps += 1
     poses, run = problem.covariances()
     return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
@@ -151,6 +151,11 @@ class _Batch:
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
+
+    @property
+    def step_deviations(self) -> float:
+        """Root mean square over the nodes of the last step, in its standard deviations."""
+        return self._solution.step_deviations / float(np.sqrt(len(self.state.nodes)))
 
     def covariances(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""

@@ -19,7 +19,7 @@ class LiveEstimate:
     reported in base_link. drift: how the true motion differs from it.
     world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
-    mean distance of the scan's points from these surfaces.
+    mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
     """
 
     time: float
@@ -36,6 +36,7 @@ class LiveEstimate:
     comparisons: int
     agreement: float
     distance: float
+    surfaces: np.ndarray
 
     @property
     def pose_covariance(self) -> np.ndarray:

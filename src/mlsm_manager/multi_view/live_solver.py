@@ -10,6 +10,7 @@ from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
 from mlsm_manager.multi_view.motion_search import searched_node
+from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
@@ -51,6 +52,7 @@ class LiveSolver:
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name."""
         return {
+            "odometry": _name_of(self.odometry),
             "nodes": self._nodes.values,
             "node_covariances": self._node_covariances.values,
             "run_unknowns": self._run,
@@ -71,6 +73,8 @@ class LiveSolver:
 
         Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
         """
+        if not np.array_equal(stored["odometry"], _name_of(parameters.odometry)):
+            raise ValueError("it was stored with another odometry profile")
         start, known = stored["start"], stored["known"]
         solver = cls(
             parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None
@@ -144,3 +148,8 @@ class LiveSolver:
         covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         matching = self.parameters.matching
         self._nodes.values[-1] = searched_node(self.log, self.odometry, self.state, covariance, matching)
+
+
+def _name_of(odometry: OdometryModel) -> np.ndarray:
+    """Return the name of a model (n,) uint8, as a map's file keeps it: models of equal width mean other unknowns."""
+    return np.frombuffer(type(odometry).__name__.encode(), dtype=np.uint8)

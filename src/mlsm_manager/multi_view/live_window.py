@@ -4,7 +4,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.agreement import agreement
+from mlsm_manager.multi_view.agreement import agreement, surfaces_met
 from mlsm_manager.multi_view.association import pairs_of
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import LiveEstimate
@@ -160,5 +160,5 @@ class LiveWindow:
             world_scale_deviation=self._parameters.sonar.world_scale_deviation,
             reported_velocity=self._log.odometry.velocity_at(self._motion.times[-1]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
-            agreement=share, distance=distance,
+            agreement=share, distance=distance, surfaces=surfaces_met(self._met, self._layout.last - 1),
         )  # fmt: skip

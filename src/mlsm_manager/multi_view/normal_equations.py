@@ -66,18 +66,24 @@ class NormalEquations:
         return (whole[: self.size, : self.size] + _REGULARISATION * scipy.sparse.eye(self.size)).tocsc()
 
 
+def step_deviations(gradient: np.ndarray, step: np.ndarray) -> float:
+    """Return how long a step (size,) is in its own standard deviations: sqrt(step^T information step)."""
+    return float(np.sqrt(max(0.0, -gradient @ step)))
+
+
 def solution_of(equations: NormalEquations) -> "Union[DenseSolution, SparseSolution]":
     """Return the solution, found in the way that is faster for its size."""
     return DenseSolution(equations) if equations.size <= _MOST_DENSE else SparseSolution(equations)
 
 
 class DenseSolution:
-    """Solves normal equations of bounded size, and tells covariances."""
+    """Solves normal equations of bounded size, and tells covariances. step_deviations: see the function."""
 
     def __init__(self, equations: NormalEquations) -> None:
         information, self._to_held = equations.dense()
         self._factor = scipy.linalg.cho_factor(information)
         self.step = -scipy.linalg.cho_solve(self._factor, equations.gradient)
+        self.step_deviations = step_deviations(equations.gradient, self.step)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the inverse of the information times `right` (size, k)."""
@@ -96,11 +102,12 @@ class DenseSolution:
 
 
 class SparseSolution:
-    """Solves normal equations of a whole run, and tells covariances."""
+    """Solves normal equations of a whole run, and tells covariances. step_deviations: see the function."""
 
     def __init__(self, equations: NormalEquations) -> None:
         self._factor = scipy.sparse.linalg.splu(equations.sparse())
         self.step = -self._factor.solve(equations.gradient)
+        self.step_deviations = step_deviations(equations.gradient, self.step)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the inverse of the information times `right` (size, k)."""

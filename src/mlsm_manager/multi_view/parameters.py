@@ -87,6 +87,12 @@ class SolverWindow(ParameterSet):
     tolerance: float = parameter(
         0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
+    settled: float = parameter(
+        0.0,
+        "so does one of which each node's share is below so many standard deviations, root mean square: where nothing "
+        "tells a direction, comparisons with nearest neighbours let the path creep along it for ever",
+        low=0.0, high=1.0,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

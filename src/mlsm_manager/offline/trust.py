@@ -14,6 +14,7 @@ from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.self_check.calibration_agreement import halves_agree
 from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.odometry_agreement import against_odometry
 from mlsm_manager.self_check.path_spread import per_minute, told_deviation
 from mlsm_manager.self_check.verdict import Verdict
@@ -85,6 +86,9 @@ def trust(replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Ver
         *_against_odometry(replayed, path, solver.odometry),
         recent_agreement(ends, np.array([estimate.agreement for estimate in estimates])),
         told_deviation(deviations.times, deviations.radii),
+        *surfaces_tell(
+            ends, np.array([estimate.surfaces for estimate in estimates]), solver.odometry.distance_deviation
+        ),
     ]
     halves = _halves(replayed.scans, solver)
     verdicts += [] if halves is None else [halves]

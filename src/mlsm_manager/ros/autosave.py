@@ -64,11 +64,14 @@ class Autosave:
             if not self._run or stored.run != self._run:
                 self._folder.put_aside(self._name)
                 return False
-            load_into(self._localiser, stored, self._parameters, same_odometry=True)
+            reason = load_into(self._localiser, stored, self._parameters, same_odometry=True)
         except (OSError, ValueError) as error:
             self._health.problem("maps not resumed", f"{error}; a new map begins, the file is put aside")
             self._folder.put_aside(self._name)
             return False
+        if reason:
+            detail = f"{reason}; its map is kept, and the vehicle is searched in it"
+            self._health.problem("runs not resumed", detail)
         self._saved_at = self._localiser.changes
         rospy.loginfo("%s: goes on in the map of %d blocks", self._health.name, self._localiser.block_count)
         return True

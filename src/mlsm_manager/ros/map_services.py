@@ -93,8 +93,11 @@ def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, run: str = 
     return localiser.stored(parameters.map_frame, parameters.calibration, time.time(), run)
 
 
-def load_into(localiser: Localiser, stored: StoredMap, parameters: MlsmCoreParameters, same_odometry: bool) -> None:
-    """Take a stored map in the place of the present one; raises ValueError for one of another frame or resolution."""
+def load_into(localiser: Localiser, stored: StoredMap, parameters: MlsmCoreParameters, same_odometry: bool) -> str:
+    """Take a stored map in the place of the present one; return why its run cannot go on, else nothing.
+
+    Raises ValueError for a map of another frame or resolution.
+    """
     if stored.frame != parameters.map_frame:
         raise ValueError(f"frame {stored.frame!r}: must be the map's, {parameters.map_frame!r}")
-    localiser.restore(stored, same_odometry)
+    return localiser.restore(stored, same_odometry)

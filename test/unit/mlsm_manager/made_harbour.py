@@ -11,9 +11,13 @@ from node_support.geometry.planar import inverse, rotated, transformed
 TURN = 14.0  # s per turn of the head
 BEAMS = 120
 SONAR_IN_BASE = np.array([0.3, 0.0])
-_CORNERS = np.array(
+HARBOUR = np.array(
     [[-25.0, -18.0], [20.0, -18.0], [20.0, -6.0], [30.0, -6.0], [30.0, 20.0], [4.0, 20.0], [4.0, 14.0], [-25.0, 14.0]]
 )
+
+
+# 300 m long and 20 m wide.
+CANAL = np.array([[-25.0, -10.0], [275.0, -10.0], [275.0, 10.0], [-25.0, 10.0]])
 
 
 @dataclass(frozen=True)
@@ -27,11 +31,12 @@ class Tour:
 
 def tour(
     count: int, direction: float = 0.0, delay: float = 0.0, noise: float = 0.1, seed: int = 0,
-    path: Optional[Callable[[np.ndarray], np.ndarray]] = None,
+    path: Optional[Callable[[np.ndarray], np.ndarray]] = None, corners: np.ndarray = HARBOUR,
 ) -> Tour:  # fmt: skip
     """Return a tour of `count` scans whose odometry goes `direction` [rad] beside the truth, with late beams.
 
     path: gives the true poses (m, 3) at times (m,); by default a vehicle that weaves without regard to its heading.
+    corners: (k, 2) m, of the walls around the water.
     """
     rng = np.random.RandomState(seed)
     times = np.arange(0.0, count * TURN + 5.0, 0.2)
@@ -39,7 +44,7 @@ def tour(
     steps = rotated(np.diff(truth.poses[:, :2], axis=0), np.full(len(times) - 1, -direction))
     positions = np.vstack([np.zeros((1, 2)), np.cumsum(steps, axis=0)]) + truth.poses[0, :2]
     odometry = Track(times, np.column_stack([positions, truth.poses[:, 2]]))
-    scans = [_scan(truth, odometry, number, delay, noise, rng) for number in range(count)]
+    scans = [_scan(truth, odometry, number, delay, noise, rng, corners) for number in range(count)]
     return Tour(scans, truth, odometry)
 
 
@@ -55,21 +60,32 @@ def _path(times: np.ndarray) -> np.ndarray:
     return np.column_stack([12.0 * np.cos(phase), 7.0 * np.sin(2.0 * phase), 1.2 * np.sin(times / 13.0)])
 
 
-def _scan(truth: Track, odometry: Track, number: int, delay: float, noise: float, rng: np.random.RandomState) -> Scan:
+def along_canal(times: np.ndarray) -> np.ndarray:
+    """Return the poses (m, 3) of a vehicle that goes along the canal at 0.15 to 0.45 m/s and looks to both sides."""
+    speed = 0.3 + 0.15 * np.sin(times / 70.0)
+    x = np.cumsum(speed * np.gradient(times))
+    yaw = 0.15 * np.sin(times / 9.0)
+    return np.column_stack([x, np.cumsum(speed * np.sin(yaw) * np.gradient(times)), yaw])
+
+
+def _scan(
+    truth: Track, odometry: Track, number: int, delay: float, noise: float, rng: np.random.RandomState,
+    corners: np.ndarray,
+) -> Scan:  # fmt: skip
     stamps = number * TURN + TURN * (np.arange(BEAMS) + 1.0) / BEAMS
     bearings = 2.0 * np.pi * np.arange(BEAMS) / BEAMS
     poses = truth.at(stamps + delay)
     sonar = poses[:, :2] + rotated(np.tile(SONAR_IN_BASE, (BEAMS, 1)), poses[:, 2])
-    ranges = _ranges(sonar, bearings + poses[:, 2]) + rng.normal(0.0, noise, BEAMS)
+    ranges = _ranges(sonar, bearings + poses[:, 2], corners) + rng.normal(0.0, noise, BEAMS)
     seen = SONAR_IN_BASE + ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
     points = np.column_stack([transformed(odometry.at(stamps), seen), np.zeros(BEAMS), np.full(BEAMS, 100.0)])
     return Scan(points, stamps, np.ones(BEAMS, dtype=bool), odometry, float(stamps[-1]))
 
 
-def _ranges(places: np.ndarray, angles: np.ndarray) -> np.ndarray:
+def _ranges(places: np.ndarray, angles: np.ndarray, corners: np.ndarray) -> np.ndarray:
     rays = np.column_stack([np.cos(angles), np.sin(angles)])[:, np.newaxis]
-    along = np.roll(_CORNERS, -1, axis=0) - _CORNERS
-    to_corner = _CORNERS - places[:, np.newaxis]
+    along = np.roll(corners, -1, axis=0) - corners
+    to_corner = corners - places[:, np.newaxis]
     cross = rays[..., 0] * along[:, 1] - rays[..., 1] * along[:, 0]
     ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
     share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross

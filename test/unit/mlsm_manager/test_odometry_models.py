@@ -5,13 +5,14 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, ahead, tour
+from made_harbour import CANAL, SONAR_IN_BASE, ahead, along_canal, tour
 
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.normal_equations import NormalEquations
@@ -179,3 +180,27 @@ def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
     assert (np.diff(radii[8:17]) > 0.0).all()
     assert radii[16] > 3.0 * radii[7]
     assert distance[16] < 3.0 * radii[16]
+
+
+def unheard_beyond(scan, reach):
+    """Return a scan without the echoes from beyond `reach` [m]."""
+    places = scan.track.at(scan.times)[:, :2]
+    kept = np.hypot(*(scan.points[:, :2] - places).T) < reach
+    return replace(scan, points=scan.points[kept], times=scan.times[kept], moving=scan.moving[kept])
+
+
+def test_in_a_straight_canal_the_told_deviation_covers_the_error():
+    canal = tour(45, noise=0.3, path=along_canal, corners=CANAL)
+    solver = followed([unheard_beyond(scan, 30.0) for scan in canal.scans], OdometryKind.HEADING)
+    told = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
+    distance = np.hypot(*errors_of(solver, canal)[:, :2].T)
+    assert (distance < 3.0 * told).all()
+    assert told[-1] > 5.0
+
+
+def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
+    canal = tour(15, noise=0.3, path=along_canal, corners=CANAL)
+    scans = [unheard_beyond(scan, 30.0) for scan in canal.scans]
+    batch = solved(followed(scans, OdometryKind.HEADING, free_scans=5))
+    assert batch.converged
+    assert batch.steps < 15

@@ -5,6 +5,7 @@ import pytest
 
 from mlsm_manager.self_check.calibration_agreement import halves_agree
 from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.odometry_agreement import against_odometry
 from mlsm_manager.self_check.path_spread import per_minute, settings_agree, starts_agree, told_deviation
 from mlsm_manager.self_check.verdict import Verdict, merged
@@ -95,3 +96,39 @@ def test_windows_that_overlap_make_one_stretch():
 def test_a_verdict_says_figure_and_limit():
     assert Verdict("depth", 2.0, 1.0, "m").line() == "depth: DOUBTFUL, 2.00, must be at most 1 (m)"
     assert not Verdict("depth", np.nan, 1.0, "m").fires
+
+
+def heard(angles):
+    """Return times and surfaces of scans that each met two surfaces, with normals at `angles` (n, 2) [rad]."""
+    normals = np.stack([np.cos(angles), np.sin(angles)], axis=-1)
+    return 14.0 * np.arange(len(angles)), np.einsum("nka,nkb->nab", normals, normals)
+
+
+def canal_after(scans):
+    """Return the normals' angles of 60 scans: first a corner, then the walls of a canal along 40 degrees."""
+    walls = np.radians(np.array([130.0, -50.0])) + np.random.RandomState(0).normal(0.0, 0.1, (60, 2))
+    return np.where((np.arange(60) < scans)[:, np.newaxis], np.radians([0.0, 90.0]), walls)
+
+
+def test_a_canal_that_does_not_tell_the_way_along_it_is_told():
+    (verdict,) = surfaces_tell(*heard(canal_after(30)), distance_deviation=np.inf)
+    assert verdict.fires
+    assert "from 420 s on, next to nothing tells the way along" in verdict.line()
+    assert 35 <= int(verdict.text.split()[-2]) <= 45
+    np.testing.assert_allclose(verdict.doubtful, [[14.0 * 30, 14.0 * 59]])
+
+
+def test_corners_tell_the_way():
+    assert not surfaces_tell(*heard(canal_after(60)), distance_deviation=np.inf)[0].fires
+
+
+def test_scans_that_meet_nothing_tell_nothing():
+    assert surfaces_tell(14.0 * np.arange(20), np.zeros((20, 2, 2)), distance_deviation=np.inf)[0].fires
+
+
+def test_a_dvl_tells_the_way_along_a_canal():
+    assert surfaces_tell(*heard(canal_after(0)), distance_deviation=0.01) == ()
+
+
+def test_few_scans_say_too_little_of_the_surfaces():
+    assert "too little" in surfaces_tell(*heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
