@@ -20,7 +20,7 @@ from sonar_simulator.world.sdf import load_sdf
 from sonar_simulator.world.world import Shape, World
 
 ROOT = Path(__file__).resolve().parents[2]
-RAYS = {45: (15, 3), 500: (50, 10)}
+RAYS = {15: (5, 3), 45: (15, 3), 150: (30, 5), 500: (50, 10)}
 HEAD = SonarHead(beams_per_turn=120, seconds_per_turn=16.0)
 DEPTH = -2.0
 _FLOOR = Shape("floor", "box", pose_matrix((0.0, 0.0, -6.0)), (400.0, 400.0, 1.0))
@@ -39,12 +39,13 @@ class SonarKind:
     """How the sonar hears: rays per beam and the standard deviation of an echo along range, m.
 
     The demo's head has a pulse of 0.15 m, the thesis's model one of 1 m. pulse_sigma: width of the extractor's matched
-    filter, m; twice the short pulse, since noise punches holes into an echo that saturates.
+    filter, m; twice the short pulse, since noise punches holes into an echo that saturates. noise_echoes: in each beam.
     """
 
     rays: int
     spread: float
     pulse_sigma: float
+    noise_echoes: int = LaserConeParameters().noise_echoes
 
     def __str__(self) -> str:
         return f"{self.rays} rays, pulse {self.spread:g} m"
@@ -64,7 +65,7 @@ class ScanMaker:
     def __init__(self, world: str, kind: SonarKind) -> None:
         self._caster = _caster(world)
         self._pattern = BeamPattern(math.radians(22.0), math.radians(2.5), *RAYS[kind.rays])
-        self._model = LaserCone(LaserConeParameters(spread=kind.spread))
+        self._model = LaserCone(LaserConeParameters(spread=kind.spread, noise_echoes=kind.noise_echoes))
         self._extraction = EchoExtractorParameters(pulse_sigma=kind.pulse_sigma, min_height=2.0)
 
     def scan(

@@ -1,6 +1,7 @@
 """From how far a scan finds its place, and how long that takes."""
 
 import time
+from dataclasses import dataclass
 from typing import List
 
 import numpy as np
@@ -9,17 +10,18 @@ import yaml
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind, still
 from benchmarks.table import Row
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.result import Prior
+from mlsm_manager.matching.problem.result import MatchResult, Prior
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, inverse, wrapped
 from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 STARTS = 100
-_NEAR, _NEAR_YAW = 0.5, np.radians(3.0)
+NEAR, NEAR_YAW = 0.5, np.radians(3.0)
 _FIXED = 1e-3
-_WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0)), "candidates": 12}
+WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0)), "candidates": 12}
 
 
 def tour_map(maker: ScanMaker) -> Blocks:
@@ -44,11 +46,13 @@ def start_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
     maker = ScanMaker("basin", kind)
     target = tour_map(maker)
     rows: List[Row] = []
-    for distance, angle, changes, limit in ((3.0, 20.0, {}, 50), (6.0, 45.0, _WIDE, 100)):
+    for distance, angle, changes, limit in ((3.0, 20.0, {}, 50), (6.0, 45.0, WIDE, 100)):
         matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
         seeds = range(first_seed, first_seed + STARTS)
-        outcomes = [_start(maker, target, matcher, distance, np.radians(angle), seed) for seed in seeds]
-        found, accepted, seconds = (np.array(column) for column in zip(*outcomes))
+        starts = [started(maker, target, matcher, distance, np.radians(angle), seed) for seed in seeds]
+        found = np.array([one.found for one in starts])
+        accepted = np.array([one.result.accepted for one in starts])
+        seconds = [one.seconds for one in starts]
         title = f"starts {distance:g} m and {angle:g} deg off, basin, {kind}"
         rows.append((f"{title}: converge", f"{found.sum()} of {STARTS}", ">= 99"))
         rows.append((f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {STARTS}", "0"))
@@ -56,10 +60,28 @@ def start_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
     return rows
 
 
-def _start(
-    maker: ScanMaker, target: Blocks, matcher: DistributionMatcher, distance: float, angle: float, seed: int
-) -> tuple:
-    """Return whether the start led to the true place, whether the match was accepted, and its seconds of a core."""
+@dataclass(frozen=True)
+class Start:
+    """What came of a match of a scan that was taken at a true pose (3,). seconds: of a core."""
+
+    true_pose: np.ndarray
+    result: MatchResult
+    seconds: float
+
+    @property
+    def error(self) -> float:
+        """Distance from the true place, m."""
+        return float(np.hypot(*(self.result.pose - self.true_pose)[:2]))
+
+    @property
+    def found(self) -> bool:
+        """Whether the match was accepted and is at the true place."""
+        yaw = abs(float(wrapped(self.result.pose[2] - self.true_pose[2])))
+        return self.result.accepted and self.error < NEAR and yaw < NEAR_YAW
+
+
+def started(maker: ScanMaker, target: Blocks, matcher: Matcher, distance: float, angle: float, seed: int) -> Start:
+    """Match a scan taken near a stop of the tour, from an expectation that is `distance` [m] and `angle` [rad] off."""
     rng = np.random.default_rng(seed)
     stops = tour_stops()
     pose = stops[seed % len(stops)] + rng.uniform([-3.0, -3.0, -0.5], [3.0, 3.0, 0.5])
@@ -71,8 +93,7 @@ def _start(
     begin = time.thread_time()
     result = matcher.match(scan, target, prior)
     seconds = time.thread_time() - begin
-    near = np.hypot(*(result.pose - pose)[:2]) < _NEAR and abs(float(wrapped(result.pose[2] - pose[2]))) < _NEAR_YAW
-    return bool(near and result.accepted), result.accepted, seconds
+    return Start(pose, result, seconds)
 
 
 def rows(first_seed: int = 0) -> List[Row]:

@@ -3,10 +3,13 @@
 from typing import Tuple
 
 from thesis_results import (
+    consistency,
+    convergence,
     moving_scan,
     processed_recording,
     processed_scans,
     recorded_scans,
+    sensitivity,
     simulated_scans,
     three_moves,
     tilt_survey,
@@ -27,4 +30,7 @@ SECTIONS: Tuple[Section, ...] = (
     Section("mapping", "7.3", "A 3-D survey of the harbour", tilt_survey.make),
     Section("moves", "7.4", "Three moves with an odometry that is 30 % off", three_moves.make),
     Section("moving", "7.4", "A vehicle that never stops", moving_scan.make),
+    Section("convergence", "beyond", "From how far off a scan finds its place", convergence.make),
+    Section("sensitivity", "beyond", "The error of a fix against rays, pulse and noise", sensitivity.make),
+    Section("consistency", "beyond", "Are the stated deviations true?", consistency.make),
 )

@@ -1,0 +1,88 @@
+"""Beyond the thesis: whether the stated deviations are true."""
+
+from typing import Dict, List
+
+import numpy as np
+from benchmarks.heads import figures, recordings
+from benchmarks.matching_moves import SEEDS, nees_band, session_errors, session_scans, session_track
+from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
+from matplotlib.axes import Axes
+from scipy.stats import chi2
+
+from mlsm_manager.matching.matchers.matcher_table import MatcherName
+from thesis_results.markdown import joined, prose, table
+from thesis_results.pictures import Pictures, new_figure
+
+JOINT_KINDS = (KINDS[0], KINDS[2])
+DRAWS = 6
+_FEWEST = 10  # runs: fewer make no distribution
+STATES = 3
+"""Of a pose: x, y and heading."""
+
+
+def make(pictures: Pictures) -> str:
+    """Return the section."""
+    squares = {kind: _last_squares(kind) for kind in KINDS}
+    figure, ((axes,),) = new_figure(7.5, 4.8)
+    _draw(axes, squares)
+    joint = [_joint(world, kind) for world in ("basin", "harbour") for kind in JOINT_KINDS]
+    return joined(
+        prose(f"""A fix comes with a covariance. Its normalised estimation error squared (NEES), the squared error
+        divided by that covariance, is {STATES} on average where the covariance is true, for x, y and heading; more
+        where the matcher is too sure of itself."""),
+        f"Of the three moves, the last accepted fix of each of {SEEDS} runs, since fixes of one run share a map:",
+        table(
+            ["sonar", "runs with a fix", "mean NEES", "95 % band of a true one"],
+            [_row(kind, found) for kind, found in squares.items()],
+        ),
+        pictures.save(
+            "consistency",
+            figure,
+            """How often a squared error stays below a value, and how often it should (black). A curve to the right
+            of the black one: too sure.""",
+        ),
+        prose(f"""The joint solver on simulated tours, whose odometry has errors as a DVL and a compass have them,
+        drawn {DRAWS} times: NEES of x and y per state (1 is true), live and of the whole run fitted afterwards
+        (batch). All fixes of one run share its odometry, so these means scatter much."""),
+        table(["tour", "sonar", "live: error", "deviation", "NEES", "batch: error", "deviation", "NEES"], joint),
+    )  # fmt: skip
+
+
+def _last_squares(kind: SonarKind) -> np.ndarray:
+    maker, track = ScanMaker("basin", kind), session_track()
+    found = []
+    for seed in range(SEEDS):
+        errors = session_errors(session_scans(maker, seed, track), MatcherName.DISTRIBUTIONS)
+        accepted = errors[errors[:, 0] > 0]
+        if len(accepted):
+            found.append(accepted[-1, 3])
+    return np.array(found)
+
+
+def _row(kind: SonarKind, squares: np.ndarray) -> List[str]:
+    if not len(squares):
+        return [str(kind), f"0 of {SEEDS}", "", ""]
+    low, high = nees_band(len(squares))
+    return [str(kind), f"{len(squares)} of {SEEDS}", f"{squares.mean():.2f}", f"{low:.2f} to {high:.2f}"]
+
+
+def _joint(world: str, kind: SonarKind) -> List[str]:
+    runs = np.array([figures(*made) for made in recordings(world, kind, DRAWS)])
+    cells = [
+        text
+        for error, nees, deviation in runs.mean(axis=0)
+        for text in (f"{error:.2f} m", f"{deviation:.2f} m", f"{nees:.2f}")
+    ]
+    return [world, str(kind), *cells]
+
+
+def _draw(axes: Axes, squares: Dict[SonarKind, np.ndarray]) -> None:
+    for kind, found in squares.items():
+        if len(found) >= _FEWEST:
+            shares = (np.arange(len(found)) + 1.0) / len(found)
+            axes.step(np.sort(found), shares, where="post", label=f"{kind}, {len(found)} runs")
+    values = np.linspace(0.0, 14.0, 200)
+    axes.plot(values, chi2.cdf(values, STATES), color="k", label=f"chi-squared, {STATES} degrees of freedom")
+    axes.set(xlabel="squared error, normalised", ylabel="share of the runs", xlim=(0.0, 14.0))
+    axes.legend(loc="lower right", fontsize="small")
+    axes.grid(True, linewidth=0.4)
