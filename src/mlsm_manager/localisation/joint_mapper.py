@@ -2,7 +2,7 @@
 
 from collections import deque
 from time import perf_counter
-from typing import Deque, List, Mapping, Optional, Tuple
+from typing import Deque, List, Mapping, Optional
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from mlsm_manager.localisation.joint_belief import (
 )
 from mlsm_manager.localisation.joint_maps import JointMaps
 from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.keyframe_map import Drawn
-from mlsm_manager.localisation.map_layers import MapSettings
+from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
 from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.stored_run import StoredRun
@@ -28,33 +29,29 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, pre
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import POSE
-from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import POSE_COLUMNS
-from mlsm_manager.self_check.map_agreement import recent_agreement
-from mlsm_manager.self_check.observability import surfaces_tell
-from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed, transformed
 
 # Scans of a run that are stored with each save: some hours, and some tens of megabytes.
 _MOST_STORED = 500
 _ORIGIN = np.zeros(3)
-# Scans that are checked for their agreement with the map: about the window of the solver.
-_CHECKED_SCANS = 20
 
 
-class JointMapper:
+class JointMapper(ShowsMaps):
     """Follows the vehicle with all scans at once: the newest may still move, the older ones are the map.
 
     No scan of a run is rejected: one that says little moves little, and its covariance grows. While `matching` is off
     scans and clouds are placed by the odometry as corrected so far. What is in the map when a run begins, or begins
     again after a relocalisation, is a surface that its scans are compared with. A run in a stored map begins only with
-    a scan that the matcher finds near the place where the vehicle is expected.
+    a scan that the matcher finds near the place where the vehicle is expected, and a stored run goes on with one that
+    its own solver finds on the map too.
     """
 
     def __init__(
@@ -99,18 +96,7 @@ class JointMapper:
 
     def verdicts(self) -> List[Verdict]:
         """Return whether the newest scans of the run agree with the map, and how uncertain its path has become."""
-        if self._session is None:
-            return []
-        newest = self._session.solver.estimates[-_CHECKED_SCANS:]
-        times = np.array([estimate.time for estimate in newest])
-        radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
-        agreements = np.array([estimate.agreement for estimate in newest])
-        surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
-        return [
-            recent_agreement(times, agreements, _CHECKED_SCANS),
-            told_deviation(times, np.array(radii)),
-            *surfaces_tell(times, surfaces, self.parameters.odometry.distance_deviation),
-        ]
+        return [] if self._session is None else self._session.verdicts()
 
     @property
     def solver(self) -> Optional[LiveSolver]:
@@ -118,32 +104,16 @@ class JointMapper:
         return self._session.solver if self._session is not None else None
 
     @property
-    def blocks(self) -> Blocks:
-        """The map that is shown."""
-        return self._maps.shown.map.blocks
+    def _shown_map(self) -> MultiLevelSurfaceMap:
+        return self._maps.shown.map
 
     @property
-    def block_count(self) -> int:
-        """Number of blocks of the map that is shown."""
-        return len(self._maps.shown.map)
-
-    @property
-    def target(self) -> BlockSource:
-        """The map in which a lost vehicle is searched."""
+    def _matched_map(self) -> MultiLevelSurfaceMap:
         return self._maps.matched.map
 
     @property
-    def layers(self) -> Mapping[Layer, Blocks]:
-        """Copies of all maps, to be stored, each made when it is asked for."""
-        return self._maps.layers
-
-    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
-        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
-        return self._maps.shown.map.in_box(low, high)
-
-    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
-        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
-        return self._maps.changed_tiles()
+    def _free_space(self) -> KeyframeCarving:
+        return self._maps.shown.free
 
     @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
@@ -203,13 +173,13 @@ class JointMapper:
         A stored run goes on where its solver finds the scan on the map, also if the scan alone says too little.
         """
         start = perf_counter()
-        longer = None if self._session is None else continued(self._session, scan, self._maps.matched.map)
+        longer = None if self._session is None else continued(self._session, scan, self._matched_map)
         if longer is not None:
             self._expected = None
             return self._taken(scan, longer, start)
         theta = np.concatenate([composed(self.correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
         prior = prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
-        result = self.matcher.match(scan, self._maps.matched.map, prior)
+        result = self.matcher.match(scan, self._matched_map, prior)
         if not result.accepted:
             return ScanUpdate(scan, result, False, self.belief)
         if self._session is None:
@@ -303,10 +273,8 @@ class JointMapper:
         return ScanUpdate(scan, None, True, self.belief)
 
     def _new_session(self) -> JointSession:
-        matched = self._maps.matched.map
-        known = KnownSurfaces(matched.blocks.mean[:, :2]) if len(matched) else None
-        solver = LiveSolver(self.parameters, self._sonar_in_base, self._start, known)
-        return JointSession(solver, self.correction.copy())
+        known = self._matched_map.blocks.mean[:, :2]
+        return JointSession.begun(self.parameters, self._sonar_in_base, self.correction.copy(), self._start, known)
 
     def _end_session(self) -> None:
         if self._session is not None:

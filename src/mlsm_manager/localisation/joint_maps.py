@@ -1,12 +1,10 @@
 """The two maps of a joint run, drawn from its keyframes."""
 
-from typing import Mapping, Tuple
-
-import numpy as np
+from typing import Mapping
 
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.map_layers import LayerCopies, MapSettings
+from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.blocks import Blocks
@@ -36,17 +34,6 @@ class JointMaps:
         if Layer.FREE in layers:
             maps.shown.free.restore(layers[Layer.FREE])
         return maps
-
-    @property
-    def layers(self) -> Mapping[Layer, Blocks]:
-        """Copies of all maps, to be stored, each made when it is asked for."""
-        maps = {Layer.SHOWN: self.shown.map, Layer.MATCHED: self.matched.map, Layer.FREE: self.shown.free}
-        return LayerCopies(maps)
-
-    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
-        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
-        tiles = self.shown.map.take_changed_tiles()
-        return tiles, self.shown.map.in_tiles(tiles)
 
     def stored(self, session: JointSession) -> StoredRun:
         """Return the run with what the maps hold of it."""

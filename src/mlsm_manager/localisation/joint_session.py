@@ -1,7 +1,7 @@
 """One run of the joint solver in the map."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, Mapping, Sequence
+from typing import List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -9,9 +9,17 @@ from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.estimate import LiveEstimate
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.self_check.map_agreement import recent_agreement
+from mlsm_manager.self_check.observability import surfaces_tell
+from mlsm_manager.self_check.path_spread import told_deviation
+from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry.planar import composed, transformed
+
+_CHECKED_SCANS = 20
+"""Scans that are checked for their agreement with the map: about the window of the solver."""
 
 
 @dataclass
@@ -43,6 +51,32 @@ class JointSession:
         """Return a run that goes on after `scans`; see LiveSolver.resumed."""
         moved = [_moved(scan, T_map_odom) for scan in scans]
         return cls(LiveSolver.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans))
+
+    @classmethod
+    def begun(
+        cls,
+        parameters: MultiViewParameters,
+        sonar_in_base: np.ndarray,
+        T_map_odom: np.ndarray,
+        start: Optional[np.ndarray],
+        known: np.ndarray,
+    ) -> "JointSession":
+        """Return a new run in a map of blocks with means at `known` (n, 2) m; `start`: see LiveSolver."""
+        surfaces = KnownSurfaces(known) if len(known) else None
+        return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
+
+    def verdicts(self) -> List[Verdict]:
+        """Return whether the newest scans agree with the map, how uncertain the path is, and what surfaces tell of it."""
+        newest = self.solver.estimates[-_CHECKED_SCANS:]
+        times = np.array([estimate.time for estimate in newest])
+        radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
+        agreements = np.array([estimate.agreement for estimate in newest])
+        surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
+        return [
+            recent_agreement(times, agreements, _CHECKED_SCANS),
+            told_deviation(times, np.array(radii)),
+            *surfaces_tell(times, surfaces, self.solver.parameters.odometry.distance_deviation),
+        ]
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""

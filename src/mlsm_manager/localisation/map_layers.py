@@ -1,12 +1,16 @@
-"""What the maps of a mapper are made from, and copies of them."""
+"""What the maps of a mapper are made from, copies of them, and what it tells of them."""
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Dict, Iterator, Mapping, Optional, Protocol
+from typing import Dict, Iterator, Mapping, Optional, Protocol, Tuple
 
-from mlsm_manager.surface_map.blocks import Blocks
+import numpy as np
+
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.carving import Carver
 from mlsm_manager.surface_map.insertion import InsertionKernel
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 
 @dataclass(frozen=True)
@@ -49,3 +53,52 @@ class LayerCopies(Mapping[Layer, Blocks]):
 
     def __len__(self) -> int:
         return len(self._maps)
+
+
+class ShowsMaps(ABC):
+    """What a mapper tells of its maps."""
+
+    @property
+    @abstractmethod
+    def _shown_map(self) -> MultiLevelSurfaceMap:
+        """The map that is shown and saved."""
+
+    @property
+    @abstractmethod
+    def _matched_map(self) -> MultiLevelSurfaceMap:
+        """The map that scans are matched with."""
+
+    @property
+    @abstractmethod
+    def _free_space(self) -> HasBlocks:
+        """What is known to be free, in the map that is shown."""
+
+    @property
+    def blocks(self) -> Blocks:
+        """The map that is shown."""
+        return self._shown_map.blocks
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks of the map that is shown."""
+        return len(self._shown_map)
+
+    @property
+    def target(self) -> BlockSource:
+        """The map in which a lost vehicle is searched."""
+        return self._matched_map
+
+    @property
+    def layers(self) -> Mapping[Layer, Blocks]:
+        """Copies of all maps, to be stored, each made when it is asked for."""
+        maps = {Layer.SHOWN: self._shown_map, Layer.MATCHED: self._matched_map, Layer.FREE: self._free_space}
+        return LayerCopies(maps)
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
+        return self._shown_map.in_box(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        tiles = self._shown_map.take_changed_tiles()
+        return tiles, self._shown_map.in_tiles(tiles)

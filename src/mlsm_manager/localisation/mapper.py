@@ -1,12 +1,12 @@
 """Matches scan by scan with the map of the scans before, and keeps that map and the pose in it (thesis 6.5.6)."""
 
 from collections import deque
-from typing import Deque, List, Mapping, Optional, Sequence, Tuple
+from typing import Deque, List, Mapping, Optional, Sequence
 
 import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
-from mlsm_manager.localisation.map_layers import LayerCopies, MapSettings
+from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
 from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
@@ -15,14 +15,14 @@ from mlsm_manager.matching.problem.result import MatchResult, corrected_points
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import ERRORS
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
 
-class Mapper:
+class Mapper(ShowsMaps):
     """Keeps the map, what is known of the pose, and the errors of the odometry.
 
     Scans of echoes are matched and inserted into the map that is matched with; clouds are inserted into the map that is
@@ -53,18 +53,16 @@ class Mapper:
         self.forget_place()
 
     @property
-    def layers(self) -> Mapping[Layer, Blocks]:
-        """Copies of all maps, to be stored, each made when it is asked for."""
-        return LayerCopies({Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free})
+    def _shown_map(self) -> MultiLevelSurfaceMap:
+        return self.shown
 
-    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
-        """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""
-        return self.shown.in_box(low, high)
+    @property
+    def _matched_map(self) -> MultiLevelSurfaceMap:
+        return self.matched
 
-    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
-        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
-        tiles = self.shown.take_changed_tiles()
-        return tiles, self.shown.in_tiles(tiles)
+    @property
+    def _free_space(self) -> MultiLevelSurfaceMap:
+        return self.free
 
     @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
@@ -112,21 +110,6 @@ class Mapper:
     def verdicts(self) -> List[Verdict]:
         """Each match is judged alone: its status says it."""
         return []
-
-    @property
-    def blocks(self) -> Blocks:
-        """The map that is shown."""
-        return self.shown.blocks
-
-    @property
-    def block_count(self) -> int:
-        """Number of blocks of the map that is shown."""
-        return len(self.shown)
-
-    @property
-    def target(self) -> BlockSource:
-        """The map that is matched with."""
-        return self.matched
 
     def take_echoes(self, scan: Scan) -> ScanUpdate:
         """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
