@@ -30,9 +30,11 @@ def _from_faces(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return (n, m) distances from the triangles' planes, infinite where the foot lies beside the triangle."""
     first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
     normal = np.cross(first, second)
-    squared = np.maximum((normal**2).sum(axis=1), np.finfo(np.float64).tiny)
+    squared = (normal**2).sum(axis=1)
+    has_area = squared > 0.0
+    squared = np.where(has_area, squared, 1.0)
     offset = points[:, np.newaxis] - corners[:, 0]
     v = np.einsum("nmi,mi->nm", np.cross(offset, second), normal) / squared
     w = np.einsum("nmi,mi->nm", np.cross(first, offset), normal) / squared
     height = np.abs(np.einsum("nmi,mi->nm", offset, normal)) / np.sqrt(squared)
-    return np.where((v >= 0.0) & (w >= 0.0) & (v + w <= 1.0), height, np.inf)
+    return np.where(has_area & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0), height, np.inf)

@@ -11,6 +11,7 @@ import numpy as np
 import scipy as sp
 
 ROOT = Path(__file__).resolve().parents[2]
+_COMPUTING = ("src", "scripts", "nodes", "yaml", "worlds", "urdf")
 
 
 def made_with(seconds: float) -> str:
@@ -24,9 +25,14 @@ def made_with(seconds: float) -> str:
 
 
 def _commit() -> str:
-    """Return the commit that is checked out, with a + where files differ from it."""
-    command = ["git", "-C", str(ROOT), "describe", "--always", "--abbrev=8", "--dirty=+", "--exclude=*"]
+    """Return the commit that is checked out, with a + where what computes differs from it."""
     try:
-        return subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout.strip()
+        changed = _git("status", "--porcelain", "--", *_COMPUTING)
+        return _git("rev-parse", "--short=8", "HEAD") + ("+" if changed else "")
     except (OSError, subprocess.CalledProcessError):
         return "unknown"
+
+
+def _git(*words: str) -> str:
+    command = ["git", "-C", str(ROOT), *words]
+    return subprocess.run(command, stdout=subprocess.PIPE, check=True, text=True).stdout.strip()

@@ -3,7 +3,6 @@
 from typing import List
 
 import numpy as np
-from benchmarks.basin_scans import ROOT
 from benchmarks.matching_moving import (
     SEEDS,
     SPEED,
@@ -17,6 +16,7 @@ from benchmarks.matching_moving import (
     true_path,
 )
 from benchmarks.matching_scans import HEAD, KINDS, ScanMaker
+from benchmarks.recorded import ROOT
 from matplotlib.axes import Axes
 
 from mlsm_manager.matching.matchers.matcher_table import MatcherName

@@ -4,7 +4,8 @@ import math
 from typing import List
 
 import numpy as np
-from benchmarks.basin_scans import ROOT, BasinScans
+from benchmarks.basin_scans import BasinScans
+from benchmarks.recorded import ROOT
 from benchmarks.shape_figures import WallErrors, wall_errors
 from benchmarks.world_distance import distances
 

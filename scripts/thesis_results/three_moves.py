@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from typing import Dict, List, Sequence, Tuple
 
 import numpy as np
-from benchmarks.basin_scans import ROOT
 from benchmarks.matching_moves import (
     SEEDS,
     odometry_path,
@@ -15,6 +14,7 @@ from benchmarks.matching_moves import (
     true_path,
 )
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
+from benchmarks.recorded import ROOT
 from matplotlib.axes import Axes
 
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
