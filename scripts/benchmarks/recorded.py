@@ -5,7 +5,7 @@ from pathlib import Path
 
 from recordings.beams.found_beams import FoundBeams
 from recordings.reading.reader import Request, read
-from recordings.vehicle.motion import MotionNames
+from recordings.vehicle.motion import MotionNames, MotionSource
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -17,4 +17,4 @@ def recorded(name: str) -> Path:
 
 def recorded_beams(name: str) -> FoundBeams:
     """Return the beams of a recording of a vehicle at rest. Raises RecordingError."""
-    return read(recorded(name), Request(motion=MotionNames(is_standing=True))).found
+    return read(recorded(name), Request(motion=MotionNames(declared=MotionSource.STANDING))).found

@@ -1,0 +1,28 @@
+"""The sections of scripts/results that take a few seconds, so that no change of a library breaks them unseen."""
+
+import re
+import sys
+from pathlib import Path
+
+import pytest
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
+
+from benchmarks.recorded import recorded
+from thesis_results.pictures import MOST_BYTES, Pictures
+from thesis_results.section_table import SECTIONS
+
+QUICK = ("recorded", "processing", "processing-recorded")
+
+
+@pytest.mark.parametrize("section", [one for one in SECTIONS if one.word in QUICK], ids=lambda one: one.word)
+def test_a_section_is_computed_with_its_pictures(section, tmp_path):
+    for name in section.recordings:
+        if not recorded(name).is_file():
+            pytest.skip(f"{recorded(name)} is not there; set UMC_DATA to the folder of the recordings")
+    text = section.make(Pictures(tmp_path / "pictures", tmp_path / "page.md"))
+    shown = re.findall(r"\]\((pictures/\w+\.png)\)", text)
+    assert shown
+    for link in shown:
+        assert 0 < (tmp_path / link).stat().st_size <= MOST_BYTES
+    assert "nan" not in text
