@@ -5,6 +5,7 @@ from functools import partial
 from typing import Callable, Dict, List
 
 from benchmarks import (
+    carving_figures,
     large_map_figures,
     map_figures,
     marina_figures,
@@ -21,6 +22,7 @@ from benchmarks.table import Row, print_table
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map": map_figures.rows,
     "large-map": large_map_figures.rows,
+    "carving": carving_figures.rows,
     "marina": marina_figures.rows,
     "matching": matching_figures.rows,
     "processing": processing_figures.rows,

@@ -10,6 +10,7 @@ import rospy
 from dynamic_reconfigure.client import Client
 from geometry_msgs.msg import TransformStamped
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import MarkerArray
 
 from benchmarks.graph import ROOT, Nodes, launched, roscore, wait_until
 from benchmarks.table import Row
@@ -55,6 +56,8 @@ class Sonar:
         self._count = 0
         self._sent: Dict[int, Tuple[int, float]] = {}
         self._scan_end = 0
+        self.scan_sent = 0.0
+        """When the last beam of the newest cleaned scan was sent, by time.perf_counter."""
         self._latencies: List[float] = []
         self.points = 0
         self._publisher = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=100, tcp_nodelay=True)
@@ -66,9 +69,9 @@ class Sonar:
     def _take(self, message: StampedIntensityCloudArrays) -> None:
         """Match the cloud with its last beam, whose stamp it bears."""
         now = time.perf_counter()
-        self._scan_end, sent = self._sent[message.header.stamp.to_nsec()]
+        self._scan_end, self.scan_sent = self._sent[message.header.stamp.to_nsec()]
         self.points = message.cloud.width
-        self._latencies.append(now - sent)
+        self._latencies.append(now - self.scan_sent)
 
     @property
     def is_connected(self) -> bool:
@@ -148,6 +151,23 @@ def latency_row(layout: str, load: Load, sonar: Sonar) -> Row:
     )
 
 
+def map_row(sonar: Sonar) -> Row:
+    """Measure the time from the last beam of a scan to the map that holds it, everything in one process."""
+    arrivals: List[float] = []
+    reader = rospy.Subscriber("/MLSM/Markers", MarkerArray, lambda _: arrivals.append(time.perf_counter()))
+    latencies = []
+    with launched("mapping.launch") as _:
+        wait_until(lambda: sonar.is_connected and reader.get_num_connections() > 0, "node that takes the beams")
+        for _ in range(SCANS):
+            sonar.scan_latencies(1)
+            sent = sonar.scan_sent
+            wait_until(lambda sent=sent: arrivals and arrivals[-1] > sent, "map")
+            latencies.append(next(arrival for arrival in arrivals if arrival > sent) - sent)
+    reader.unregister()
+    figures = f"{1e3 * float(np.median(latencies)):.0f} ms at the median, {1e3 * max(latencies):.0f} at most"
+    return f"one: last beam of {BEAMS * BINS} points to the published map", figures, "<= 100 ms"
+
+
 def cpu_share(sonar: Sonar, nodes: Nodes, beam_rate: float) -> float:
     """Return the nodes' share of a core while beams come live, with odometry between them."""
     start, used = time.monotonic(), nodes.cpu_seconds()
@@ -168,4 +188,4 @@ def rows() -> List[Row]:
     """Return the figures of both layouts."""
     with roscore():
         sonar = Sonar(recorded_beams())
-        return [row for layout in LAYOUTS for row in layout_rows(layout, sonar)]
+        return [*(row for layout in LAYOUTS for row in layout_rows(layout, sonar)), map_row(sonar)]

@@ -145,8 +145,11 @@ def wait_until(holds: Callable[[], bool], timeout: float = 20.0, required: bool 
     return False
 
 
-def play(bag: Path, rate: float) -> None:
-    """Play a bag to its end, to all who listen: playback starts when every listener is connected to every topic."""
+def play(bag: Path, rate: float, longest: float = 120.0) -> None:
+    """Play a bag to its end, in at most `longest` s, to all who listen.
+
+    Playback starts when every listener is connected to every topic.
+    """
     command = ["rosbag", "play", "--quiet", "--clock", "--pause", f"--rate={rate}", str(bag), "__name:=player"]
     player = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     try:
@@ -155,7 +158,7 @@ def play(bag: Path, rate: float) -> None:
         for topic in _topics(bag):
             wait_for_subscribers(topic, len(dict(subscribers).get(topic, [])))
         rospy.ServiceProxy("/player/pause_playback", SetBool)(False)
-        assert player.wait(timeout=120) == 0
+        assert player.wait(timeout=longest) == 0
     finally:
         player.kill()
 

@@ -9,9 +9,12 @@ import xmlrpc.client
 import pytest
 from stopwatch import ROOT, START_TIMEOUT, STOP_TIMEOUT, free_port
 
+from imagenex_852_driver.logs.log_file import LogWriter
+from imagenex_852_driver.logs.log_record import LoggedPing
+from imagenex_852_driver.protocol import Reply, ReplyKind
 from node_support.ros.master_watch import PERIOD
 
-NODES = ("thresholder", "mapping", "imagenex_852_driver", "gazebo_sonar")
+NODES = ("thresholder", "mapping", "imagenex_852_driver", "gazebo_sonar", "play_852")
 # Long enough for a node to ask the absent master more often than a new master has to be asked.
 AWAY = 4.0 * PERIOD
 
@@ -56,9 +59,12 @@ def master(tmp_path):
 
 
 @pytest.fixture
-def nodes(master):
+def nodes(master, tmp_path):
     """Return the processes of nodes that have begun to publish diagnostics, by name."""
-    started = {node: _started(node, master) for node in NODES}
+    with LogWriter(tmp_path / "short.852") as log:
+        log.write(LoggedPing(Reply(ReplyKind.IMX, 20, bytes(252))))
+    arguments = {"play_852": [str(tmp_path / "short.852"), "--loop", "__name:=play_852"]}
+    started = {node: _started(node, arguments.get(node, []), master) for node in NODES}
     try:
         _wait_for_diagnostics(master, started)
         yield started
@@ -68,8 +74,8 @@ def nodes(master):
             process.communicate()
 
 
-def _started(node, master):
-    command = ["python3", str(ROOT / "nodes" / node)]
+def _started(node, arguments, master):
+    command = ["python3", str(ROOT / "nodes" / node), *arguments]
     return subprocess.Popen(
         command, env=master.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     )

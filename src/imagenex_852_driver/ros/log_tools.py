@@ -2,6 +2,7 @@
 
 import math
 import os
+import threading
 import time
 from argparse import Namespace
 from pathlib import Path
@@ -23,45 +24,65 @@ from node_support.errors import RefusedInput
 from node_support.files import whole_file
 from node_support.headers import check_stamp
 from node_support.parameters import ParameterError
-from node_support.ros.node import StartError, guarded, make_health
+from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, guarded, make_health
 from underwater_map_construction.msg import SonarScanLine
 
-_LONGEST_SLEEP = 0.1  # s: an end is noticed within this time
-# rospy sends from a queue, which is lost when the process ends.
-_LAST_MESSAGES_LEAVE = 0.5
+_WAIT_STEP = 0.05  # s: soon enough for a person
 
 
 class LogPlayer:
-    """Publishes a log on sonar/raw, stamped with the current time."""
+    """Publishes a log on sonar/raw, stamped with the current time, then ends the node."""
 
     def __init__(self, options: Namespace) -> None:
         """Raises StartError when the log cannot be read."""
         self._options = options
-        self.reader = opened(options.file)
-        self.published = 0
+        self._reader = opened(options.file)
+        self._published = 0
+        self._health = make_health("play_852")
+        self.healths = [self._health]
+        self._publish = guarded(self._health, self._publish_ping)
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=1000)
+        self._ended = threading.Event()
+        rospy.on_shutdown(self._end)
+        threading.Thread(target=guarded(self._health, self._run), daemon=True).start()
 
-    def run(self) -> None:
-        """Play to the end, or without end with `loop`; stops early at shutdown."""
+    def _run(self) -> None:
+        try:
+            self._play_to_the_end()
+        except StartError as error:
+            rospy.logfatal("%s: %s", rospy.get_name(), error)
+        rospy.signal_shutdown("the log has ended")
+
+    def _play_to_the_end(self) -> None:
+        """Play once, or with `loop` until the node ends; a log without pings is played once."""
         while self._options.wait_for_subscribers and not self._beams.get_num_connections():
-            if rospy.is_shutdown():
+            if self._ended.wait(_WAIT_STEP):
                 return
-            time.sleep(_LONGEST_SLEEP / 2)
         self._play()
-        while self._options.loop and self.published and not rospy.is_shutdown():
-            self.reader = opened(self._options.file)
+        while self._options.loop and self._published and not self._ended.is_set():
+            self._reader = opened(self._options.file)
             self._play()
-        time.sleep(_LAST_MESSAGES_LEAVE)
+        self._ended.wait(LAST_MESSAGES_ARRIVE)
 
     def _play(self) -> None:
         start = time.monotonic()
-        for moment, ping in timed(self.reader, self._options.rate):
-            if not _slept_until(start + moment):
+        for moment, ping in timed(self._reader, self._options.rate):
+            if self._ended.wait(max(start + moment - time.monotonic(), 0.0)):
                 return
-            message = _message(ping, rospy.get_time(), self._options)
-            if message is not None:
-                self._beams.publish(message)
-                self.published += 1
+            self._publish(ping)
+
+    def _publish_ping(self, ping: LoggedPing) -> None:
+        stamp = rospy.get_time()
+        check_stamp(round(stamp * 1e9))
+        message = _message(ping, stamp, self._options)
+        if message is not None:
+            self._beams.publish(message)
+            self._health.count("beams out")
+            self._published += 1
+
+    def _end(self) -> None:
+        self._ended.set()
+        print(f"play_852: {self._published} beams published; {summary(self._reader)}")
 
 
 def convert(options: Namespace) -> str:
@@ -153,12 +174,3 @@ def summary(reader: log_file.LogReader) -> str:
 
 def _message(ping: LoggedPing, stamp: float, options: Namespace) -> Optional[SonarScanLine]:
     return scan_line(stamp, ping.reply, ping.start_gain_db, options.frame_id, options.inverted)
-
-
-def _slept_until(moment: float) -> bool:
-    while not rospy.is_shutdown():
-        left = moment - time.monotonic()
-        if left <= 0:
-            return True
-        time.sleep(min(left, _LONGEST_SLEEP))
-    return False

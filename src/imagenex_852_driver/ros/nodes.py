@@ -3,9 +3,10 @@
 import sys
 
 import rospy
+from rosgraph.names import anonymous_name
 
 from imagenex_852_driver.logs.arguments import convert_arguments, play_arguments, record_arguments
-from imagenex_852_driver.ros.log_tools import LogPlayer, LogRecorder, convert, summary
+from imagenex_852_driver.ros.log_tools import LogPlayer, LogRecorder, convert
 from imagenex_852_driver.ros.model import EmulatedImagenex852, Imagenex852
 from node_support.ros.node import StartError, run
 from sonar_driver.ros.driver_node import DriverNode
@@ -23,15 +24,9 @@ def run_emulator(world_echoes: WorldEchoes) -> None:
 
 
 def run_player() -> None:
-    """Publish a log, then end."""
+    """Publish a log, then end; several may play at once."""
     options = play_arguments(rospy.myargv()[1:])
-    rospy.init_node("play_852", anonymous=True)
-    try:
-        player = LogPlayer(options)
-    except StartError as error:
-        sys.exit(f"play_852: {error}")
-    player.run()
-    print(f"play_852: {player.published} beams published; {summary(player.reader)}")
+    run(anonymous_name("play_852"), lambda: LogPlayer(options))
 
 
 def run_recorder() -> None:

@@ -20,6 +20,7 @@ from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import Drawn
 from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
@@ -168,7 +169,7 @@ class JointMapper:
 
     def _resume_run(self, run: StoredRun) -> None:
         """Go on with a stored run in the maps that were stored with it."""
-        session = JointSession.resumed(self.parameters, self._sonar_in_base, run.T_map_odom, run.scans, run.solver)
+        session = JointSession.resumed(self.parameters, run.sonar_in_base, run.T_map_odom, run.scans, run.solver)
         self._maps.resume(run, session)
         self._session = session
         self._know(run.scans[-1], session)
@@ -185,7 +186,15 @@ class JointMapper:
         return self._solve(scan) if self._expected is None else self._resume(scan, self._expected)
 
     def _resume(self, scan: Scan, expected: Belief) -> ScanUpdate:
-        """Go on with a scan that fits to the map about where it is expected; any other is rejected."""
+        """Go on with a scan that fits to the map about where it is expected; any other is rejected.
+
+        A stored run goes on where its solver finds the scan on the map, also if the scan alone says too little.
+        """
+        start = perf_counter()
+        longer = None if self._session is None else continued(self._session, scan, self._maps.matched.map)
+        if longer is not None:
+            self._expected = None
+            return self._taken(scan, longer, start)
         theta = np.concatenate([composed(self.correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
         prior = prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
         result = self.matcher.match(scan, self._maps.matched.map, prior)
@@ -251,11 +260,16 @@ class JointMapper:
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
         session = self._session or self._new_session()
-        estimate = session.add(scan)
+        session.add(scan)
+        return self._taken(scan, session, start)
+
+    def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
+        """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
         self._maps.matched.add(TimedPoints.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
+        estimate = session.solver.estimates[-1]
         if not estimate.comparisons:
             return ScanUpdate(scan, None, True, self.belief)
         result = match_of(scan, estimate, self.belief, session, perf_counter() - start)

@@ -51,8 +51,8 @@ class JointMaps:
     def stored(self, session: JointSession) -> StoredRun:
         """Return the run with what the maps hold of it."""
         return StoredRun(
-            session.T_map_odom, session.scans, session.solver.stored(), self.shown.moving, self.shown.covered,
-            self.matched.covered,
+            session.T_map_odom, session.solver.log.sonar_in_base, session.scans, session.solver.stored(),
+            self.shown.moving, self.shown.covered, self.matched.covered,
         )  # fmt: skip
 
     def resume(self, run: StoredRun, session: JointSession) -> None:

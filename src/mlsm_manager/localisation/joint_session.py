@@ -44,6 +44,11 @@ class JointSession:
         moved = [_moved(scan, T_map_odom) for scan in scans]
         return cls(LiveSolver.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans))
 
+    def copied(self) -> "JointSession":
+        """Return a copy; what it learns the original does not."""
+        solver = self.solver
+        return self.resumed(solver.parameters, solver.log.sonar_in_base, self.T_map_odom, self.scans, solver.stored())
+
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""
         self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)

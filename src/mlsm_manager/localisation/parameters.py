@@ -143,8 +143,8 @@ class MlsmNodeParameters(ParameterSet):
         0.1, "how far into the future map -> odom is stamped", unit="s", low=0.0, high=10.0
     )
     map_period: float = parameter(
-        1.0, "shortest time between two messages of the map, in wall time", unit="s", low=0.05, high=3600.0,
-        tunable=False,
+        1.0, "shortest time between two messages of the map, in wall time; the next change after it is sent at once",
+        unit="s", low=0.05, high=3600.0, tunable=False,
     )  # fmt: skip
     insertion: InsertionKernel = parameter(
         InsertionKernel.NUMPY, "what inserts points: NUMBA is two to four times faster and needs python3-numba",

@@ -20,13 +20,15 @@ _PREFIX, _SOLVER = "run.", "solver."
 
 @dataclass(frozen=True)
 class StoredRun:
-    """T_map_odom: (3,) that moves the scans before they are solved. scans: all, oldest first. solver: see LiveSolver.
+    """T_map_odom: (3,) that moves the scans before they are solved. sonar_in_base: (2,) m. scans: all, oldest first.
 
+    solver: see LiveSolver.
     clouds: of the map that is shown, whose places may still change. shown, matched: what both maps hold without such
     keyframes, where these lie.
     """
 
     T_map_odom: np.ndarray
+    sonar_in_base: np.ndarray
     scans: Sequence[Scan]
     solver: Mapping[str, np.ndarray]
     clouds: Sequence[TimedPoints]
@@ -38,6 +40,7 @@ class StoredRun:
         scans, tracks = self.scans, [scan.track for scan in self.scans]
         parts = {
             "T_map_odom": self.T_map_odom,
+            "sonar_in_base": np.asarray(self.sonar_in_base),
             **{_SOLVER + name: array for name, array in self.solver.items()},
             **_joined("scan", [TimedPoints.of_scan(scan) for scan in scans]),
             "scan_moving": np.concatenate([np.empty(0), *(scan.moving for scan in scans)]).astype(np.uint8),
@@ -69,10 +72,11 @@ def _run_of(part: Callable[[str], np.ndarray], solver: Mapping[str, np.ndarray])
         Scan(cloud.points, cloud.times, flags.astype(bool), Track(*track), cloud.end)
         for cloud, flags, *track in zip(heard, moving, times, poses)
     ]
-    if part("T_map_odom").shape != (3,) or not np.isfinite(part("T_map_odom")).all():
-        raise ValueError(f"T_map_odom {part('T_map_odom')}")
+    for name, size in (("T_map_odom", 3), ("sonar_in_base", 2)):
+        if part(name).shape != (size,) or not np.isfinite(part(name)).all():
+            raise ValueError(f"{name} {part(name)}")
     shown, matched = (_covered_of(name, part) for name in ("shown", "matched"))
-    return StoredRun(part("T_map_odom"), scans, solver, _split("cloud", part), shown, matched)
+    return StoredRun(part("T_map_odom"), part("sonar_in_base"), scans, solver, _split("cloud", part), shown, matched)
 
 
 def _joined(name: str, clouds: Sequence[TimedPoints]) -> Dict[str, np.ndarray]:

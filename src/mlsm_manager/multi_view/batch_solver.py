@@ -37,10 +37,16 @@ class BatchResult:
     converged: bool
 
 
-def solved(live: LiveSolver) -> BatchResult:
-    """Return the fit of all scans that `live` has taken; its own state stays as it is."""
-    problem = _Batch(live.log, live.odometry, live.parameters, live.state.copy())
-    window = live.parameters.window
+def solved(
+    live: LiveSolver, parameters: Optional[MultiViewParameters] = None, start: Optional[State] = None
+) -> BatchResult:
+    """Return the fit of all scans that `live` has taken; its own state stays as it is.
+
+    parameters, start: others than those of `live`, with the same odometry.
+    """
+    parameters, start = parameters or live.parameters, start or live.state
+    problem = _Batch(live.log, live.odometry, parameters, start.copy())
+    window = parameters.window
     steps, converged = 0, False
     while steps < window.batch_iterations and not converged:
         converged = problem.step() < window.tolerance

@@ -23,6 +23,7 @@ from mlsm_manager.offline.mission_report import mission_of
 from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
+from mlsm_manager.offline.refitting import refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import (
@@ -40,6 +41,7 @@ from mlsm_manager.offline.run_files import (
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.report.mission import Mission
 from mlsm_manager.self_check.north_east_down import suspicions
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
@@ -85,7 +87,8 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     replayed = _replayed(recording, scans, parameters)
     _tell_of_refused(replayed, options)
     refined = _refined(recording, replayed, parameters) if options.refine else None
-    found = None if replayed.solver is None else Found.of(replayed, refined)
+    refitted = _refitted(replayed, refined) if options.check else []
+    found = None if replayed.solver is None else Found.of(replayed, refined, refitted)
     known = parameters if found is None else found.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known)
@@ -167,6 +170,11 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
 def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
     with _bar(None, "", "refine"):
         return refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
+
+
+def _refitted(replayed: Replayed, refined: Refined) -> List[Verdict]:
+    with _bar(None, "", "check"):
+        return refitted_verdicts(replayed.solver, refined.batch)
 
 
 def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Namespace) -> List[Session]:

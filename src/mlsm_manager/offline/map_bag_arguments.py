@@ -39,6 +39,11 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     )
     parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
     parser.add_argument(
+        "--check", action="store_true",
+        help="with --refine: smooth five times more, with other settings and from another start, and say how far the "
+        "paths lie apart",
+    )  # fmt: skip
+    parser.add_argument(
         "--no-calibrate",
         dest="calibrate",
         action="store_false",
@@ -54,6 +59,8 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     if options.refine and len(options.bags) > 1:
         parser.error("--refine smooths one recording, not several")
+    if options.check and not options.refine:
+        parser.error("--check repeats the smoothing of --refine; give both")
     if options.out is None and not options.inspect:
         parser.error("the following arguments are required: --out")
     if options.vehicle and len(options.bags) > 1:

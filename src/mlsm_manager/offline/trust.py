@@ -1,7 +1,7 @@
 """Whether a run can be trusted, told without any truth: the checks of map_bag."""
 
 from dataclasses import dataclass
-from typing import Any, Dict, List, Optional, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -71,8 +71,11 @@ class Trust:
         return {"checks": checks, "deviation_per_minute": told}
 
 
-def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
-    """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
+def trust(replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Verdict] = ()) -> Trust:
+    """Return what the checks say of a run of the joint solver; of the refined path where there is one.
+
+    refitted: what other fits of the run say.
+    """
     solver = replayed.solver
     estimates = solver.estimates
     ends = np.array([estimate.time for estimate in estimates])
@@ -84,7 +87,8 @@ def trust(replayed: Replayed, refined: Optional[Refined]) -> Trust:
         told_deviation(deviations.times, deviations.radii),
     ]
     halves = _halves(replayed.scans, solver)
-    return Trust(verdicts if halves is None else [*verdicts, halves], deviations)
+    verdicts += [] if halves is None else [halves]
+    return Trust([*verdicts, *refitted], deviations)
 
 
 def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:

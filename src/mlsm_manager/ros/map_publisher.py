@@ -20,6 +20,7 @@ from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.health import Health
 from node_support.ros.node import guarded
+from node_support.ros.on_change import on_change
 from sonar_processing.ros.conversions import header
 
 # Share of the time that may go into sending the whole map on one topic again and again.
@@ -116,20 +117,22 @@ class MapPublisher:
         ]
         if has_octomap_messages():
             self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, localiser, health))
+        self._tell = on_change(parameters.map_period, self._publish, health)
 
     def change(self, stamp_ns: Optional[int] = None) -> None:
-        """Remember that the map changed, by a cloud with this stamp where there is one."""
+        """Publish soon, because the map changed, by a cloud with this stamp where there is one."""
         if stamp_ns is not None:
             self._stamp_ns = stamp_ns
         for topic in self._whole:
             topic.change()
+        self._tell()
 
     def replace(self) -> None:
-        """Remember that there is another map now."""
+        """Publish soon, because there is another map now."""
         self._tiles.replace()
         self.change()
 
-    def publish(self) -> None:
+    def _publish(self) -> None:
         """Send what changed since the last time to those who listen."""
         self._tiles.publish_if_changed()
         for topic in self._whole:

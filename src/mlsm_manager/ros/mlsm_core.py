@@ -22,7 +22,7 @@ from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import matrices
-from node_support.ros.node import every, guarded, make_health
+from node_support.ros.node import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
@@ -55,7 +55,6 @@ class MlsmCore:
             lambda update: self._publish_fix(update, round(update.scan.reference_time * 1e9)),
         )  # fmt: skip
         rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
-        every(parameters.map_period, self._map.publish, self.health)
 
     @classmethod
     def as_node(cls) -> "MlsmCore":

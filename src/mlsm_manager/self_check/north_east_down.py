@@ -3,20 +3,22 @@
 from typing import List, Optional, Sequence
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.problem.scan import Scan
 from node_support.geometry.planar import composed, inverse
 
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
 _CLIMB = 2.0
-# rad: turns between two scans that tell a direction: more than the beams' step, less than what makes a scan smeared.
-_LEAST_TURN, _GREATEST_TURN = 0.15, 1.2
-# Bearings are compared in steps of 3 deg, as most heads make them; a quarter of them has to hold echoes in both scans.
-_SECTORS = 120
-_LEAST_COMMON = _SECTORS // 4
-# m: ranges that differ by more say no more than that something else is seen.
+# The odometry as it is, and turned up: x, y and yaw are multiplied by these.
+_AS_TOLD, _TURNED_UP = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
+# Echoes of a scan: with fewer their mean distance tells little, and more take time and tell nothing new.
+_FEWEST, _MOST = 30, 1000
+# m: echoes that are farther from all others say no more than that something else is seen.
 _OTHER_SURFACE = 5.0
-# Pairs of scans that turned, and the share of them that has to speak against the odometry.
+# times: by less the two odometries do not differ, as on a straight way or where the vehicle stands.
+_CLEARLY = 1.2
+# Pairs of scans that tell the two apart, and the share of them that has to speak against the odometry.
 _LEAST_PAIRS = 5
 _SHARE = 0.75
 
@@ -37,7 +39,7 @@ class ZDownSigns:
 
     def take_scan(self, scan: Scan) -> None:
         """Compare a scan with the one before it."""
-        vote = None if self._previous is None else _fits_opposite_turn(self._previous, scan)
+        vote = None if self._previous is None else _fits_turned_up(self._previous, scan)
         self._previous = scan
         if vote is not None:
             self._pairs += 1
@@ -51,7 +53,7 @@ class ZDownSigns:
             found.append(f"z grows by {climb:.1f} m from the start, as a depth does")
         share = self._against / max(self._pairs, 1)
         if self._pairs >= _LEAST_PAIRS and share >= _SHARE:
-            found.append(f"in {100.0 * share:.0f} % of the turns the echoes drift with the yaw instead of against it")
+            found.append(f"in {100.0 * share:.0f} % of the scans the echoes fit better with y and yaw reversed")
         return found
 
 
@@ -67,30 +69,26 @@ def suspicions(heights: np.ndarray, scans: Sequence[Scan]) -> List[str]:
     return signs.lines()
 
 
-def _fits_opposite_turn(earlier: Scan, later: Scan) -> Optional[bool]:
-    turn = float(later.reference_pose[2] - earlier.reference_pose[2])
-    if not _LEAST_TURN <= abs(turn) <= _GREATEST_TURN:
+def _fits_turned_up(earlier: Scan, later: Scan) -> Optional[bool]:
+    """Return whether two scans fit each other better with the odometry turned up; None where they do not tell."""
+    if min(len(earlier), len(later)) < _FEWEST:
         return None
-    before, after = _nearest_ranges(earlier), _nearest_ranges(later)
-    shift = round(turn / (2.0 * np.pi) * _SECTORS)
-    as_told, opposite = _difference(np.roll(before, -shift), after), _difference(np.roll(before, shift), after)
-    return None if as_told is None or opposite is None else opposite < as_told
-
-
-def _nearest_ranges(scan: Scan) -> np.ndarray:
-    """Return (sectors,) the nearest echo around the vehicle, m, NaN where none is."""
-    poses = scan.track.at(scan.times)
-    placed = np.column_stack([scan.points[:, :2], np.zeros(len(scan))])
-    seen = composed(inverse(poses), placed)
-    sector = np.floor(np.arctan2(seen[:, 1], seen[:, 0]) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
-    ranges = np.full(_SECTORS, np.inf)
-    np.minimum.at(ranges, sector, np.hypot(seen[:, 0], seen[:, 1]))
-    return np.where(np.isfinite(ranges), ranges, np.nan)
-
-
-def _difference(one: np.ndarray, other: np.ndarray) -> Optional[float]:
-    differences = np.abs(one - other)
-    common = np.isfinite(differences)
-    if np.count_nonzero(common) < _LEAST_COMMON:
+    as_told = _distance(_placed(earlier, _AS_TOLD), _placed(later, _AS_TOLD))
+    turned_up = _distance(_placed(earlier, _TURNED_UP), _placed(later, _TURNED_UP))
+    if max(as_told, turned_up) < _CLEARLY * min(as_told, turned_up):
         return None
-    return float(np.minimum(differences[common], _OTHER_SURFACE).mean())
+    return turned_up < as_told
+
+
+def _placed(scan: Scan, signs: np.ndarray) -> np.ndarray:
+    """Return (n, 2) echoes in odom, m, where the vehicle's poses are multiplied by `signs`."""
+    chosen = slice(None, None, -(-len(scan) // _MOST))
+    points, poses = scan.points[chosen, :2], scan.track.at(scan.times[chosen])
+    seen = composed(inverse(poses), np.column_stack([points, np.zeros(len(points))]))
+    return composed(poses * signs, seen)[:, :2]
+
+
+def _distance(one: np.ndarray, other: np.ndarray) -> float:
+    """Return the mean distance [m] of the points (n, 2) from their nearest neighbours among others (m, 2)."""
+    distances, _ = cKDTree(one).query(other)
+    return float(np.minimum(distances, _OTHER_SURFACE).mean())

@@ -4,6 +4,8 @@ import numpy as np
 
 from mlsm_manager.self_check.verdict import Verdict, merged
 
+_NOWHERE = np.empty((0, 2))
+
 
 def settings_agree(times: np.ndarray, paths: np.ndarray, deviations: np.ndarray, limit: float = 2.0) -> Verdict:
     """Return how far paths of other settings or starts lie from the first one, in its told deviations.
@@ -19,6 +21,22 @@ def settings_agree(times: np.ndarray, paths: np.ndarray, deviations: np.ndarray,
     return Verdict(
         "spread over settings", value, limit, "farthest path, told deviations", doubtful=far, question=question
     )
+
+
+def starts_agree(
+    times: np.ndarray, path: np.ndarray, other_start: np.ndarray, other_path: np.ndarray, limit: float = 0.5
+) -> Verdict:
+    """Return which share of the way from a path to another start is left between it and the path found from there.
+
+    times: (m,) s. path, other_start, other_path: (m, >= 2). The value is the ratio of the root mean squares.
+    """
+    displaced, left = (np.hypot(*(one - path)[:, :2].T) for one in (other_start, other_path))
+    ratio = float(np.sqrt((left**2).mean() / max((displaced**2).mean(), np.finfo(float).tiny)))
+    far = merged(times[left > limit * displaced.max()], float(np.median(np.diff(times)))) if ratio > limit else _NOWHERE
+    return Verdict(
+        "second start", ratio, limit, "share of a start's displacement by a told deviation that is left",
+        doubtful=far, question="Does the solver come back to the same path when it starts a told deviation beside it?",
+    )  # fmt: skip
 
 
 def told_deviation(times: np.ndarray, deviations: np.ndarray, limit: float = 5.0) -> Verdict:

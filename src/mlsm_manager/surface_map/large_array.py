@@ -48,7 +48,8 @@ class LargeArray:
         return self._view(length)
 
     def _view(self, length: int) -> np.ndarray:
-        return np.frombuffer(self._memory, dtype=self._dtype).reshape(length, *self._shape)
+        # Arrays of numpy before 1.20 do not keep the mapping from being moved, but the memoryview that they hold does.
+        return np.frombuffer(memoryview(self._memory), dtype=self._dtype).reshape(length, *self._shape)
 
     def _moved(self, length: int) -> bool:
         """Move the pages; return whether that was possible: not where somebody else still holds the array."""

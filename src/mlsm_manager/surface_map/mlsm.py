@@ -93,6 +93,15 @@ class MultiLevelSurfaceMap:
         rows, owners = self._store.find(cell_keys(cells))
         return self._store.blocks(rows, self.resolution), rows, owners
 
+    def is_near(self, points: np.ndarray) -> np.ndarray:
+        """Return which points (n, >= 2) lie in a cell that holds a block or adjoins one that does."""
+        around = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 2)
+        cells = cells_of(points, self.resolution)[:, np.newaxis] + around
+        _, owners = self._store.find(cell_keys(cells.reshape(-1, 2)))
+        near = np.zeros(len(points), dtype=bool)
+        near[owners // len(around)] = True
+        return near
+
     def at(self, rows: np.ndarray) -> Blocks:
         """Return a copy of the blocks in `rows` (n,), which `find` named."""
         return self._store.blocks(rows, self.resolution)

@@ -25,15 +25,16 @@ def quaternion_of(matrix: np.ndarray) -> np.ndarray:
     Each row of the products is the quaternion times one of its own components; the largest component loses least to
     rounding (Shepperd 1978).
     """
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix[:3, :3]
-    products = np.array([
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix[:3, :3].tolist()
+    products = [
         [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
         [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
         [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
         [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
-    ])  # fmt: skip
-    row = products[np.argmax(np.diag(products))]
-    return row / np.linalg.norm(row)
+    ]
+    diagonal = [products[index][index] for index in range(4)]
+    row = np.array(products[diagonal.index(max(diagonal))])
+    return row / math.sqrt(row.dot(row))
 
 
 def yaw_of(pose: np.ndarray) -> float:

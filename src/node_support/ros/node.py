@@ -24,6 +24,10 @@ _UNKNOWN_TO_MASTER = (
     "the ROS master was restarted and does not know this node, so that nobody can connect to it; the node ends. "
     "Parameters were lost with the old master: restart the launch file"
 )
+LAST_MESSAGES_ARRIVE = 3.0
+"""s from the last message to the end of a node that plays a recording.
+
+When a connection ends, rospy drops what a listener that stood still for a while has not yet read."""
 _END_STEP = 0.01  # s: roslaunch waits for every node
 
 

@@ -12,13 +12,12 @@ from rosgraph_msgs.msg import Clock
 
 from node_support import topics
 from node_support.pace import Pace
-from node_support.ros.node import StartError, guarded, make_health
+from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, guarded, make_health
 from recordings.ros.upright import turn_up
 
 _CLOCK_PERIOD = 0.01  # s of wall time: as rosbag play does
 _WAIT_STEP = 0.05  # s: soon enough for a person
 _LATECOMERS = 5.0  # s: a node that the master still lists may have died, and will never connect
-_LAST_MESSAGES_ARRIVE = 3.0  # s: when a connection ends, rospy drops what a listener that stood still has not yet read
 _QUEUE_SIZE = 1000
 
 
@@ -71,7 +70,7 @@ class BagPlayer:
                 return
             self._publishers[played.topic].publish(played.message)
             self._health.count("messages")
-        self._ended.wait(_LAST_MESSAGES_ARRIVE)
+        self._ended.wait(LAST_MESSAGES_ARRIVE)
         rospy.signal_shutdown("the bag has ended")
 
     def _tick(self, pace: Pace, since_start: float) -> None:

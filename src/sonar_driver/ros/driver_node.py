@@ -99,9 +99,10 @@ class DriverNode:
             self._stop.wait(_PAUSE_AFTER_FAILURE)
 
     def _publish(self, ping: Any) -> None:
+        # A ping leaves before its reply comes: with a clock near 0 its stamp is negative, which rospy.Time refuses.
+        check_stamp(round(ping.stamp * 1e9))
         message = self._model.message(ping, self._live.current, self._tilt.for_beam())
         if message is not None:
-            check_stamp(message.header.stamp.to_nsec())
             self._beams.publish(message)
             self.health.count("beams out")
 

@@ -5,6 +5,7 @@ import numpy as np
 from node_support.errors import RefusedInput
 
 HIGHEST_LEVEL = 255
+_LEVELS = np.arange(HIGHEST_LEVEL + 1)
 
 
 def otsu_threshold(strengths: np.ndarray) -> float:
@@ -16,17 +17,25 @@ def otsu_threshold(strengths: np.ndarray) -> float:
     """
     if strengths.size == 0:
         raise RefusedInput("clouds without points", "no strength to take a threshold of")
-    levels = np.clip(strengths, 0, HIGHEST_LEVEL).astype(np.int64)
-    histogram = np.bincount(levels, minlength=HIGHEST_LEVEL + 1)
-    level = np.arange(histogram.size)
-    count_below = np.cumsum(histogram)
-    sum_below = np.cumsum(histogram * level)
-    count_above = count_below[-1] - count_below
-    sum_above = sum_below[-1] - sum_below
-    separates = (count_below > 0) & (count_above > 0)
-    if not separates.any():
-        return float(levels[0])
-    w1, w2 = count_below[separates], count_above[separates]
-    between = w1 * w2 * (sum_below[separates] / w1 - sum_above[separates] / w2) ** 2
-    best = level[separates][between >= between.max() * (1.0 - 1e-12)]
+    histogram = level_histogram(strengths)
+    count_below = histogram.cumsum()
+    lowest, highest = count_below.searchsorted([1, strengths.size])
+    if lowest == highest:
+        return float(lowest)
+    separating = slice(lowest, highest)
+    sum_below = (histogram * _LEVELS).cumsum()
+    w1, sum1 = count_below[separating], sum_below[separating]
+    w2, sum2 = count_below[-1] - w1, sum_below[-1] - sum1
+    between = w1 * w2 * (sum1 / w1 - sum2 / w2) ** 2
+    best = np.flatnonzero(between >= between.max() * (1.0 - 1e-12)) + lowest
     return float(best[0] + best[-1]) / 2.0
+
+
+def level_histogram(strengths: np.ndarray) -> np.ndarray:
+    """Return (256,) int64: how many of `strengths` (n,), any numeric type, n > 0, lie in each integer level."""
+    strengths = np.ascontiguousarray(strengths)
+    if not (strengths.min() >= 0 and strengths.max() < HIGHEST_LEVEL + 1):
+        strengths = np.clip(strengths, 0, HIGHEST_LEVEL)
+    # By way of the smallest type, because float to int64 takes twice as long as both steps.
+    levels = strengths.astype(np.uint8).astype(np.intp)
+    return np.bincount(levels, minlength=HIGHEST_LEVEL + 1)

@@ -82,9 +82,10 @@ class Thresholder:
         if not valid.any():
             self.newest_threshold = None
             return cloud.select(valid)
-        self.newest_threshold = threshold = self.threshold(cloud.points[valid, 3])
+        strengths = np.ascontiguousarray(cloud.points[:, 3])
+        self.newest_threshold = threshold = self.threshold(strengths if valid.all() else strengths[valid])
         with np.errstate(invalid="ignore"):
-            return cloud.select(valid & (cloud.points[:, 3] > threshold))
+            return cloud.select(valid & (strengths > threshold))
 
     def threshold(self, strengths: np.ndarray) -> float:
         """Return the threshold for `strengths` (n,), n > 0, all finite.

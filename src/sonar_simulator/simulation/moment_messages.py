@@ -117,13 +117,13 @@ class MomentMessages:
 
 
 def _shift(vector: Any, pose: np.ndarray) -> None:
-    vector.x, vector.y, vector.z = pose[:3, 3]
+    vector.x, vector.y, vector.z = pose[:3, 3].tolist()
 
 
 def _turn(quaternion: Any, pose: np.ndarray) -> None:
-    quaternion.x, quaternion.y, quaternion.z, quaternion.w = quaternion_of(pose)
+    quaternion.x, quaternion.y, quaternion.z, quaternion.w = quaternion_of(pose).tolist()
 
 
 def _move(twist: Any, values: np.ndarray) -> None:
-    twist.linear.x, twist.linear.y, twist.linear.z = values[:3]
-    twist.angular.x, twist.angular.y, twist.angular.z = values[3:]
+    twist.linear.x, twist.linear.y, twist.linear.z = values[:3].tolist()
+    twist.angular.x, twist.angular.y, twist.angular.z = values[3:].tolist()

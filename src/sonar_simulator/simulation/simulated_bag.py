@@ -31,7 +31,7 @@ class SimulatedBag:
         self._settings = settings
         self._messages = MomentMessages(bag.make, np.asarray)
         self._tilt = math.nan
-        self._mount = np.eye(4)
+        self._mount: Any = None
 
     def begin(self, robot: RobotDescription) -> None:
         """Write what applies to the whole bag: the fixed transforms and the parameters."""
@@ -52,14 +52,16 @@ class SimulatedBag:
         messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
-        mount = self._messages.transform(self._mount_at(moment.tilt), stamp, BASE_FRAME, SONAR_FRAME)
-        messages[0][1].transforms.append(mount)
+        messages[0][1].transforms.append(self._mount_at(moment.tilt, stamp))
         for topic, message in messages:
             self._write(_RENAMED.get(topic, topic), message, stamp_ns)
 
-    def _mount_at(self, tilt: float) -> np.ndarray:
+    def _mount_at(self, tilt: float, stamp: Any) -> Any:
+        """Return the sonar's mount as a message, which is written before the next one is asked for."""
         if tilt != self._tilt:
-            self._tilt, self._mount = tilt, tilted(self._setup.T_base_sonar, tilt)
+            pose = tilted(self._setup.T_base_sonar, tilt)
+            self._tilt, self._mount = tilt, self._messages.transform(pose, stamp, BASE_FRAME, SONAR_FRAME)
+        self._mount.header.stamp = stamp
         return self._mount
 
     def _stamp(self, seconds: float) -> Any:

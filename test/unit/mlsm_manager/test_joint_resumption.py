@@ -9,8 +9,9 @@ from made_harbour import SONAR_IN_BASE, tour
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
+from node_support.geometry.planar import composed, transformed
 
 HARBOUR = tour(14, direction=0.05)
 KILLED_AFTER = 9
@@ -51,9 +52,16 @@ def resumed(stored, same_odometry=True):
     return localiser
 
 
-def displaced(stored, shift):
-    """Return the stored map with a correction that is `shift` (3,) beside the true one."""
-    return replace(stored, arrays={**stored.arrays, "T_map_odom": stored.arrays["T_map_odom"] + np.array(shift)})
+def begun_anew(scans, origin=(12.0, -9.0, 0.4)):
+    """Return the scans as an odometry places them that counts from elsewhere: its frame lies at `origin` (3,)."""
+    origin = np.array(origin)
+    tracks = [Track(scan.track.times, composed(origin, scan.track.poses)) for scan in scans]
+    return [replace(scan, points=transformed(origin, scan.points), track=track) for scan, track in zip(scans, tracks)]
+
+
+def sector_of(scan, beams=14):
+    """Return the first beams of a scan, which hear one wall and say nothing of the way along it."""
+    return Scan(scan.points[:beams], scan.times[:beams], scan.moving[:beams], scan.track, scan.reference_time)
 
 
 def without_a_run(stored):
@@ -95,21 +103,31 @@ def test_a_second_kill_loses_no_more_than_the_first(killed):
 
 
 @pytest.mark.parametrize("has_run", [True, False])
-def test_a_vehicle_that_is_elsewhere_writes_nothing_before_it_is_found(killed, has_run):
+def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(killed, has_run):
     _, stored = killed
-    localiser = resumed(displaced(stored if has_run else without_a_run(stored), [12.0, -9.0, 0.4]))
+    localiser = resumed(stored if has_run else without_a_run(stored))
     before = localiser.blocks.rows.copy()
-    updates = taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3])
+    updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]))
     assert [update.accepted for update in updates] == [False, False, False]
     assert localiser.is_lost
     np.testing.assert_array_equal(localiser.blocks.rows, before)
 
 
+@pytest.mark.parametrize(("has_run", "goes_on"), [(True, True), (False, False)])
+def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(killed, has_run, goes_on):
+    _, stored = killed
+    localiser = resumed(stored if has_run else without_a_run(stored))
+    (update,) = taken(localiser, [sector_of(HARBOUR.scans[KILLED_AFTER])])
+    assert update.accepted == goes_on
+    true_place = HARBOUR.truth.at(np.array([HARBOUR.scans[KILLED_AFTER].reference_time]))[0]
+    assert not goes_on or np.hypot(*(update.belief.theta[:2] - true_place[:2])) < 0.5
+
+
 @pytest.mark.parametrize("has_run", [True, False])
 def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, whole, has_run):
     (before, stored), (whole, wanted) = killed, whole
-    localiser = resumed(displaced(stored if has_run else without_a_run(stored), [12.0, -9.0, 0.4]))
-    updates = taken(localiser, HARBOUR.scans[KILLED_AFTER:])
+    localiser = resumed(stored if has_run else without_a_run(stored))
+    updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER:]))
     assert updates[3].accepted
     assert not localiser.is_lost
     np.testing.assert_allclose(updates[-1].belief.theta[:2], wanted[-1].belief.theta[:2], atol=0.5)

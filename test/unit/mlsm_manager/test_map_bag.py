@@ -28,7 +28,7 @@ FILES = {
 @pytest.fixture(scope="module")
 def basin(tmp_path_factory):
     folder = tmp_path_factory.mktemp("basin")
-    done = run(BASIN, "--out", folder, "--truth", "/ground_truth", "--refine")
+    done = run(BASIN, "--out", folder, "--truth", "/ground_truth", "--refine", "--check")
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -38,7 +38,7 @@ def test_a_simulated_bag_gives_all_files(basin):
 
 
 def test_the_same_command_writes_the_same_bytes(basin, tmp_path):
-    assert run(BASIN, "--out", tmp_path, "--truth", "/ground_truth", "--refine").returncode == 0
+    assert run(BASIN, "--out", tmp_path, "--truth", "/ground_truth", "--refine", "--check").returncode == 0
     for name in FILES - {"summary.json"}:
         assert (tmp_path / name).read_bytes() == (basin / name).read_bytes(), name
 
@@ -51,6 +51,12 @@ def test_the_summary_has_the_promised_keys(basin):
         assert set(summary[name]) == {"mean", "sd", "max"}
     assert summary["rejected"] == 0
     assert {"echoes", "calibration", "checks", "deviation_per_minute", "trust"} <= set(summary)
+
+
+def test_fits_with_other_settings_and_from_another_start_are_among_the_checks(basin):
+    checks = summary_of(basin)["checks"]
+    assert not checks["spread over settings"]["fires"]
+    assert not checks["second start"]["fires"]
 
 
 def test_a_simulated_basin_is_mapped_where_it_is(basin):

@@ -6,7 +6,7 @@ import pytest
 from mlsm_manager.self_check.calibration_agreement import halves_agree
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.odometry_agreement import against_odometry
-from mlsm_manager.self_check.path_spread import per_minute, settings_agree, told_deviation
+from mlsm_manager.self_check.path_spread import per_minute, settings_agree, starts_agree, told_deviation
 from mlsm_manager.self_check.verdict import Verdict, merged
 
 TIMES = np.arange(0.0, 2000.0, 1.0)
@@ -66,6 +66,14 @@ def test_settings_that_lead_elsewhere_are_told():
     verdict = settings_agree(TIMES, np.stack([STRAIGHT, near, far]), deviations)
     assert verdict.fires
     assert verdict.doubtful[0, 0] == 1501.0
+
+
+def test_a_start_that_is_hardly_left_is_told():
+    start = STRAIGHT + 1.0
+    assert not starts_agree(TIMES, STRAIGHT, start, STRAIGHT + 0.1).fires
+    stuck = starts_agree(TIMES, STRAIGHT, start, np.where(TIMES[:, np.newaxis] > 700.0, start, STRAIGHT))
+    assert stuck.fires
+    assert stuck.doubtful[0, 0] == 701.0
 
 
 def test_a_deviation_that_grows_without_end_is_told():

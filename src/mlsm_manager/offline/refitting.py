@@ -1,0 +1,60 @@
+"""Fits a whole run again, with other settings and from another start: does the path hang on them?"""
+
+from dataclasses import replace
+from typing import List
+
+import numpy as np
+
+from mlsm_manager.multi_view.batch_solver import BatchResult, solved
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.state import POSE, State
+from mlsm_manager.self_check.path_spread import settings_agree, starts_agree
+from mlsm_manager.self_check.verdict import Verdict
+
+_NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5
+"""Factors of settings that nobody knows better than that."""
+_MORE_SCANS = 2
+_TURNS = 1.0  # of the direction in which the second start lies beside the path, along the whole run
+
+
+def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
+    """Return what further fits of the run that `solver` followed say of `batch`, its fit with its own settings."""
+    deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
+    start = displaced(batch.state, deviations, solver.parameters.matching.cut)
+    others = [solved(solver, parameters, batch.state) for parameters in other_settings(solver.parameters)]
+    second = solved(solver, start=start)
+    told = _path(solver, batch.state)
+    paths = np.stack([told, *(_path(solver, other.state) for other in others)])
+    again = np.stack([told, _path(solver, start), _path(solver, second.state)])
+    return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
+
+
+def other_settings(parameters: MultiViewParameters) -> List[MultiViewParameters]:
+    """Return a handful of parameters, each of which differs from `parameters` in one setting of the comparisons."""
+    own = parameters.matching
+    changes = (
+        {"cut": _NARROWER * own.cut},
+        {"range_deviation": _WIDER * own.range_deviation},
+        {"weight": _HALF * own.weight},
+        {"block_scans": own.block_scans + _MORE_SCANS},
+    )
+    return [replace(parameters, matching=replace(own, **change)) for change in changes]
+
+
+def displaced(state: State, deviations: np.ndarray, most: float) -> State:
+    """Return a state whose nodes lie one told deviation (n,) [m] beside those of `state`, but at most `most` [m].
+
+    The direction turns slowly along the run, so that scans of one time still agree with each other.
+    """
+    angles = 2.0 * np.pi * _TURNS * np.linspace(0.0, 1.0, len(deviations))
+    moved = state.copy()
+    moved.nodes[:, :2] += np.minimum(deviations, most)[:, np.newaxis] * np.column_stack(
+        [np.cos(angles), np.sin(angles)]
+    )
+    return moved
+
+
+def _path(solver: LiveSolver, state: State) -> np.ndarray:
+    nodes = np.arange(len(state.nodes))
+    return solver.log.node_poses(nodes) + state.nodes[:, POSE]
