@@ -7,6 +7,7 @@ import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from enum import Enum
 from pathlib import Path
 from typing import Callable, List, Optional
 from xml.etree import ElementTree as ET
@@ -16,10 +17,12 @@ from oldest.environment import HOW_TO_GET_ONE, find_python38
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "build/test_results"
 STEP_TIMEOUT = 400.0
-# Downloads 100 MB.
-ENVIRONMENT_TIMEOUT = 1200.0
+# Downloads 100 MB, or computes with what the others leave.
+SPARE_TIMEOUT = 1200.0
 # Rostests mostly wait; each has a master of its own. With more at once, two cores no longer answer in time.
 TOGETHER = 2
+# The lowest there is: who waits for a message gets the processor at once.
+SPARE_PRIORITY = 19
 # Rostests that measure time, or whose simulation or playback runs as fast as a whole processor allows.
 ALONE = (
     "compass_demo",
@@ -39,6 +42,8 @@ ALONE = (
     "vehicle",
 )
 ROSTEST_TRIES = 1
+# Of pytest: a file's tests share what its fixtures made.
+IN_PARALLEL = ("-n", "auto", "--dist", "loadfile")
 _PRINTING = threading.Lock()
 
 
@@ -51,63 +56,73 @@ class Outcome:
     skipped: int = 0
 
 
+class Load(Enum):
+    """What a step asks of the machine."""
+
+    WHOLE = "uses all processors or measures time: nothing else may run"
+    SHARED = "mostly waits: some run at once"
+    SPARE = "computes and measures no time: takes what the SHARED ones leave"
+
+
 @dataclass(frozen=True)
 class Step:
     """One command and how its result is counted.
 
-    report: the JUnit file, or the folder of such files, that it leaves. is_alone: nothing else may run meanwhile.
-    tries: how often it is run at most, until it passes.
+    report: the JUnit file, or the folder of such files, that it leaves. tries: how often it is run at most, until it
+    passes.
     """
 
     name: str
     command: List[str]
     report: Optional[Path] = None
+    load: Load = Load.WHOLE
     timeout: float = STEP_TIMEOUT
-    is_alone: bool = True
     tries: int = 1
+
+    @property
+    def prioritised_command(self) -> List[str]:
+        """The command at the priority of its load."""
+        return ["nice", f"-n{SPARE_PRIORITY}", *self.command] if self.load is Load.SPARE else self.command
 
 
 def steps() -> List[Step]:
-    """Return all steps, those that run alone with quick ones first."""
-    unit_report, recordings_report = RESULTS / "unit.xml", RESULTS / "recordings.xml"
-    installation_report, stopping_report = RESULTS / "installation.xml", RESULTS / "stopping.xml"
-    plain = RESULTS / "without_ros.xml"
-    pytest = ["python3", "-m", "pytest"]
-    found = [
+    """Return all steps, those that run alone with quick ones first, and long ones before short ones."""
+    return [
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
         Step("ruff format", ["ruff", "format", "--quiet", "--check", "."]),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
-        Step("unit tests", [*pytest, "-n", "auto", "--dist", "loadfile", f"--junitxml={unit_report}"], unit_report),
-        Step(
-            "recordings",
-            [*pytest, "test/recordings", f"--junitxml={recordings_report}"],
-            recordings_report,
-            is_alone=False,
-        ),
+        _pytest("unit tests", "test/unit", *IN_PARALLEL),
+        _pytest("stopping", "test/stopping/test_stop.py"),
         *oldest_versions(),
-        Step("installation", [*pytest, "test/installation", f"--junitxml={installation_report}"], installation_report),
-        Step("without ROS", [*pytest, "test/without_ros", f"--junitxml={plain}"], plain, ENVIRONMENT_TIMEOUT),
-        Step("stopping", [*pytest, "test/stopping", f"--junitxml={stopping_report}"], stopping_report),
+        _pytest("recordings", "test/recordings", load=Load.SPARE),
+        _pytest("without ROS", "test/without_ros", load=Load.SPARE),
+        _pytest("documentation", "test/documentation", load=Load.SPARE),
+        _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),
+        _pytest("installation", "test/installation", load=Load.SHARED),
+        *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"))),
     ]
-    for test in sorted((ROOT / "test/rostest").glob("*.test")):
-        folder = RESULTS / test.stem
-        command = ["rostest", "--results-filename=result.xml", str(test)]
-        found.append(Step(f"rostest {test.stem}", command, folder, is_alone=test.stem in ALONE, tries=ROSTEST_TRIES))
-    return found
+
+
+def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
+    report = RESULTS / f"{name.replace(' ', '_')}.xml"
+    command = ["python3", "-m", "pytest", *arguments, f"--junitxml={report}"]
+    return Step(name, command, report, load, SPARE_TIMEOUT if load is Load.SPARE else STEP_TIMEOUT)
+
+
+def _rostest(test: Path) -> Step:
+    command = ["rostest", "--results-filename=result.xml", str(test)]
+    load = Load.WHOLE if test.stem in ALONE else Load.SHARED
+    return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load, tries=ROSTEST_TRIES)
 
 
 def oldest_versions() -> List[Step]:
-    """Return the steps of the unit tests with the oldest versions, none where no Python 3.8 is found."""
+    """Return the step of the unit tests with the oldest versions, none where no Python 3.8 is found."""
     if find_python38() is None:
         print(f"       left out: oldest versions: {HOW_TO_GET_ONE}", flush=True)
         return []
     report = RESULTS / "oldest.xml"
-    command = ["python3", "scripts/oldest/run.py", "-n", "auto", "--dist", "loadfile", f"--junitxml={report}"]
-    environment = ["python3", "scripts/oldest/environment.py"]
-    return [
-        Step("oldest versions: environment", environment, timeout=ENVIRONMENT_TIMEOUT),
-        Step("oldest versions: unit tests", command, report),
-    ]
+    command = ["python3", "scripts/oldest/run.py", *IN_PARALLEL, f"--junitxml={report}"]
+    return [Step("oldest versions", command, report, Load.SPARE, SPARE_TIMEOUT)]
 
 
 def run_step(step: Step) -> Outcome:
@@ -126,7 +141,7 @@ def _tried(step: Step) -> Outcome:
     environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(step.report or RESULTS)}
     try:
         done = subprocess.run(
-            step.command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            step.prioritised_command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL, timeout=step.timeout, check=False,
         )  # fmt: skip
         status, output = done.returncode, done.stdout.decode(errors="replace")
@@ -191,9 +206,11 @@ def main(words: List[str], run: Callable[[Step], Outcome] = run_step) -> int:
     subprocess.run(["rm", "-rf", str(RESULTS)], check=True)
     RESULTS.mkdir(parents=True)
     chosen = [step for step in steps() if not words or any(word in step.name for word in words)]
-    outcomes = [run(step) for step in chosen if step.is_alone]
-    with ThreadPoolExecutor(max_workers=TOGETHER) as pool:
-        outcomes += pool.map(run, [step for step in chosen if not step.is_alone])
+    outcomes = [run(step) for step in chosen if step.load is Load.WHOLE]
+    with ThreadPoolExecutor(TOGETHER) as shared, ThreadPoolExecutor(TOGETHER) as spare:
+        pools = {Load.SHARED: shared, Load.SPARE: spare}
+        running = [pools[step.load].submit(run, step) for step in chosen if step.load in pools]
+    outcomes += [one.result() for one in running]
     passed, failed = sum(o.passed for o in outcomes), sum(o.failed for o in outcomes)
     print(f"{passed} passed, {failed} failed")
     return int(failed > 0 or passed == 0)

@@ -6,10 +6,13 @@ from typing import Callable, Dict, List
 
 from benchmarks import (
     carving_figures,
+    growth_figures,
     large_map_figures,
     map_figures,
     marina_figures,
     matching_figures,
+    other_libraries,
+    other_registrations,
     processing_figures,
     shape_figures,
     simulation_figures,
@@ -20,11 +23,13 @@ from benchmarks import (
 from benchmarks.table import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
+    "growth": growth_figures.rows,
     "map": map_figures.rows,
     "large-map": large_map_figures.rows,
     "carving": carving_figures.rows,
     "marina": marina_figures.rows,
     "matching": matching_figures.rows,
+    "others": lambda: other_libraries.rows() + other_registrations.rows(),
     "processing": processing_figures.rows,
     "simulation": simulation_figures.rows,
     "vehicle": vehicle_figures.rows,

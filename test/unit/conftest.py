@@ -15,7 +15,10 @@ sys.path.append(str(ROOT / "test" / "rostest"))
 sys.path.append(str(Path(__file__).resolve().parent))
 sys.path.append(str(ROOT / "test" / "unit" / "sonar_driver"))
 
-settings.register_profile("repeatable", derandomize=True, deadline=None)
+# The same examples in every run: more of them would find nothing new in the next one.
+settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)
+# Other examples in every run, to look for what nobody thought of: pytest --hypothesis-profile=thorough.
+settings.register_profile("thorough", deadline=None, max_examples=1000)
 # For a second run of all tests with other versions, see scripts/oldest.
 settings.register_profile("few", settings.get_profile("repeatable"), max_examples=20)
 settings.load_profile("repeatable")

@@ -19,11 +19,13 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from node_support.errors import RefusedInput
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
-# s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over.
-_LONGEST_SILENCE = 60.0
+# s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
+# that scans of a fast playback on a busy machine, which are late by a minute, come after it.
+_LONGEST_SILENCE = 120.0
 
 
 class MapInput(Enum):
@@ -198,6 +200,13 @@ class Localiser:
             self._search.jump()
             self._newest = None
         return until - time
+
+    def check_time(self, time: float) -> None:
+        """Raise RefusedInput for a `time` [s] of a scan long before the belief's, which cannot be predicted back."""
+        until = self.believed_until
+        if until is not None and time < until - _JUMP_BACK:
+            detail = f"by {until - time:.1f} s, since the odometry was followed without them; the machine is too slow"
+            raise RefusedInput("scans too late", detail)
 
     def silent_since(self, time: float) -> Optional[float]:
         """Return the time [s] of the belief when it is so old at `time` that `follow` must be called, else None."""

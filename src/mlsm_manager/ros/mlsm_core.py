@@ -108,7 +108,7 @@ class MlsmCore:
     def _inserted(self, cloud: IntensityCloud) -> CloudUpdate:
         if cloud.frame_id == self._live.current.map_frame:
             return self._localiser.take_placed(cloud.points[cloud.valid])
-        self._notice_time(cloud.stamp_ns * 1e-9)
+        self._notice_time_of_scan(cloud.stamp_ns * 1e-9)
         return self._localiser.take_cloud(
             TimedPoints.from_stamps(cloud.points, cloud.time_stamps, cloud.stamp_ns * 1e-9)
         )
@@ -116,7 +116,8 @@ class MlsmCore:
     def _match(self, cloud: IntensityCloud) -> None:
         self.health.count("scans in")
         self._check_header(cloud)
-        self._notice_time(cloud.stamp_ns * 1e-9)
+        self._notice_time_of_scan(cloud.stamp_ns * 1e-9)
+        self._localiser.check_time(cloud.stamp_ns * 1e-9)
         scan = self._scan(self._without_far_points(cloud))
         if scan is None:
             return
@@ -198,6 +199,11 @@ class MlsmCore:
         if since is not None:
             self._localiser.follow(self._odometry.track(since, np.empty(0), time), time)
         return self._localiser.correction(time, pose)
+
+    def _notice_time_of_scan(self, time: float) -> None:
+        """Notice that time jumped back; while the odometry goes on, an old scan is merely late."""
+        newest = self._odometry.newest()
+        self._notice_time(time if newest is None or newest[0] is None else max(time, newest[0]))
 
     def _notice_time(self, time: float) -> None:
         seconds = self._localiser.notice_time(time)

@@ -91,11 +91,12 @@ def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.
     if len(points) == 0:
         return np.ones(0, dtype=bool)
     points = np.ascontiguousarray(points, dtype=np.float32)
-    tree = cKDTree(points)
+    tree = cKDTree(points, balanced_tree=False)
     slack = 1e-5 * radius + 1e-6
     surely = tree.query_ball_point(points, max(radius - slack, 0.0), return_length=True) > min_neighbors
-    possibly = tree.query_ball_point(points, radius + slack, return_length=True) > min_neighbors
-    for index in np.flatnonzero(possibly & ~surely):
+    unsure = np.flatnonzero(~surely)
+    possibly = tree.query_ball_point(points[unsure], radius + slack, return_length=True) > min_neighbors
+    for index in unsure[possibly]:
         near = points[tree.query_ball_point(points[index], radius + slack)]
         surely[index] = np.count_nonzero(_squared_distances(near, points[index]) <= radius * radius) > min_neighbors
     return surely

@@ -1,8 +1,7 @@
-"""The executables of this package."""
+"""The executables of this package. The detectors are imported by those who run them, for they load scipy.optimize."""
 
 from node_support.ros.node import run
 from sonar_processing.ros.pipeline import Pipeline
-from sonar_processing.ros.shape_detectors import CircleDetectorNode, LineDetectorNode
 from sonar_processing.ros.sonar_control import SonarControl
 from sonar_processing.ros.sonar_image import SonarImage
 from sonar_processing.ros.sonar_to_cloud import SonarToCloud
@@ -21,11 +20,15 @@ def run_stage(name: str) -> None:
 
 def run_line_detector() -> None:
     """Run line_detector."""
+    from sonar_processing.ros.shape_detectors import LineDetectorNode
+
     run("line_detector", LineDetectorNode)
 
 
 def run_circle_detector() -> None:
     """Run circle_detector."""
+    from sonar_processing.ros.shape_detectors import CircleDetectorNode
+
     run("circle_detector", CircleDetectorNode)
 
 

@@ -1,13 +1,9 @@
-"""Hypothesis strategies and settings that the driver's tests share."""
+"""Hypothesis strategies that the driver's tests share."""
 
-from hypothesis import settings
 from hypothesis import strategies as st
 
 from imagenex_852_driver.protocol import Reply, ReplyKind, SwitchCommand
 from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES
-
-REPEATABLE = settings(derandomize=True, deadline=None, max_examples=100)
-
 
 commands = st.builds(
     dict,

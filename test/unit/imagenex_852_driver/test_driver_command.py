@@ -1,7 +1,7 @@
 import contextlib
 
 import pytest
-from driver_strategies import REPEATABLE, chunks_of, commands, garbage
+from driver_strategies import chunks_of, commands, garbage
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -26,13 +26,11 @@ def test_the_bytes_are_those_of_the_thesis_table():
     assert command.encode() == bytes.fromhex(expected)
 
 
-@REPEATABLE
 @given(commands)
 def test_every_valid_command_round_trips(command):
     assert SwitchCommand.decode(command.encode()) == command
 
 
-@REPEATABLE
 @given(commands)
 def test_the_terminator_occurs_at_the_end_only(command):
     assert command.encode().find(0xFD) == 26
@@ -65,14 +63,12 @@ def test_the_command_knows_which_reply_it_asks_for(values, kind):
     assert SwitchCommand(max_range=20, **values).reply_kind is kind
 
 
-@REPEATABLE
 @given(st.binary(max_size=60))
 def test_decoding_raises_nothing_but_frame_errors(data):
     with contextlib.suppress(FrameError):
         SwitchCommand.decode(data)
 
 
-@REPEATABLE
 @given(st.lists(st.tuples(garbage(), commands), max_size=3), st.lists(st.integers(0), max_size=5))
 def test_the_reader_finds_every_command_in_garbage_however_it_is_cut(parts, cuts):
     reader = CommandReader()

@@ -1,7 +1,6 @@
 import os
 
 import pytest
-from driver_strategies import REPEATABLE
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -90,7 +89,6 @@ def test_only_the_first_hundred_damages_are_remembered_but_all_are_counted(log):
     assert (reader.damage_count, len(reader.damages), reader.ping_count) == (150, 100, 150)
 
 
-@REPEATABLE
 @given(st.binary(max_size=300), st.integers(0, 639), st.binary(max_size=300))
 def test_no_damage_ends_the_reading_or_costs_a_whole_ping(tmp_path_factory, before, cut, after):
     path = tmp_path_factory.mktemp("log") / "damaged.852"

@@ -1,5 +1,5 @@
 import pytest
-from driver_strategies import REPEATABLE, commands, replies
+from driver_strategies import commands, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -28,7 +28,6 @@ pings = st.builds(
 )
 
 
-@REPEATABLE
 @given(pings)
 def test_every_ping_round_trips(ping):
     assert decode_record(ping.encode()) == ping
@@ -74,7 +73,6 @@ def test_a_value_that_does_not_fit_is_refused_with_the_value():
         LoggedPing(REPLY, start_gain_db=300).encode()
 
 
-@REPEATABLE
 @given(st.binary(max_size=700))
 def test_checking_raises_nothing_but_frame_errors(data):
     try:
@@ -84,7 +82,6 @@ def test_checking_raises_nothing_but_frame_errors(data):
     assert data[:3] == b"852"
 
 
-@REPEATABLE
 @given(commands, replies(), st.integers(0, 2_000_000_000))
 def test_every_ping_of_the_driver_can_be_logged(command, reply, stamp):
     logged = LoggedPing.of(float(stamp), command, reply)

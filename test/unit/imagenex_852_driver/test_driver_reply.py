@@ -1,7 +1,7 @@
 import contextlib
 
 import pytest
-from driver_strategies import REPEATABLE, replies
+from driver_strategies import replies
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -10,7 +10,6 @@ from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind
 RECORDED_HEADER = bytes.fromhex("49475811 45780a32 40037403")
 
 
-@REPEATABLE
 @given(replies())
 def test_every_valid_reply_round_trips(reply):
     assert Reply.decode(reply.encode()) == reply
@@ -50,7 +49,6 @@ def test_a_wrong_number_of_echoes_is_refused_with_the_number():
         Reply(ReplyKind.IMX, 20, bytes(251))
 
 
-@REPEATABLE
 @given(st.binary(max_size=600))
 def test_decoding_raises_nothing_but_frame_errors(data):
     with contextlib.suppress(FrameError):

@@ -1,4 +1,4 @@
-from driver_strategies import REPEATABLE, chunks_of, garbage, replies
+from driver_strategies import chunks_of, garbage, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -11,19 +11,16 @@ def replies_in(parser, chunks):
     return [parsed.reply for chunk in chunks for parsed in parser.feed(chunk)]
 
 
-@REPEATABLE
 @given(st.binary(max_size=2000), st.lists(st.integers(0), max_size=5))
 def test_no_stream_of_bytes_makes_it_raise(data, cuts):
     replies_in(ReplyParser(), chunks_of(data, cuts))
 
 
-@REPEATABLE
 @given(garbage(), replies())
 def test_a_whole_reply_behind_garbage_is_never_lost(noise, reply):
     assert replies_in(ReplyParser(), [noise + reply.encode()])[-1:] == [reply]
 
 
-@REPEATABLE
 @given(garbage(), replies(), garbage(), st.lists(st.integers(0), max_size=8))
 def test_any_cutting_of_the_stream_gives_the_same_replies_and_counts(before, reply, after, cuts):
     stream = before + reply.encode() + after
@@ -32,7 +29,6 @@ def test_any_cutting_of_the_stream_gives_the_same_replies_and_counts(before, rep
     assert whole.counts == cut.counts
 
 
-@REPEATABLE
 @given(st.lists(replies(), max_size=4))
 def test_replies_back_to_back_come_out_in_order(sent):
     stream = b"".join(reply.encode() for reply in sent)

@@ -1,5 +1,4 @@
 import pytest
-from driver_strategies import REPEATABLE
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -75,7 +74,6 @@ def test_a_sector_narrower_than_a_step_is_refused():
         HeadSettings(sector_width_deg=3, step_size_deg=6)
 
 
-@REPEATABLE
 @given(st.integers(0, 255), st.floats(0, 2.55), st.integers(0, 510), st.integers(-210, 210), st.integers(0, 360))
 def test_settings_that_exist_never_put_the_terminator_inside_a_command(pulse, absorption, delay, train, sector):
     try:

@@ -52,7 +52,7 @@ def cells(blocks):
 ECHO = st.tuples(st.integers(-8, 8).map(float), st.integers(-8, 8).map(lambda y: y + 0.3))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(st.lists(ECHO, max_size=12), min_size=1, max_size=8), st.integers(-4, 4), st.integers(-4, 4))
 def test_what_is_settled_is_as_if_every_keyframe_had_carved_once_from_its_last_place(frames, early, last):
     clouds = [cloud(number, *echoes) for number, echoes in enumerate(frames)]

@@ -50,7 +50,7 @@ def assert_same(found, wanted):
 STEP = st.tuples(st.sampled_from(["add", "draw", "insert"]), st.integers(-4, 4))
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(st.lists(STEP, max_size=10), st.integers(-4, 4))
 def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
     shown, keyframes, inserted = KeyframeMap(RESOLUTION, LIMIT), [], []

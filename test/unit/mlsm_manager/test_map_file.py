@@ -21,7 +21,7 @@ def _loaded(blocks):
 
 
 @given(st.integers(0, 2**31), st.integers(1, 400), st.sampled_from([0.1, 0.5, 3.0]))
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 def test_cell_bottom_top_and_number_of_points_are_kept_exactly(seed, count, resolution):
     blocks = random_map(seed, count, resolution, extent=3.0).blocks
     assert partition(_loaded(blocks)) == partition(blocks)

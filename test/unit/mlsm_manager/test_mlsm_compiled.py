@@ -32,7 +32,7 @@ def _points(drawn):
 
 
 @given(BATCHES, st.sampled_from([0.1, 0.5, 1.0]))
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=100)
 def test_batches_of_any_points_make_the_same_rows(batches, resolution):
     maps = _maps(resolution)
     for batch in batches:

@@ -19,7 +19,7 @@ def _assert_same_map(blocks, expected):
 
 
 @given(st.integers(0, 2**31), st.integers(1, 300), st.integers(1, 300), st.floats(0.3, 5.0))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_inserted_blocks_make_the_map_that_all_points_make(seed, first, second, extent):
     points, others = random_points(seed, first, extent), random_points(seed + 1, second, extent)
     one, merged, other = MultiLevelSurfaceMap(0.5), MultiLevelSurfaceMap(0.5), MultiLevelSurfaceMap(0.5)
@@ -57,7 +57,7 @@ def test_blocks_beyond_the_limit_are_counted_by_their_points():
 
 
 @given(st.integers(0, 2**31), st.lists(st.floats(-12, 12), min_size=4, max_size=4))
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 def test_a_box_holds_the_blocks_that_a_look_at_all_finds_in_the_same_order(seed, corners):
     low, high = np.minimum(corners[:2], corners[2:]), np.maximum(corners[:2], corners[2:])
     surface_map = random_map(seed, count=1500)

@@ -159,6 +159,7 @@ def scaled(scan, factor):
     return replace(scan, points=transformed(move, scan.points), track=shrunk)
 
 
+@pytest.mark.newest_only("dear; the tests above follow the same tour")
 def test_thrusters_find_a_scale_that_is_30_percent_off(made):
     solver = followed([scaled(scan, 1.0 / 1.3) for scan in made.scans], OdometryKind.THRUSTERS)
     newest = solver.estimates[-1]

@@ -8,6 +8,7 @@ from mlsm_manager.localisation.joint_parameters import Estimator
 SCANS = 50
 
 
+@pytest.mark.newest_only("a statistic of many scans; test_map_bag and test_localiser compute single ones")
 @pytest.mark.parametrize("estimator", Estimator)
 def test_noise_and_bubbles_correct_nothing(estimator):
     found = outcome(bubbles, estimator, SCANS, seed=2)

@@ -49,4 +49,5 @@ def test_a_scan_without_a_solution_is_left_out_and_counted(made):
 def test_a_scan_that_is_left_out_changes_nothing_else(made):
     rest = [*made.scans[:DAMAGED], *made.scans[DAMAGED + 1 :]]
     damaged = [*made.scans[:DAMAGED], with_wild_odometry(made.scans[DAMAGED]), *made.scans[DAMAGED + 1 :]]
-    np.testing.assert_array_equal(replayed(made, damaged).corrected, replayed(made, rest).corrected)
+    found, expected = replayed(made, damaged), replayed(made, rest)
+    np.testing.assert_allclose(found.corrected, expected.corrected, rtol=0.0, atol=1e-9)

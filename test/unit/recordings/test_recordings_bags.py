@@ -35,7 +35,7 @@ def mcap(tmp_path_factory):
 def assert_same(recording, expected):
     assert [one.beam.stamp_ns for one in recording.beams] == [one.beam.stamp_ns for one in expected.beams]
     for one, other in zip(recording.beams, expected.beams):
-        assert np.array_equal(one.T_target_sonar, other.T_target_sonar)
+        np.testing.assert_allclose(one.T_target_sonar, other.T_target_sonar, rtol=0.0, atol=1e-9)
         assert np.array_equal(one.beam.intensities, other.beam.intensities)
         assert (one.beam.angle, one.is_moving) == (other.beam.angle, other.is_moving)
     np.testing.assert_allclose(recording.track.poses, expected.track.poses, rtol=0.0, atol=1e-9)

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
@@ -24,7 +24,6 @@ def _points(ranges, elevations, bearings):
     return xyz.reshape(-1, 3).astype(np.float32)
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.integers(1, 12), st.integers(1, 40), st.floats(0.01, 6.2))
 def test_a_laser_scan_is_row_after_row_of_its_angles(rows, columns, opening):
     values = np.arange(rows * columns) % 40 + 1.0
@@ -46,7 +45,6 @@ def test_the_retro_of_a_laser_scan_goes_with_its_rays():
     np.testing.assert_array_equal(rays.retro, [[0.1, 0.2], [0.3, 0.4]])
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.integers(1, 12), st.integers(1, 30), st.floats(0.02, 3.0), st.booleans())
 def test_the_rows_of_a_pyramid_of_points_are_found(rows, columns, opening, told):
     ranges = 3.0 + (np.arange(rows * columns) % 7).reshape(rows, columns)
@@ -100,7 +98,6 @@ CIRCLE = Rays(
 )
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.floats(-math.pi, math.pi))
 def test_a_beam_of_a_circle_holds_the_rays_within_its_width(bearing):
     beam = CIRCLE.within(bearing, math.radians(2.5))

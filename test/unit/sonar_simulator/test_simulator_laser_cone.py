@@ -15,7 +15,6 @@ def _echoes(distances, seed=0, **values):
     return beams[0] if np.ndim(distances) == 1 else beams
 
 
-@settings(derandomize=True, deadline=None)
 @given(st.floats(0.001, 50.0))
 def test_a_contact_falls_into_the_bin_that_covers_its_range(distance):
     (index,) = np.flatnonzero(_echoes([distance], **NOISE_FREE))
@@ -62,7 +61,7 @@ def test_noise_lies_around_the_nearest_contact():
     assert ranges.mean() == pytest.approx(10.0, abs=1.5)
 
 
-@settings(derandomize=True, deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(st.floats(0.0, 255.0), st.floats(0.0, 255.0))
 def test_noise_never_leaves_0_to_127(mean, sd):
     strengths = _echoes(np.full(50, 25.0), noise_strength_mean=mean, noise_strength_sd=sd, noise_echoes=500)

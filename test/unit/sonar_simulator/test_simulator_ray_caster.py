@@ -2,7 +2,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry.matrices import pose_matrix
@@ -19,7 +19,6 @@ def _directions(bearings, elevations):
     return np.stack([level * np.cos(bearings), level * np.sin(bearings), np.sin(elevations)], axis=-1)
 
 
-@settings(derandomize=True, deadline=None)
 @given(
     st.tuples(*(st.floats(-0.9, 0.9) for _ in range(3))),
     st.floats(-np.pi, np.pi),

@@ -41,7 +41,8 @@ def test_poses_of_models_in_models_multiply(tmp_path_factory, poses):
 
 @given(POSES)
 def test_a_pose_reads_as_it_is_written(pose):
-    np.testing.assert_array_equal(own_pose(ET.fromstring(f"<link><pose>{_text(pose)}</pose></link>")), _matrix(pose))
+    found = own_pose(ET.fromstring(f"<link><pose>{_text(pose)}</pose></link>"))
+    np.testing.assert_allclose(found, _matrix(pose), rtol=0.0, atol=1e-12)
 
 
 @given(POSES, POSES, POSES)

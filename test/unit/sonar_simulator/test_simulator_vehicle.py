@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry.matrices import pose_matrix, yaw_of
@@ -29,7 +29,6 @@ def test_a_script_ends_at_the_sum_of_its_moves_and_stays_there():
     np.testing.assert_allclose(SCRIPT.pose(SCRIPT.duration + 100.0), expected, atol=1e-12)
 
 
-@settings(derandomize=True, deadline=None)
 @given(TIMES)
 def test_the_twist_is_the_derivative_of_the_pose_seen_from_the_body(time):
     step = 1e-4
@@ -39,7 +38,6 @@ def test_the_twist_is_the_derivative_of_the_pose_seen_from_the_body(time):
     np.testing.assert_allclose(SCRIPT.twist(time), [*linear, 0.0, 0.0, angular], atol=1e-3)
 
 
-@settings(derandomize=True, deadline=None)
 @given(TIMES)
 def test_pose_and_twist_are_continuous(time):
     step = 1e-6
