@@ -5,6 +5,7 @@ from typing import Tuple
 from thesis_results import (
     consistency,
     convergence,
+    marina,
     moving_scan,
     processed_recording,
     processed_scans,
@@ -30,6 +31,7 @@ SECTIONS: Tuple[Section, ...] = (
     Section("mapping", "7.3", "A 3-D survey of the harbour", tilt_survey.make),
     Section("moves", "7.4", "Three moves with an odometry that is 30 % off", three_moves.make),
     Section("moving", "7.4", "A vehicle that never stops", moving_scan.make),
+    Section("marina", "7.4", "A real marina", marina.make, marina.RECORDINGS),
     Section("convergence", "beyond", "From how far off a scan finds its place", convergence.make),
     Section("sensitivity", "beyond", "The error of a fix against rays, pulse and noise", sensitivity.make),
     Section("consistency", "beyond", "Are the stated deviations true?", consistency.make),
