@@ -66,7 +66,7 @@ class JointSession:
         return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def verdicts(self) -> List[Verdict]:
-        """Return how well the newest scans agree with the map, how uncertain the path is, and what surfaces tell of it."""
+        """Return how the newest scans agree with the map, how far the path is known, and what surfaces tell of it."""
         newest = self.solver.estimates[-_CHECKED_SCANS:]
         times = np.array([estimate.time for estimate in newest])
         radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
