@@ -8,6 +8,8 @@ import numpy as np
 from mlsm_manager.multi_view.batch_solver import BatchResult
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.odometry_model import HELD_DEVIATION
+from mlsm_manager.multi_view.priors import run_deviations, run_mean
 from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.parameters import describe
@@ -27,6 +29,16 @@ class Calibration:
     names: Tuple[str, ...]
     values: np.ndarray
     deviations: np.ndarray
+
+    @classmethod
+    def expected(cls, solver: LiveSolver) -> "Calibration":
+        """Return what was known before the run."""
+        columns, sonar = solver.odometry.calibrated, solver.parameters.sonar
+        of_node = list(columns.values())
+        values = np.append(run_mean(sonar), solver.odometry.first_node()[of_node])
+        deviations = np.append(run_deviations(sonar), solver.odometry.first_deviations()[of_node])
+        deviations = np.maximum(deviations, HELD_DEVIATION)
+        return cls((*_OF_RUN, *columns), values, deviations)
 
     @classmethod
     def of_live(cls, solver: LiveSolver) -> "Calibration":

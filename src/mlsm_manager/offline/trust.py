@@ -12,7 +12,7 @@ from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
-from mlsm_manager.self_check.calibration_agreement import halves_agree
+from mlsm_manager.self_check.calibration_agreement import as_expected, halves_agree
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.odometry_agreement import against_odometry
@@ -90,6 +90,9 @@ def trust(replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Ver
             ends, np.array([estimate.surfaces for estimate in estimates]), solver.odometry.distance_deviation
         ),
     ]
+    found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
+    before = Calibration.expected(solver)
+    verdicts.append(as_expected(before.names, before.values, before.deviations, found.values))
     halves = _halves(replayed.scans, solver)
     verdicts += [] if halves is None else [halves]
     return Trust([*verdicts, *refitted], deviations)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.self_check.calibration_agreement import halves_agree
+from mlsm_manager.self_check.calibration_agreement import as_expected, halves_agree
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.odometry_agreement import against_odometry
@@ -50,6 +50,14 @@ def test_scans_that_left_their_map_are_told(lost_from, fires):
     verdict = recent_agreement(14.0 * np.arange(100), agreements)
     assert verdict.fires == fires
     assert len(verdict.doubtful) == fires
+
+
+def test_a_head_that_is_mounted_turned_is_told():
+    names, expected, deviations = ["sonar_delay", "odometry_direction"], np.zeros(2), np.array([1.0, 0.1])
+    assert not as_expected(names, expected, deviations, np.array([0.9, -0.11])).fires
+    verdict = as_expected(names, expected, deviations, np.array([0.9, 0.34]))
+    assert verdict.fires
+    assert "odometry_direction is 0.34, 0 +- 0.1 was expected" in verdict.line()
 
 
 def test_halves_that_find_another_delay_are_told():
