@@ -20,12 +20,12 @@ class Found:
     closing: Optional[Closed] = None
 
     @classmethod
-    def of(cls, replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Verdict] = ()) -> "Found":
-        """Return what was found in a run that the joint solver has followed; `refitted`: what other fits of it say."""
+    def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> "Found":
+        """Return what was found in a run that the joint solver has followed; `further`: what other checks say."""
         solver = replayed.solver
         live = Calibration.of_live(solver)
         calibration = live if refined is None else Calibration.of_batch(solver, refined.batch)
-        return cls(calibration, trust(replayed, refined, refitted), None if refined is None else refined.closing)
+        return cls(calibration, trust(replayed, refined, further), None if refined is None else refined.closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""

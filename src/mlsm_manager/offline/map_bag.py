@@ -40,7 +40,7 @@ from mlsm_manager.offline.run_files import (
 )
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.report.mission import Mission
-from mlsm_manager.self_check.north_east_down import suspicions
+from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.parameters import ParameterError
@@ -85,12 +85,13 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     parameters = suited(parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
     recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
-    _warn_of_z_down(recording, scans, options)
+    signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
+    _warn_of_z_down(signs, options)
     replayed = _replayed(recording, scans, parameters)
     _tell_of_refused(replayed, options)
     refined = _refined(recording, replayed, parameters) if options.refine else None
     refitted = _refitted(replayed, refined) if options.check else []
-    found = None if replayed.solver is None else Found.of(replayed, refined, refitted)
+    found = None if replayed.solver is None else Found.of(replayed, refined, [signs.turns(), *refitted])
     known = parameters if found is None else found.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known)
@@ -134,10 +135,10 @@ def _write_report(folder: Path, mission: Mission) -> None:
     write_report(folder / REPORT, mission)
 
 
-def _warn_of_z_down(recording: Recording, scans: List[Scan], options: Namespace) -> None:
-    heights = np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])
+def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:
     advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
-    for sign in suspicions(heights, scans):
+    advice += "; if the head turns the other way, set head_turns"
+    for sign in signs.lines():
         print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
 
 

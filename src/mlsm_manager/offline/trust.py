@@ -72,10 +72,10 @@ class Trust:
         return {"checks": checks, "deviation_per_minute": told}
 
 
-def trust(replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Verdict] = ()) -> Trust:
+def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> Trust:
     """Return what the checks say of a run of the joint solver; of the refined path where there is one.
 
-    refitted: what other fits of the run say.
+    further: what other checks say.
     """
     solver = replayed.solver
     estimates = solver.estimates
@@ -95,7 +95,7 @@ def trust(replayed: Replayed, refined: Optional[Refined], refitted: Sequence[Ver
     verdicts.append(as_expected(before.names, before.values, before.deviations, found.values))
     halves = _halves(replayed.scans, solver)
     verdicts += [] if halves is None else [halves]
-    return Trust([*verdicts, *refitted], deviations)
+    return Trust([*verdicts, *further], deviations)
 
 
 def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:

@@ -28,6 +28,11 @@ from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
 from sonar_processing.ros.subscribers import subscribe_to_clouds
 
+_Z_DOWN_ADVICE = (
+    "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true); "
+    "if the head turns the other way, set head_turns"
+)
+
 
 class MlsmCore:
     """Converts messages for the localiser, and publishes what it answers."""
@@ -135,8 +140,7 @@ class MlsmCore:
         self._z_down.take_scan(scan)
         signs = self._z_down.lines()
         if signs:
-            advice = "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true)"
-            self.health.problem("scans with signs of z down", f"{'; '.join(signs)}: {advice}")
+            self.health.problem("scans with signs of z down", f"{'; '.join(signs)}: {_Z_DOWN_ADVICE}")
 
     def _mount(self, stamp_ns: int) -> None:
         """Tell the localiser where the sonar is on the vehicle, once tf knows it."""

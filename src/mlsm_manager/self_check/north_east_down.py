@@ -1,4 +1,4 @@
-"""Signs that an odometry counts x north, y east, z down instead of x, y left, z up (REP-103)."""
+"""Signs that an odometry counts z down, not x, y left, z up as in REP-103, or that a head turns the other way."""
 
 from typing import List, Optional, Sequence
 
@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry.planar import composed, inverse
 
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
@@ -18,9 +19,9 @@ _FEWEST, _MOST = 30, 1000
 _OTHER_SURFACE = 5.0
 # times: by less the two odometries do not differ, as on a straight way or where the vehicle stands.
 _CLEARLY = 1.2
-# Pairs of scans that tell the two apart, and the share of them that has to speak against the odometry.
+# Pairs of scans that tell the two apart, and the share of them that at most may speak against the odometry.
 _LEAST_PAIRS = 5
-_SHARE = 0.75
+_SHARE = 0.7
 
 
 class ZDownSigns:
@@ -51,22 +52,30 @@ class ZDownSigns:
         climb, dive = self._highest - self._start, self._start - self._lowest
         if climb > _CLIMB and climb > dive:
             found.append(f"z grows by {climb:.1f} m from the start, as a depth does")
-        share = self._against / max(self._pairs, 1)
-        if self._pairs >= _LEAST_PAIRS and share >= _SHARE:
-            found.append(f"in {100.0 * share:.0f} % of the scans the echoes fit better with y and yaw reversed")
+        turns = self.turns()
+        if turns.fires:
+            found.append(f"in {100.0 * turns.value:.0f} % of the scans the echoes fit better with y and yaw reversed")
         return found
 
+    def turns(self) -> Verdict:
+        """Return whether the echoes turn as the odometry does."""
+        return Verdict(
+            "turns of odometry and echoes",
+            self._against / self._pairs if self._pairs >= _LEAST_PAIRS else np.nan,
+            _SHARE,
+            f"share of {self._pairs} pairs of scans that fit better if the vehicle turned the other way: the odometry "
+            "counts z down, or the head turns the other way than its driver says",
+            question="When the vehicle turns, do the walls stay where they are?",
+        )
 
-def suspicions(heights: np.ndarray, scans: Sequence[Scan]) -> List[str]:
-    """Return one line for each sign of z down in a whole recording; none where nothing speaks for it.
 
-    heights: (n,) z of the sonar in odom, m, one for each beam.
-    """
+def z_down_signs(heights: np.ndarray, scans: Sequence[Scan]) -> ZDownSigns:
+    """Return the signs of a whole recording. heights: (n,) z of the sonar in odom, m, one for each beam."""
     signs = ZDownSigns(float(heights[0]))
     signs.take_heights(heights)
     for scan in scans:
         signs.take_scan(scan)
-    return signs.lines()
+    return signs
 
 
 def _fits_turned_up(earlier: Scan, later: Scan) -> Optional[bool]:

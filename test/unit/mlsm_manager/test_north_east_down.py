@@ -8,7 +8,7 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.self_check.north_east_down import ZDownSigns, suspicions
+from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from node_support.geometry.planar import inverse, transformed
 from recordings.reading.reader import Request
 from recordings.vehicle.motion import MotionNames
@@ -41,17 +41,17 @@ def _scans(count, sign=1.0, turn=TURN, step=(0.0, 0.0)):
 
 
 def test_a_yaw_that_the_echoes_follow_is_no_suspicion():
-    assert suspicions(LEVEL, _scans(8)) == []
+    assert z_down_signs(LEVEL, _scans(8)).lines() == []
 
 
 def test_a_yaw_that_turns_against_the_echoes_is_one():
-    (sign,) = suspicions(LEVEL, _scans(8, TURNED_OVER))
+    (sign,) = z_down_signs(LEVEL, _scans(8, TURNED_OVER)).lines()
     assert sign == "in 100 % of the scans the echoes fit better with y and yaw reversed"
 
 
 def test_a_vehicle_that_drives_its_turns_tells_it_as_well():
-    assert suspicions(LEVEL, _scans(8, step=(0.5, 0.3))) == []
-    assert len(suspicions(LEVEL, _scans(8, TURNED_OVER, step=(0.5, 0.3)))) == 1
+    assert z_down_signs(LEVEL, _scans(8, step=(0.5, 0.3))).lines() == []
+    assert len(z_down_signs(LEVEL, _scans(8, TURNED_OVER, step=(0.5, 0.3))).lines()) == 1
 
 
 def test_a_vehicle_that_stands_tells_nothing():
@@ -62,12 +62,12 @@ def test_a_vehicle_that_stands_tells_nothing():
 
 
 def test_a_few_turns_are_not_enough_to_say():
-    assert suspicions(LEVEL, _scans(4, TURNED_OVER)) == []
+    assert z_down_signs(LEVEL, _scans(4, TURNED_OVER)).lines() == []
 
 
 @pytest.mark.parametrize(("heights", "count"), [([0.0, 3.0, 5.0], 1), ([0.0, -3.0, -5.0], 0), ([-5.0, 0.0, -5.0], 1)])
 def test_a_vehicle_that_climbs_far_above_its_start_is_a_suspicion(heights, count):
-    assert len(suspicions(np.array(heights), [])) == count
+    assert len(z_down_signs(np.array(heights), []).lines()) == count
 
 
 @pytest.mark.parametrize(("heights", "count"), [([-5.0, 0.0], 0), ([-5.0, 1.5], 0), ([0.0, 2.5], 1), ([3.0, 4.0], 1)])
@@ -91,4 +91,10 @@ def test_a_live_vehicle_is_suspected_once_enough_turns_speak_against_it():
 def test_a_tour_of_the_basin_turned_over_is_suspected(z_is_down, count):
     recording = read_recording(BASIN, Request(motion=MotionNames(z_is_down=z_is_down)))
     scans = [scan for scan, _ in scans_of(recording, ReplayParameters().echoes())]
-    assert len(suspicions(LEVEL, scans)) == count
+    assert len(z_down_signs(LEVEL, scans).lines()) == count
+
+
+def test_a_run_whose_turns_are_reversed_is_doubted():
+    assert not z_down_signs(LEVEL, _scans(8)).turns().fires
+    assert z_down_signs(LEVEL, _scans(8, TURNED_OVER)).turns().fires
+    assert "too little" in z_down_signs(LEVEL, _scans(4, TURNED_OVER)).turns().line()
