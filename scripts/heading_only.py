@@ -28,11 +28,16 @@ def main() -> None:
 
 def reduce_bag(source: Path, target: Path, odom_frame: str, base_frame: str) -> None:
     """Write `target`; messages in other frames, such as a true position, stay as they are."""
-    with rosbag.Bag(str(source)) as read, rosbag.Bag(str(target), "w", compression="bz2") as written:
-        for topic, message, time in read.read_messages():
-            kept = reduced(message, odom_frame, base_frame)
-            if kept is not None:
-                written.write(topic, kept, time)
+    kept = []
+    with rosbag.Bag(str(source)) as read:
+        # Topics often lie in chunks of their own, and rosbag keeps one decompressed chunk.
+        for topic in read.get_type_and_topic_info().topics:
+            for _, message, time in read.read_messages(topics=[topic]):
+                kept.append((time, topic, reduced(message, odom_frame, base_frame)))
+    with rosbag.Bag(str(target), "w", compression="bz2") as written:
+        for time, topic, message in sorted(kept, key=lambda entry: entry[0]):
+            if message is not None:
+                written.write(topic, message, time)
 
 
 def reduced(message: Any, odom_frame: str, base_frame: str) -> Optional[Any]:

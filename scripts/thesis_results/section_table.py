@@ -32,6 +32,7 @@ SECTIONS: Tuple[Section, ...] = (
     Section("moves", "7.4", "Three moves with an odometry that is 30 % off", three_moves.make),
     Section("moving", "7.4", "A vehicle that never stops", moving_scan.make),
     Section("marina", "7.4", "A real marina", marina.make, marina.RECORDINGS),
+    Section("compass", "7.4", "The marina with the compass alone", marina.make_compass_alone, marina.RECORDINGS),
     Section("convergence", "beyond", "From how far off a scan finds its place", convergence.make),
     Section("sensitivity", "beyond", "The error of a fix against rays, pulse and noise", sensitivity.make),
     Section("consistency", "beyond", "Are the stated deviations true?", consistency.make),
