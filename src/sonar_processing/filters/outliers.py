@@ -94,6 +94,9 @@ def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.
     tree = cKDTree(points, balanced_tree=False)
     slack = 1e-5 * radius + 1e-6
     surely = tree.query_ball_point(points, max(radius - slack, 0.0), return_length=True) > min_neighbors
+    if surely.all():
+        # scipy 1.3 raises for a query without points.
+        return surely
     unsure = np.flatnonzero(~surely)
     possibly = tree.query_ball_point(points[unsure], radius + slack, return_length=True) > min_neighbors
     for index in unsure[possibly]:
