@@ -75,6 +75,8 @@ def run_map_bag() -> None:
 def map_bag(options: Namespace) -> Dict[str, Any]:
     """Map the bag and write the files; return what summary.json holds. Raises RecordingError and OSError."""
     start = time.monotonic()
+    for bag in options.bags:
+        bag.stat()
     recording = read_recording(options.bags[0], options.request)
     for note in recording.notes:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)

@@ -14,6 +14,12 @@ def test_a_missing_bag_is_named(tmp_path):
     assert refused("/no/such.bag", "--out", tmp_path) == "map_bag: /no/such.bag: No such file or directory"
 
 
+def test_a_missing_further_bag_is_named_before_the_first_is_mapped(tmp_path):
+    out = tmp_path / "out"
+    assert refused(BASIN, "/no/such.bag", "--out", out) == "map_bag: /no/such.bag: No such file or directory"
+    assert not out.exists()
+
+
 def test_a_missing_topic_is_answered_with_those_there_are(tmp_path):
     line = refused(BASIN, "--out", tmp_path, "--truth", "/gps")
     assert "no topic /gps" in line
@@ -53,7 +59,9 @@ def test_further_fits_need_the_first_one(tmp_path):
 
 
 def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
-    assert refused(BASIN, tmp_path / "no.bag", "--out", tmp_path).startswith(f"map_bag: {tmp_path / 'no.bag'}")
+    broken = tmp_path / "no.bag"
+    broken.write_bytes(b"no bag")
+    assert refused(BASIN, broken, "--out", tmp_path).startswith(f"map_bag: {broken}: ")
 
 
 def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
