@@ -41,7 +41,6 @@ ALONE = (
     "standing",
     "vehicle",
 )
-ROSTEST_TRIES = 1
 # Of pytest: a file's tests share what its fixtures made.
 IN_PARALLEL = ("-n", "auto", "--dist", "loadfile")
 _PRINTING = threading.Lock()
@@ -68,8 +67,7 @@ class Load(Enum):
 class Step:
     """One command and how its result is counted.
 
-    report: the JUnit file, or the folder of such files, that it leaves. tries: how often it is run at most, until it
-    passes.
+    report: the JUnit file, or the folder of such files, that it leaves.
     """
 
     name: str
@@ -77,7 +75,6 @@ class Step:
     report: Optional[Path] = None
     load: Load = Load.WHOLE
     timeout: float = STEP_TIMEOUT
-    tries: int = 1
 
     @property
     def prioritised_command(self) -> List[str]:
@@ -112,7 +109,7 @@ def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
 def _rostest(test: Path) -> Step:
     command = ["rostest", "--results-filename=result.xml", str(test)]
     load = Load.WHOLE if test.stem in ALONE else Load.SHARED
-    return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load, tries=ROSTEST_TRIES)
+    return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load)
 
 
 def oldest_versions() -> List[Step]:
@@ -126,17 +123,7 @@ def oldest_versions() -> List[Step]:
 
 
 def run_step(step: Step) -> Outcome:
-    """Run a step, print what failed and return its counts; it has failed when all of its tries have."""
-    for left in reversed(range(step.tries)):
-        outcome = _tried(step)
-        if not outcome.failed:
-            break
-        if left:
-            print(f"AGAIN  {step.name}: the first try failed, see above", flush=True)
-    return outcome
-
-
-def _tried(step: Step) -> Outcome:
+    """Run a step, print what failed and return its counts."""
     start = time.monotonic()
     environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(step.report or RESULTS)}
     try:

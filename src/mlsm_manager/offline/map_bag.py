@@ -98,11 +98,13 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known)
     run = run if found is None else replace(run, trust=found.trust)
-    write_run(options.out, " ".join(bag.name for bag in options.bags), run, recording)
+    title = " ".join(bag.name for bag in options.bags)
+    write_run(options.out, title, run, recording)
     for number, session in enumerate(sessions, start=2):
         write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, _poses(session.replayed))
     write_live(options.out / "live.yaml", known, options.odom_frame, options.base_frame)
     seconds = time.monotonic() - start
+    errors = errors_of(run, recording)
     summary = {
         **run.counts,
         "odometry": {"profile": odometry.kind.value.lower(), "reason": odometry.reason},
@@ -112,10 +114,9 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
         **({} if found is None else found.to_mapping()),
         **({"sessions": [session.to_mapping() for session in sessions]} if sessions else {}),
-        **errors_of(run, recording),
+        **errors,
     }
     write_summary(options.out, summary)
-    errors, title = errors_of(run, recording), " ".join(bag.name for bag in options.bags)
     _write_report(options.out, mission_of(title, recording, replayed, refined, run, found, errors, known.to_mapping()))
     return summary
 

@@ -23,6 +23,24 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
 
     Raises ParameterError for an unknown key or a value that is not allowed.
     """
+    parser = _parser()
+    options = parser.parse_args(arguments)
+    _check(parser, options)
+    _check_motion(parser, options)
+    values = _values(parser, options)
+    options.fixed = frozenset(values)
+    if options.odometry is not None:
+        options.odometry = OdometryKind(options.odometry.upper())
+    elif "odometry" in values:
+        options.odometry = OdometryKind(ReplayParameters.from_mapping({"odometry": values["odometry"]}).odometry)
+    options.parameters = ReplayParameters.from_mapping(values)
+    options.request = request_of(options, options.parameters.part(ReadingParameters))
+    if options.refine and options.parameters.estimator is not Estimator.JOINT:
+        raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
+    return options
+
+
+def _parser() -> CommandLine:
     parser = CommandLine("map_bag", description="Map a recording without a ROS master.")
     parser.add_argument(
         "bags", type=Path, nargs="+", metavar="bag",
@@ -56,7 +74,11 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     parser.add_argument("--parameters", type=Path, help="yaml file, such as a live.yaml; --set overrides it")
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
-    options = parser.parse_args(arguments)
+    return parser
+
+
+def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
+    """Refuse options that contradict each other, and a command without a folder to write to."""
     if options.refine and len(options.bags) > 1:
         parser.error("--refine smooths one recording, not several")
     if options.check and not options.refine:
@@ -65,23 +87,17 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         parser.error("the following arguments are required: --out")
     if options.vehicle and len(options.bags) > 1:
         parser.error("--vehicle belongs to one recording, not to several")
-    _check_motion(parser, options)
+
+
+def _values(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Dict[str, Any]:
+    """Return the parameters that were set, by their keys."""
     values = _from_file(options.parameters) if options.parameters else {}
     values.update(set_values(parser, options.set))
     if options.matcher:
         values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
-    options.fixed = frozenset(values)
-    if options.odometry is not None:
-        options.odometry = OdometryKind(options.odometry.upper())
-    elif "odometry" in values:
-        options.odometry = OdometryKind(ReplayParameters.from_mapping({"odometry": values["odometry"]}).odometry)
-    options.parameters = ReplayParameters.from_mapping(values)
-    options.request = request_of(options, options.parameters.part(ReadingParameters))
-    if options.refine and options.parameters.estimator is not Estimator.JOINT:
-        raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
-    return options
+    return values
 
 
 def _check_motion(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
