@@ -70,6 +70,7 @@ class Localiser:
         self._newest: Optional[Scan] = None
         self._newest_came = 0.0
         self._search = PlaceSearch()
+        self._resumed_at: Optional[StoredPlace] = None
         self._changes = 0
         self.use(settings)
 
@@ -198,7 +199,7 @@ class Localiser:
             self.mapper.forget_place()
             self._live.clear()
             self._search.jump()
-            self._newest = None
+            self._newest = self._resumed_at = None
         return until - time
 
     def check_time(self, time: float) -> None:
@@ -207,6 +208,10 @@ class Localiser:
         if until is not None and time < until - _JUMP_BACK:
             detail = f"by {until - time:.1f} s, since the odometry was followed without them; the machine is too slow"
             raise RefusedInput("scans too late", detail)
+
+    def bridged(self, track: Track) -> Track:
+        """Return a track that begins where the vehicle was when its place was stored; see StoredPlace.bridged."""
+        return track if self._resumed_at is None else self._resumed_at.bridged(track)
 
     def silent_since(self, time: float) -> Optional[float]:
         """Return the time [s] of the belief when it is so old at `time` that `follow` must be called, else None."""
@@ -276,6 +281,7 @@ class Localiser:
             self._newest = None
             self._search.lose()
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
+            self._resumed_at = place
             if place is not None:
                 self.mapper.start_from(place.widened, place.correction)
                 self._live.start_from(place.correction)
@@ -290,5 +296,5 @@ class Localiser:
             self.mapper.clear()
             self._live.clear()
             self._search.forget()
-            self._newest = None
+            self._newest = self._resumed_at = None
         return count
