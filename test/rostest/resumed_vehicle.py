@@ -8,17 +8,18 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import Any, Dict, List, Sequence, Set, Tuple
 
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
-from graph import PACKAGE_ROOT, Inbox, wait_for_publisher_links, wait_until
+from graph import PACKAGE_ROOT, Inbox, rows, wait_for_publisher_links, wait_until
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.surface_map.blocks import cells_of
 from mlsm_manager.surface_map.files.map_file import read_map
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import cloud_to_message
@@ -50,12 +51,12 @@ class Fate(Enum):
 
 @dataclass(frozen=True)
 class Kill:
-    """map_lost: whether the file was broken or its map not taken up. seconds_lost: of the mission, before the kill.
+    """map_kept: share of the saved cells that the node holds when it was started again. seconds_lost: of the mission.
 
     distance, deviation: m, of the fix that is farthest from the wanted place, and what it says of itself.
     """
 
-    map_lost: bool
+    map_kept: float
     seconds_lost: float
     fate: Fate
     distance: float
@@ -128,8 +129,8 @@ class ResumedVehicle:
             raise
         return node
 
-    def _started_again(self, next_scan: int) -> Tuple["subprocess.Popen[bytes]", bool, float]:
-        """Start the node before a scan; return it, whether its map was lost, and the seconds of the mission that were.
+    def _started_again(self, next_scan: int) -> Tuple["subprocess.Popen[bytes]", float, float]:
+        """Start the node before a scan; return it, the share of the map that it kept, and the seconds that were lost.
 
         Raises MapFileError for a file that is not whole.
         """
@@ -138,11 +139,13 @@ class ResumedVehicle:
         self._sent_until += random.uniform(*AWAY)
         saved_until = StoredPlace.of_arrays(stored.arrays).belief.time - self._shift
         lost = self._mission.scans[next_scan - 1].reference_time - saved_until
-        return node, self._block_count() != len(stored.shown), lost
+        saved = {tuple(cell) for cell in stored.shown.cells.tolist()}
+        return node, len(saved & self._held(stored.shown.resolution)) / len(saved), lost
 
-    def _block_count(self) -> int:
+    def _held(self, resolution: float) -> Set[Tuple[int, int]]:
+        """Return the cells that the node's map holds."""
         cloud = rospy.ServiceProxy(self._get_region, GetRegion)(Point(-1e4, -1e4, -1e4), Point(1e4, 1e4, 1e4)).cloud
-        return int(cloud.width)
+        return {tuple(cell) for cell in cells_of(rows(cloud).astype(np.float64), resolution).tolist()}
 
     @property
     def _get_region(self) -> str:
@@ -168,8 +171,8 @@ class ResumedVehicle:
     def _send_odometry(self, until: float) -> None:
         track = self._mission.odometry
         first, last = np.searchsorted(track.times, [self._sent_until, until])
-        rows = zip(track.times[first:last], track.poses[first:last])
-        self._tf.publish([self._transform("odom", "base_link", time, pose) for time, pose in rows])
+        known = zip(track.times[first:last], track.poses[first:last])
+        self._tf.publish([self._transform("odom", "base_link", time, pose) for time, pose in known])
         self._sent_until = until
 
     def _transform(self, parent: str, child: str, seconds: float, pose: np.ndarray) -> TransformStamped:

@@ -19,6 +19,7 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.running_copy import finished
 from node_support.errors import RefusedInput
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
@@ -96,8 +97,7 @@ class Localiser:
     @property
     def blocks(self) -> Blocks:
         """The map that is shown and saved, as it is now."""
-        with self._lock:
-            return self.mapper.blocks
+        return self._copied(Layer.SHOWN)
 
     @property
     def block_count(self) -> int:
@@ -117,8 +117,12 @@ class Localiser:
     @property
     def free(self) -> Blocks:
         """What is known to be free."""
+        return self._copied(Layer.FREE)
+
+    def _copied(self, layer: Layer) -> Blocks:
         with self._lock:
-            return self.mapper.layers[Layer.FREE]
+            copy = self.mapper.begin_copy(layer)
+        return finished(copy, self._lock)
 
     @property
     def changes(self) -> int:
@@ -261,10 +265,11 @@ class Localiser:
         Keyframes are only stored with the name of a run of the graph, in which a node can go on with them.
         """
         with self._lock:
-            belief, layers = self.mapper.belief, dict(self.mapper.layers)
+            belief, copies = self.mapper.belief, {layer: self.mapper.begin_copy(layer) for layer in Layer}
             keyframes = self.mapper.keyframes if run else {}
             correction = self.mapper.correction.copy()
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
+        layers = {layer: finished(copy, self._lock) for layer, copy in copies.items()}
         return StoredMap(frame, layers, calibration, made, arrays, run)
 
     def restore(self, stored: StoredMap, same_odometry: bool) -> str:
