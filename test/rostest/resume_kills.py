@@ -70,7 +70,7 @@ def tell(kills: List[Kill]) -> None:
     lost = [kill.seconds_lost for kill in kills]
     print(f"{len(kills)} kills: {fates}")
     print(f"share of the saved map that is there after a kill: least {min(kill.map_kept for kill in kills):.3f}")
-    print(f"lost at the kill, s of the mission: median {np.median(lost):.1f}, most {max(lost):.1f}")
+    print(f"from the first fix that was not saved to the kill, s: median {np.median(lost):.2f}, most {max(lost):.2f}")
     farthest = [round(kill.distance, 2) for kill in kills], [round(kill.deviation, 2) for kill in kills]
     print(f"farthest fix after each, m: {farthest[0]}\nwhat it says of itself, m: {farthest[1]}", flush=True)
 

@@ -34,6 +34,8 @@ AHEAD = 1.5
 """s of odometry after a scan's end that are sent before the scan, more than the localiser waits for."""
 AWAY = (2.0, 10.0)
 """s of the mission that pass while a node starts again, at least and at most."""
+ROUNDING = 1e-3
+"""s, more than is lost of a time since 1970."""
 EXPECTED_SCANS = 3
 """So many scans are only searched near the place where the vehicle is expected."""
 DEVIATIONS = 3.0
@@ -51,7 +53,8 @@ class Fate(Enum):
 
 @dataclass(frozen=True)
 class Kill:
-    """map_kept: share of the saved cells that the node holds when it was started again. seconds_lost: of the mission.
+    """map_kept: share of the saved cells that the node holds when it was started again.
+    seconds_lost: of wall time, from the first fix that was not saved to the kill; 0 where all were saved.
 
     distance, deviation: m, of the fix that is farthest from the wanted place, and what it says of itself.
     """
@@ -94,6 +97,7 @@ class ResumedVehicle:
         self._static.publish([self._transform("base_link", "sonar", 0.0, np.append(mission.sonar_in_base, 0.0))])
         self._fixes = Inbox(f"{namespace}/MLSM/odometry", Odometry)
         self._sent_until = mission.scans[0].start - 1.0
+        self._fixed_at: Dict[float, float] = {}
 
     def die_often(self, kills: int) -> List[Kill]:
         """Go through the mission in `kills` + 1 parts, and die between them; return what became of each kill."""
@@ -105,7 +109,7 @@ class ResumedVehicle:
             for part in others:
                 threading.Event().wait(random.uniform(0.0, 2.0 * PERIOD))
                 self._end(node)
-                node, *losses = self._started_again(part[0])
+                node, *losses = self._started_again(time.monotonic())
                 self._go(part)
                 found.append(Kill(*losses, *self._fate(part)))
         finally:
@@ -129,8 +133,8 @@ class ResumedVehicle:
             raise
         return node
 
-    def _started_again(self, next_scan: int) -> Tuple["subprocess.Popen[bytes]", float, float]:
-        """Start the node before a scan; return it, the share of the map that it kept, and the seconds that were lost.
+    def _started_again(self, killed: float) -> Tuple["subprocess.Popen[bytes]", float, float]:
+        """Start the node; return it, the share of the map that it kept, and the seconds that were lost.
 
         Raises MapFileError for a file that is not whole.
         """
@@ -138,9 +142,11 @@ class ResumedVehicle:
         node = self._started()
         self._sent_until += random.uniform(*AWAY)
         saved_until = StoredPlace.of_arrays(stored.arrays).belief.time - self._shift
-        lost = self._mission.scans[next_scan - 1].reference_time - saved_until
+        unsaved = [came for end, came in self._fixed_at.items() if end > saved_until + ROUNDING]
+        self._fixed_at.clear()
         saved = {tuple(cell) for cell in stored.shown.cells.tolist()}
-        return node, len(saved & self._held(stored.shown.resolution)) / len(saved), lost
+        kept = len(saved & self._held(stored.shown.resolution)) / len(saved)
+        return node, kept, killed - min(unsaved, default=killed)
 
     def _held(self, resolution: float) -> Set[Tuple[int, int]]:
         """Return the cells that the node's map holds."""
@@ -157,7 +163,8 @@ class ResumedVehicle:
             if scan.reference_time + AHEAD > self._sent_until:
                 self._send_odometry(scan.reference_time + AHEAD)
                 self._echoes.publish(cloud_to_message(self._cloud(scan)))
-                wait_until(partial(self._is_fixed, scan), LATEST_FIX, required=False)
+                if wait_until(partial(self._is_fixed, scan), LATEST_FIX, required=False):
+                    self._fixed_at[scan.reference_time] = time.monotonic()
 
     def _is_fixed(self, scan: Scan) -> bool:
         return scan.reference_time in self._fixed()
