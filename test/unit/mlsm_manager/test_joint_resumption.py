@@ -79,6 +79,17 @@ def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed, whole):
     np.testing.assert_allclose(np.sort(halves.blocks.mean, axis=0), np.sort(whole.blocks.mean, axis=0), atol=1e-4)
 
 
+def test_what_was_stored_stays_as_it_is_while_scans_are_taken(killed):
+    """A file is written from it while the node goes on."""
+    _, saved = killed
+    localiser = resumed(saved)
+    for scan in HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]:
+        stored = localiser.stored("map", {}, 0.0, "run")
+        before = map_bytes(stored)
+        localiser.take_scan(scan)
+        assert map_bytes(stored) == before
+
+
 def test_the_newest_scans_of_a_resumed_run_may_still_move(killed):
     _, stored = killed
     localiser = resumed(stored)
