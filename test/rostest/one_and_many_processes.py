@@ -8,7 +8,7 @@ from typing import Any, Dict
 import numpy as np
 import rospy
 import rostest
-from graph import TEST_DATA, Inbox, play, rows, wait_for_subscribers
+from graph import TEST_DATA, Inbox, play, rows, wait_for_links, wait_for_subscribers
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
@@ -20,6 +20,8 @@ ECHO_SPREAD, NOISE_SPREAD = 0.15, 4.0
 CELL = 0.5
 # Turns of the head in the bag, which ends in the middle of one.
 SCANS = 10
+# Of the beams: sonar_to_cloud of both layouts, and in one of them a node for images.
+LISTENERS = 3
 
 
 class OneAndManyProcesses(unittest.TestCase):
@@ -32,17 +34,20 @@ class OneAndManyProcesses(unittest.TestCase):
         maps = {name: Inbox(f"/{name}/MLSM/cloud", PointCloud2) for name in layouts}
         scans = {name: Inbox(f"/{name}/sonar/scan/cleaned", StampedIntensityCloud) for name in layouts}
         beside = {name: _beside(name) for name in layouts}
-        wait_for_subscribers("/many/sonar/scan/cleaned", 2)
-        wait_for_subscribers("/many/sonar/scan/thresholded", 1)
-        wait_for_subscribers("/many/sonar/scan/sonarCloud", 1)
-        wait_for_subscribers("/one/sonar/scan/cleaned", 1)
-        wait_for_subscribers("/many/sonar/scan/polar", 1)
-        wait_for_subscribers("/sonar/raw", 3)
+        for inbox in (
+            *maps.values(),
+            *scans.values(),
+            *(one for inboxes in beside.values() for one in inboxes.values()),
+        ):
+            inbox.wait_for_link()
+        wait_for_links("/many/sonar/scan/cleaned", 2)
+        for topic in ("thresholded", "sonarCloud", "polar"):
+            wait_for_links(f"/many/sonar/scan/{topic}")
+        wait_for_subscribers("/sonar/raw", LISTENERS)
         play(TEST_DATA / "basin.bag", rate=15)
         cls.blocks, cls.beside = {}, {}
         for name in layouts:
-            last = scans[name].wait_for(lambda _, inbox=scans[name]: len(inbox.messages) >= SCANS)
-            stamp = last.header.stamp
+            stamp = scans[name].wait_for_number(SCANS)[-1].header.stamp
             cls.blocks[name] = rows(maps[name].wait_for(lambda cloud, stamp=stamp: cloud.header.stamp == stamp))
             cls.beside[name] = {what: newest(beside[name][what]) for what in beside[name]}
 
@@ -112,7 +117,7 @@ def _beside(layout: str) -> Dict[str, Inbox]:
 
 def newest(inbox: Inbox) -> Any:
     """Return what came after the last turn (images come more often)."""
-    return inbox.wait_for(lambda _: len(inbox.messages) >= SCANS)
+    return inbox.wait_for_number(SCANS)[-1]
 
 
 def walls() -> list:
