@@ -182,7 +182,9 @@ def play(bag: Path, rate: float, longest: float = 300.0) -> None:
 
     Playback starts when every listener is connected to every topic.
     """
-    command = ["rosbag", "play", "--quiet", "--clock", "--pause", f"--rate={rate}", str(bag), "__name:=player"]
+    # Of a burst after a stop of this process, the player would drop what exceeds its queue.
+    options = ["--quiet", "--clock", "--pause", "--queue=100000", f"--rate={rate}"]
+    command = ["rosbag", "play", *options, str(bag), "__name:=player"]
     player = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
     try:
         rospy.wait_for_service("/player/pause_playback", timeout=PATIENCE)
