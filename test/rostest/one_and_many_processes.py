@@ -101,7 +101,7 @@ def _made(processes: str) -> Dict[str, Any]:
     """Return what a layout publishes by the end of the last turn: the newest message of each topic."""
     inboxes = {name: Inbox(topic, kind) for name, (topic, kind) in TOPICS.items()}
     maps = Inbox("/MLSM/cloud", PointCloud2)
-    with launched("mapping.launch", f"processes:={processes}"):
+    with launched("mapping.launch", f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml"):
         for inbox in (maps, *inboxes.values()):
             inbox.wait_for_link()
         for topic in INNER_TOPICS[processes]:
