@@ -3,6 +3,8 @@
 
 import sys
 import unittest
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any, Dict, List
 
 import numpy as np
@@ -42,7 +44,8 @@ class OneAndManyProcesses(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         """Keep the maps and what is made beside them."""
-        made = {processes: _made(processes) for processes in LISTENERS}
+        with TemporaryDirectory() as maps:
+            made = {processes: _made(processes, Path(maps) / processes) for processes in LISTENERS}
         cls.blocks = {processes: rows(messages["map"]) for processes, messages in made.items()}
         cls.beside = made
 
@@ -113,11 +116,15 @@ def _steps(clouds: Inbox, maps: Inbox) -> List[Step]:
         return [Step(time, wait) for time in np.arange(bag.get_start_time(), bag.get_end_time(), SECONDS)]
 
 
-def _made(processes: str) -> Dict[str, Any]:
-    """Return what a layout publishes by the end of the last turn: the newest message of each topic."""
+def _made(processes: str, folder: Path) -> Dict[str, Any]:
+    """Return what a layout publishes by the end of the last turn: the newest message of each topic.
+
+    It saves its map in `folder`, in which a node that is started again would go on in its map.
+    """
     inboxes = {name: Inbox(topic, kind) for name, (topic, kind) in TOPICS.items()}
     maps = Inbox("/MLSM/cloud", PointCloud2)
-    with launched("mapping.launch", f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml"):
+    arguments = (f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml", f"map_directory:={folder}")
+    with launched("mapping.launch", *arguments):
         for inbox in (maps, *inboxes.values()):
             inbox.wait_for_link()
         for topic in INNER_TOPICS[processes]:
