@@ -57,8 +57,7 @@ class JointParameters(OdometryChoice):
     )
     solver_kernel: SolverKernel = parameter(
         SolverKernel.NUMPY,
-        "what compares echoes with surfaces: NUMBA takes a fifth of the time and needs python3-numba; AUTO: NUMBA where "
-        "it is installed",
+        "what compares echoes with surfaces: NUMBA is faster and needs python3-numba; AUTO: NUMBA if installed",
         tunable=False,
     )
 

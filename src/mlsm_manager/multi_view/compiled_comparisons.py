@@ -3,7 +3,7 @@
 Their time is short enough to look for all neighbours anew each time, where numpy has to keep lists of them.
 """
 
-from typing import Optional, Tuple
+from typing import Tuple
 
 import numpy as np
 
@@ -40,7 +40,10 @@ class CompiledNeighbours:
 def summed_compiled(
     pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, matching: SurfaceMatching, cut: float
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Return what the comparisons of each pair of scans say; see Summation. Those of one scan must follow each other."""
+    """Return what the comparisons of each pair of scans say; see Summation.
+
+    Those whose sources are of one scan must follow each other.
+    """
     packed = _packed(sources)
     return summed_comparisons(
         pairs.rows, pairs.neighbours, pairs.importance,

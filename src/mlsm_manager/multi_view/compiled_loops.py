@@ -19,14 +19,13 @@ PAIR_COLUMNS = 14
 CANDIDATES = 6
 """Nearest points that may share a comparison."""
 _MOST_CELLS = 512  # on each side of the grid of cells: bounds its memory, however far apart points lie
+_SLACK = 1.0 + 1e-9  # of a squared distance: so far may it be rounded
 _FIRST_CAPACITY = 1024
 
 
 @njit(cache=True)
-def _kept(near, index, held, distance, target, tie):
+def _kept(near, index, held, distance, target):
     """Put a target among the nearest ones of a block, of which `held` are known; return how many are known then."""
-    if held > 0 and distance > near[0] + tie:
-        return held
     place = held
     if held == CANDIDATES:
         if distance >= near[CANDIDATES - 1]:
@@ -82,8 +81,10 @@ def _write_slopes(source, target, slopes):
 
 @njit("Tuple((i8[::1], i8[::1], f8[::1], f8))(f8[:,::1], f8)", cache=True)
 def sorted_into_cells(places, reach):
-    """Return the order (n,) of places (n, 2), n > 0, by square cells; where each cell begins in it (rows * columns + 1,);
-    low x, low y, rows and columns of the grid (4,); and the side of a cell, at least `reach`.
+    """Return the order (n,) of places (n, 2), n > 0, by square cells, where each cell begins in it, low x, low y, rows
+    and columns of the grid (4,), and the side of a cell [m], at least `reach`.
+
+    Cells follow each other along x; the array of their beginnings has one more entry, the end of the last one.
     """
     low_x, low_y, high_x, high_y = places[0, 0], places[0, 1], places[0, 0], places[0, 1]
     for point in range(len(places)):
@@ -117,7 +118,14 @@ def shared_neighbours(sources, source_scans, targets, target_scans, target_block
     reach = cut + tie
     order, starts, grid, side = sorted_into_cells(targets, reach)
     low_x, low_y, cell_rows, cell_columns = grid[0], grid[1], int(grid[2]), int(grid[3])
+    target_x, target_y, scan_of, block_of = (
+        targets[order, 0],
+        targets[order, 1],
+        target_scans[order],
+        target_blocks[order],
+    )
     near, index = np.empty((blocks, CANDIDATES)), np.empty((blocks, CANDIDATES), np.int64)
+    farthest = np.full(blocks, reach * reach)
     held, touched = np.zeros(blocks, np.int64), np.empty(blocks, np.int64)
     rows, neighbours = np.empty(_FIRST_CAPACITY, np.int64), np.empty(_FIRST_CAPACITY, np.int64)
     distances, shares = np.empty(_FIRST_CAPACITY), np.empty(_FIRST_CAPACITY)
@@ -134,27 +142,30 @@ def shared_neighbours(sources, source_scans, targets, target_scans, target_block
         for line in range(max(row - 1, 0), min(row + 1, cell_rows - 1) + 1):
             if first_column > last_column:
                 break
-            for place in range(starts[line * cell_columns + first_column], starts[line * cell_columns + last_column + 1]):
-                target = order[place]
-                across, along = targets[target, 0] - x, targets[target, 1] - y
-                distance = np.sqrt(across * across + along * along)
-                if distance >= reach or target_scans[target] == scan:
+            for place in range(
+                starts[line * cell_columns + first_column], starts[line * cell_columns + last_column + 1]
+            ):
+                across, along = target_x[place] - x, target_y[place] - y
+                square, block = across * across + along * along, block_of[place]
+                if square >= farthest[block] or scan_of[place] == scan:
                     continue
-                block = target_blocks[target]
                 if held[block] == 0:
                     touched[found] = block
                     found += 1
-                held[block] = _kept(near[block], index[block], held[block], distance, target, tie)
+                held[block] = _kept(near[block], index[block], held[block], np.sqrt(square), order[place])
+                farthest[block] = min(farthest[block], _SLACK * (near[block, 0] + tie) ** 2)
         for number in range(found):
             block = touched[number]
             if near[block, 0] < cut:
                 if made + CANDIDATES > len(rows):
                     rows, neighbours = _doubled(rows), _doubled(neighbours)
                     distances, shares = _doubled(distances), _doubled(shares)
-                end = made + _write_shares(near[block], index[block], held[block], tie, neighbours[made:], distances[made:], shares[made:])
+                end = made + _write_shares(
+                    near[block], index[block], held[block], tie, neighbours[made:], distances[made:], shares[made:]
+                )
                 rows[made:end] = source
                 made = end
-            held[block] = 0
+            held[block], farthest[block] = 0, reach * reach
     return rows[:made].copy(), neighbours[:made].copy(), distances[:made].copy(), shares[:made].copy()
 
 

@@ -4,7 +4,7 @@ from enum import Enum
 
 
 class SolverKernel(Enum):
-    """AUTO: NUMBA where numba can be imported, else NUMPY."""
+    """AUTO: NUMBA where numba is installed and can keep on disk what it compiles, else NUMPY."""
 
     AUTO = "AUTO"
     NUMPY = "NUMPY"
@@ -17,6 +17,7 @@ class SolverKernel(Enum):
             return self
         try:
             import mlsm_manager.multi_view.compiled_loops  # noqa: F401
-        except ImportError:
+        except (ImportError, RuntimeError):
+            # numba raises a RuntimeError where it finds no folder that it may write to.
             return SolverKernel.NUMPY
         return SolverKernel.NUMBA
