@@ -26,7 +26,7 @@ def walls():
 def circling(times):
     """Return poses (n, 3) on circles of 4 m around a point that goes along the harbour: bent between any two scans."""
     angles = times / 6.0
-    return np.column_stack([4.0 * np.cos(angles) - 15.0 + times / 8.0, 4.0 * np.sin(angles), angles + np.pi / 2.0])
+    return np.column_stack([4.0 * np.cos(angles) - 15.0 + times / 16.0, 4.0 * np.sin(angles), angles + np.pi / 2.0])
 
 
 @pytest.fixture(scope="module")
