@@ -16,7 +16,8 @@ from oldest.environment import HOW_TO_GET_ONE, find_python38
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "build/test_results"
-STEP_TIMEOUT = 400.0
+# Longer than any test waits for an event that does not come.
+STEP_TIMEOUT = 600.0
 # Downloads 100 MB, or computes with what the others leave.
 SPARE_TIMEOUT = 1200.0
 # Rostests mostly wait; each has a master of its own. With more at once, two cores no longer answer in time.

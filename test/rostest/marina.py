@@ -48,11 +48,13 @@ class Marina(unittest.TestCase):
             wait_for_subscribers("/sonar/raw", 1)
             play(minutes, RATE)
         diagnostics.wait_for("mlsm_core", "scans in", len(cls.replayed.updates))
-        wait_until(lambda: len(fixes.messages) >= cls.replayed.matched, timeout=5.0, required=False)
+        wait_until(lambda: len(fixes.messages) >= cls.replayed.matched, required=False)
         cls.fixes = [(stamp(fix), planar(fix.pose.pose.position, fix.pose.pose.orientation)) for fix in fixes.messages]
+        last = cls.replayed.updates[-1].scan.reference_time
+        wait_until(lambda: corrections(transforms)[0][-1] >= last)
         cls.corrections = corrections(transforms)
         whole_map = cls.replayed.mapper.block_count
-        wait_until(lambda: maps.messages[-1:] and maps.messages[-1].width >= whole_map, timeout=5.0, required=False)
+        wait_until(lambda: maps.messages[-1:] and maps.messages[-1].width >= whole_map, required=False)
         cls.map = rows(maps.messages[-1])
 
     def test_the_scans_that_map_bag_matches_are_matched(self) -> None:

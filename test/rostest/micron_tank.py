@@ -32,9 +32,9 @@ class MicronTank(unittest.TestCase):
         maps = Inbox("/MLSM/cloud", PointCloud2)
         scans = Inbox("/sonar/scan/cleaned/cloud", PointCloud2)
         wait_for_subscribers("/sonar/raw", 1)
-        wait_for_subscribers("/sonar/scan/cleaned/cloud", 1)
+        scans.wait_for_link()
         play(bag, rate=4)
-        last = scans.wait_for(lambda _: len(scans.messages) >= 2)
+        last = scans.wait_for_number(2)[-1]
         cls.blocks = rows(maps.wait_for(lambda cloud: cloud.header.stamp == last.header.stamp))
 
     def test_four_walls_stand_as_straight_lines(self) -> None:

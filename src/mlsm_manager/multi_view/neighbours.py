@@ -38,11 +38,7 @@ class NeighbourLists:
         self._cut = -np.inf
 
     def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
-        """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
-
-        The shares of what one source meets in one block add up to 1. Sources and targets are those of the beginning,
-        perhaps moved.
-        """
+        """See association.Neighbours."""
         if not len(sources) or not len(targets):
             nothing = np.empty(0, dtype=np.int64)
             return nothing, nothing, np.empty(0), np.empty(0)
