@@ -68,5 +68,15 @@ class IntensityCloud:
         if self.is_organized:
             points = np.where(keep[:, np.newaxis], self.points, np.float32(np.nan))
             return replace(self, points=points)
-        kept = np.flatnonzero(keep)
-        return replace(self, points=self.points.take(kept, axis=0), time_stamps=self.time_stamps.take(kept))
+        return self._taken(np.flatnonzero(keep))
+
+    def take(self, places: np.ndarray) -> "IntensityCloud":
+        """Return the cloud with the points of these numbers (m,), ascending, as `select` does."""
+        if not self.is_organized:
+            return self._taken(places)
+        keep = np.zeros(len(self), dtype=bool)
+        keep[places] = True
+        return self.select(keep)
+
+    def _taken(self, places: np.ndarray) -> "IntensityCloud":
+        return replace(self, points=self.points.take(places, axis=0), time_stamps=self.time_stamps.take(places))
