@@ -6,7 +6,7 @@ from typing import Callable, NamedTuple
 import numpy as np
 
 from node_support.kernels import Kernel
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import IntensityCloud, are_finite
 from sonar_processing.filters.otsu import HIGHEST_LEVEL, level_histogram, threshold_of_levels
 
 
@@ -15,25 +15,20 @@ class StrengthCounts:
     """The finite points of a cloud by strength.
 
     levels: (256,) int64, how many of the strengths above 0 lie in each integer level, those above 255 in the last.
-    silent: number of the other points. lowest, highest: of all strengths. weakest: of those above 0. They are infinite
-    where there is no such point.
+    silent: number of the other points. lowest, highest: of all strengths, infinite without a point. echoes_differ:
+    whether there are different strengths above 0.
     """
 
     levels: np.ndarray
     silent: int
     lowest: float
     highest: float
-    weakest: float
+    echoes_differ: bool
 
     @property
     def is_empty(self) -> bool:
         """Whether the cloud has no finite point."""
         return self.lowest > self.highest
-
-    @property
-    def echoes_differ(self) -> bool:
-        """Whether there are different strengths above 0."""
-        return self.weakest < self.highest
 
     @property
     def all_levels(self) -> np.ndarray:
@@ -73,22 +68,22 @@ def count_strengths(cloud: IntensityCloud) -> StrengthCounts:
 
 def counts_of(strengths: np.ndarray) -> StrengthCounts:
     """Count finite strengths (n,)."""
-    # By index, because a mask with many changes takes four times as long.
-    echoes = strengths.take(np.flatnonzero(strengths > 0))
-    return StrengthCounts(
-        level_histogram(echoes) if echoes.size else np.zeros(HIGHEST_LEVEL + 1, np.int64),
-        strengths.size - echoes.size,
-        float(strengths.min(initial=np.inf)),
-        float(strengths.max(initial=-np.inf)),
-        float(echoes.min(initial=np.inf)),
-    )
+    if not strengths.size:
+        return StrengthCounts(np.zeros(HIGHEST_LEVEL + 1, np.int64), 0, np.inf, -np.inf, False)
+    levels, highest = level_histogram(strengths), strengths.max()
+    # To count takes a tenth of the time of picking the echoes out.
+    echoes = int(np.count_nonzero(strengths > 0))
+    silent = strengths.size - echoes
+    levels[0] -= silent
+    echoes_differ = echoes > 0 and int(np.count_nonzero(strengths == highest)) < echoes
+    return StrengthCounts(levels, silent, float(strengths.min()), float(highest), echoes_differ)
 
 
 def strong_points(cloud: IntensityCloud, threshold: float) -> np.ndarray:
     """Return the numbers (m,) of the finite points above a threshold."""
     with np.errstate(invalid="ignore"):
         above = np.flatnonzero(np.ascontiguousarray(cloud.points[:, 3]) > np.float32(threshold))
-    finite = np.isfinite(cloud.points.take(above, axis=0)).all(axis=1) & np.isfinite(cloud.time_stamps.take(above))
+    finite = are_finite(cloud.points.take(above, axis=0), cloud.time_stamps.take(above))
     return above if finite.all() else above[finite]
 
 
@@ -96,7 +91,8 @@ def _count_compiled(cloud: IntensityCloud) -> StrengthCounts:
     from sonar_processing.filters.compiled_strengths import count_strengths
 
     counts, ends = count_strengths(np.ascontiguousarray(cloud.points), np.ascontiguousarray(cloud.time_stamps))
-    return StrengthCounts(counts[:-1], int(counts[-1]), *ends.tolist())
+    lowest, highest, weakest = ends.tolist()
+    return StrengthCounts(counts[:-1], int(counts[-1]), lowest, highest, weakest < highest)
 
 
 def _strong_compiled(cloud: IntensityCloud, threshold: float) -> np.ndarray:

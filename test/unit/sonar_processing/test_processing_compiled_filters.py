@@ -35,7 +35,8 @@ def _scan(points):
     rng = np.random.RandomState(3)
     angles = 2.0 * np.pi * rng.randint(0, 120, points) / 120
     ranges = np.where(rng.uniform(size=points) < 0.6, rng.normal(20.0, 0.5, points), rng.uniform(1.0, 50.0, points))
-    return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles), rng.normal(-2, 0.05, points)]).astype("f4")
+    heights = rng.normal(-2.0, 0.05, points)
+    return np.column_stack([ranges * np.cos(angles), ranges * np.sin(angles), heights]).astype(np.float32)
 
 
 @given(STRENGTHS, st.sampled_from(list(ThresholdMode)), st.booleans(), st.sampled_from([1, 2]))
@@ -55,7 +56,7 @@ def test_a_point_that_is_not_finite_in_any_value_counts_nowhere(column, broken):
     values = [*cloud.points.T, cloud.time_stamps]
     values[column][2] = broken
     counts = [strength_loops(kernel).count(cloud) for kernel in Kernel]
-    assert [count.highest for count in counts] == ([95.0, 95.0])
+    assert [count.highest for count in counts] == [95.0, 95.0]
     assert [strength_loops(kernel).strong(cloud, 50.0).tolist() for kernel in Kernel] == [[3, 4], [3, 4]]
 
 

@@ -60,7 +60,8 @@ def test_the_floor_does_not_lower_a_threshold(mode):
 def test_what_is_kept_lies_above_the_threshold_and_what_goes_does_not(strengths, mode, floor, nonzero):
     thresholder = Thresholder(ThresholderParameters(mode=mode, min_threshold=floor, otsu_nonzero=nonzero))
     cloud = cloud_of(strengths)
-    above = cloud.points[:, 3] > thresholder.threshold(counts_of(cloud.points[:, 3])) if strengths else np.empty(0, dtype=bool)
+    threshold = thresholder.threshold(counts_of(cloud.points[:, 3])) if strengths else 0.0
+    above = cloud.points[:, 3] > threshold
     np.testing.assert_array_equal(thresholder(cloud).points, cloud.points[above])
 
 
