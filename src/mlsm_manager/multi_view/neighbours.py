@@ -14,6 +14,15 @@ _CANDIDATES = 6  # kept of each point and block: more than there usually are wit
 _MARGIN = 1.0  # m beyond the cut that is looked up too: so far may points move before all is looked up anew
 
 
+def shares_of(distance: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+    """Return which shares (k, n) of the comparison of a point its k candidates at `distance` (k, n) [m] have.
+
+    nearest: (n,) the least distance of each point. The shares add up to 1.
+    """
+    share = np.maximum(1.0 - (distance - nearest) / TIE, 0.0)
+    return share / share.sum(axis=0)
+
+
 class NeighbourLists:
     """For each point and each block of scans, the nearest points of other scans, found anew where they may be wrong.
 
@@ -51,8 +60,7 @@ class NeighbourLists:
         """Share each comparison among the candidates that are hardly farther than the nearest."""
         entries = np.flatnonzero(nearest < cut)
         distance = distance[:, entries]
-        share = np.maximum(1.0 - (distance - nearest[entries]) / TIE, 0.0)
-        share /= share.sum(axis=0)
+        share = shares_of(distance, nearest[entries])
         rank, entry = np.nonzero(share)
         listed = entries[entry]
         return self._rows[listed], self._candidates[rank, listed], distance[rank, entry], share[rank, entry]
