@@ -65,9 +65,8 @@ def _moments(
         share = (stamps[start] - stamps[0]) / span
         now = tides[int(share * _TIDES)]
         if parameters.ships:
-            now = with_ship(
-                now, *_passing(share * parameters.ships, span / parameters.ships, path.at(stamps[start:end]))
-            )
+            place = path.at(stamps[start : start + 1])[0, :2]
+            now = with_ship(now, *_passing(share * parameters.ships, span / parameters.ships, place))
         yield slice(start, end), now
 
 
