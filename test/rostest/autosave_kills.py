@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """A node that is killed with -9 at any moment goes on in its map when it is started again."""
 
+import os
 import random
 import shutil
 import signal
@@ -63,8 +64,17 @@ class KilledNode:
             self._assert_files_are_whole()
         return saved
 
-    def _started(self) -> "subprocess.Popen[bytes]":
-        command = [str(PACKAGE_ROOT / "nodes/mlsm_core"), f"__ns:={self._namespace}"]
+    def held_when_another_starts_it(self) -> Set[int]:
+        """Start the node from a shell, as another run of roslaunch would, and return the blocks that it holds."""
+        node = self._started("sh", "-c", '"$@"; exit $?', "sh")
+        try:
+            return self._held()
+        finally:
+            os.killpg(node.pid, signal.SIGKILL)
+            node.wait()
+
+    def _started(self, *starter: str) -> "subprocess.Popen[bytes]":
+        command = [*starter, str(PACKAGE_ROOT / "nodes/mlsm_core"), f"__ns:={self._namespace}"]
         node = subprocess.Popen(command, start_new_session=True)
         try:
             wait_until(self._answers)
@@ -134,6 +144,15 @@ class AutosaveKills(unittest.TestCase):
         with ThreadPoolExecutor(NODES) as pool:
             saved = list(pool.map(lambda node: node.die_often(rospy.get_param("~kills") // NODES), nodes))
         self.assertTrue(all(saved), saved)
+
+    def test_a_node_that_another_process_starts_begins_a_new_map(self) -> None:
+        """Under the same master; the saved map is kept under another name."""
+        folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, str(folder))
+        node = self._node(folder / "0", "/vehicle_of_two")
+        self.assertTrue(node.die_often(1))
+        self.assertEqual(node.held_when_another_starts_it(), set())
+        self.assertEqual(len(list(node.folder.glob("*.autosave.previous.mlsm"))), 1)
 
     def _node(self, folder: Path, namespace: str) -> KilledNode:
         folder.mkdir()

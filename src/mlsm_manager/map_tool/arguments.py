@@ -32,8 +32,12 @@ def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     crop = commands.add_parser("crop", help="keep what lies in a box")
     _add_map(crop)
     crop.add_argument("out", type=Path, metavar="OUT")
-    crop.add_argument("--low", type=float, nargs="+", required=True, metavar="X Y [Z]", help="its lower corner [m]")
-    crop.add_argument("--high", type=float, nargs="+", required=True, metavar="X Y [Z]", help="its upper corner [m]")
+    crop.add_argument(
+        "--low", type=float, nargs="+", required=True, metavar=("X", "Y"), help="its lower corner, X Y or X Y Z [m]"
+    )
+    crop.add_argument(
+        "--high", type=float, nargs="+", required=True, metavar=("X", "Y"), help="its upper corner, X Y or X Y Z [m]"
+    )
     merge = commands.add_parser("merge", help="make one map of two")
     _add_two_maps(merge)
     merge.add_argument("out", type=Path, metavar="OUT")

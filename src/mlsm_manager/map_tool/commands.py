@@ -1,5 +1,6 @@
 """What the commands of map_tool do."""
 
+import os
 import sys
 import time
 from argparse import Namespace
@@ -31,7 +32,16 @@ def run_map_tool() -> None:
         sys.exit(f"map_tool: {error}")
     except KeyboardInterrupt:
         sys.exit("map_tool: interrupted")
-    print("\n".join(lines))
+    _tell(lines)
+
+
+def _tell(lines: List[str]) -> None:
+    """Print lines to whoever reads them to the end or, as `head` does, does not."""
+    try:
+        print("\n".join(lines), flush=True)
+    except BrokenPipeError:
+        # Python flushes again at its end, and would complain then.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 def read_any(path: Path) -> StoredMap:

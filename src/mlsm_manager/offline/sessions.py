@@ -21,6 +21,8 @@ from sonar_processing.beams.beam_correction import BeamCorrection
 
 # A cluster in the same network answers within a second, a busy one within a few.
 CLUSTER_TIMEOUT = 10.0
+_SHOWN_AFTER = 3.0
+"""s after the end of a scan at which its correction is shown: it waits for odometry and is blended in."""
 Prepared = Tuple[Recording, List[Scan]]
 Reader = Callable[[Path], Recording]
 """Reads a recording; a function at the top of a module or a partial of one, so that other processes can call it."""
@@ -44,9 +46,9 @@ class Session:
         }
 
     def way(self, color: str) -> Way:
-        """Return the way of the vehicle from the first scan on that was found in the map; empty where none was."""
+        """Return the way of the vehicle since the first scan was found in the map; empty where none was."""
         found, replayed = self.scans_until_found, self.replayed
-        start = np.inf if found is None else replayed.updates[found].scan.reference_time
+        start = np.inf if found is None else replayed.updates[found].scan.reference_time + _SHOWN_AFTER
         known = replayed.times >= start
         return Way(f"{CORRECTED}, {self.bag.name}", color, replayed.times[known], replayed.corrected[known])
 

@@ -1,5 +1,6 @@
-"""Saves the map steadily, and goes on in it when the node is started again within the same run of the graph."""
+"""Saves the map steadily, and goes on in it when the node is started again within the same run of roslaunch."""
 
+import os
 from pathlib import Path
 
 import rospy
@@ -17,13 +18,13 @@ class Autosave:
     """One file for each node in map_directory, and the last one of the run before under another name."""
 
     def __init__(self, namespace: str, localiser: Localiser, parameters: MlsmCoreParameters, health: Health) -> None:
-        """Load what a node of this name saved in this run of the graph, and save from now on."""
+        """Load what a node of this name saved in this run of roslaunch, and save from now on."""
         self._localiser = localiser
         self._parameters = parameters
         self._health = health
         self._folder = MapFolder(parameters.map_directory)
         self._name = rospy.resolve_name(namespace).strip("/").replace("/", ".") + ".autosave"
-        self._run = str(rospy.get_param("/run_id", ""))
+        self._run = _run_of_roslaunch()
         self._saved_at = localiser.changes
         if not self._resumed() and parameters.map:
             self._start_in(parameters.map)
@@ -56,7 +57,7 @@ class Autosave:
         rospy.loginfo("%s: starts in %s, %d blocks", self._health.name, name, self._localiser.block_count)
 
     def _resumed(self) -> bool:
-        """Load what this node saved in this run of the graph; put aside what another run left."""
+        """Load what this node saved in this run of roslaunch; put aside what another run left."""
         if self._parameters.autosave_period == 0.0 or not self._folder.path(self._name).exists():
             return False
         try:
@@ -75,3 +76,12 @@ class Autosave:
         self._saved_at = self._localiser.changes
         rospy.loginfo("%s: goes on in the map of %d blocks", self._health.name, self._localiser.block_count)
         return True
+
+
+def _run_of_roslaunch() -> str:
+    """Return a name for the run of whatever started the node; empty without a master that counts its runs.
+
+    A roscore may outlive many runs of roslaunch, so that its own number alone does not tell them apart.
+    """
+    run = str(rospy.get_param("/run_id", ""))
+    return f"{run} {os.getppid()}" if run else ""

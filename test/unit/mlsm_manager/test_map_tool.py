@@ -1,9 +1,12 @@
 """map_tool's commands, as a user types them."""
 
+import os
+import subprocess
 import sys
 
 import pytest
 from made_maps import random_map, stored_map
+from programs import ROOT
 
 from mlsm_manager.map_tool.commands import run_map_tool
 from mlsm_manager.surface_map.files.map_file import read_map, write_map
@@ -34,6 +37,15 @@ def test_info_says_frame_blocks_extent_and_calibration(run):
     assert "blocks of 0.5 m, 500 points, x -10.0 to 10.0 m" in told
     assert "calibration: range_scale = 0.98" in told
     assert "b.mlsm" in told
+
+
+def test_a_reader_that_stops_reading_ends_it_without_a_traceback(run, tmp_path):
+    read, write = os.pipe()
+    os.close(read)
+    command = [sys.executable, str(ROOT / "nodes" / "map_tool"), "info", "a.mlsm"]
+    ended = subprocess.run(command, cwd=str(tmp_path), stdout=write, stderr=subprocess.PIPE, timeout=120)
+    os.close(write)
+    assert (ended.returncode, ended.stderr) == (0, b"")
 
 
 def test_view_writes_a_picture_where_there_is_no_screen(run, tmp_path):
