@@ -12,12 +12,17 @@ class SolverKernel(Enum):
 
     @property
     def resolved(self) -> "SolverKernel":
-        """NUMPY or NUMBA."""
-        if self is not SolverKernel.AUTO:
+        """NUMPY or NUMBA, whose loops are loaded and compiled now, so that no scan waits for them.
+
+        Raises ImportError for NUMBA without numba.
+        """
+        if self is SolverKernel.NUMPY:
             return self
         try:
             import mlsm_manager.multi_view.compiled_comparisons  # noqa: F401
         except (ImportError, RuntimeError):
             # numba raises a RuntimeError where it finds no folder that it may write to.
+            if self is SolverKernel.NUMBA:
+                raise
             return SolverKernel.NUMPY
         return SolverKernel.NUMBA

@@ -1,5 +1,6 @@
 """Comparisons by compiled loops are those by numpy, but for rounding."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +16,7 @@ from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.offline.replay_parameters import ReplayParameters
 
 pytest.importorskip("numba")
 SAME = 1e-9
@@ -81,6 +83,14 @@ def test_points_without_a_finite_place_are_refused():
     lost = replace(points, places=points.places * np.where(np.arange(20) == 7, np.nan, 1.0)[:, np.newaxis])
     with pytest.raises(ValueError, match="without a finite place"):
         Comparing.by(SolverKernel.NUMBA).neighbours(points, 5).within(lost, points, 2.0)
+
+
+@pytest.mark.parametrize("kernel", ["AUTO", "NUMBA"])
+def test_the_loops_are_compiled_before_the_first_scan(kernel, monkeypatch):
+    module = "mlsm_manager.multi_view.compiled_comparisons"
+    monkeypatch.delitem(sys.modules, module, raising=False)
+    ReplayParameters(solver_kernel=kernel).build_localiser()
+    assert module in sys.modules
 
 
 def test_where_numba_is_installed_it_is_chosen():
