@@ -18,7 +18,7 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import Point
-from graph import PACKAGE_ROOT, PATIENCE, wait_for_publisher_links, wait_until
+from graph import PACKAGE_ROOT, PATIENCE, forget_links, wait_for_publisher_links, wait_until
 
 from mlsm_manager.surface_map.files.map_file import read_map
 from sonar_processing.cloud import IntensityCloud
@@ -61,6 +61,7 @@ class KilledNode:
             finally:
                 node.send_signal(signal.SIGKILL)
                 node.wait()
+                forget_links(self._publisher, StampedIntensityCloud())
             self._assert_files_are_whole()
         return saved
 

@@ -208,3 +208,13 @@ def end_publishing(publisher: rospy.Publisher) -> None:
     publisher.unregister()
     told = f"{topic}: still connected"
     wait_until(lambda: not any(_links(node, topic, "i") for node in nodes_of(topic)[1]), told=told)
+
+
+def forget_links(publisher: rospy.Publisher, message: Any) -> None:
+    """Send messages to nodes that were killed until rospy has noticed: their links look like those of new nodes."""
+
+    def are_forgotten() -> bool:
+        publisher.publish(message)
+        return publisher.get_num_connections() == 0
+
+    wait_until(are_forgotten, told=f"{publisher.name}: still linked to a node that was killed")

@@ -7,7 +7,8 @@ import unittest
 import rosgraph
 import rospy
 import rostest
-from graph import TEST_DATA, Diagnostics, Inbox, play, wait_for_subscribers
+from graph import TEST_DATA, Diagnostics, Inbox, wait_for_subscribers
+from playback import play, steps_every
 
 from sonar_processing.ros.conversions import cloud_from_message
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
@@ -16,6 +17,8 @@ from underwater_map_construction.msg import Circles, StampedIntensityCloud, Wall
 # Turns of the head in the bag, which ends in the middle of one.
 SCANS = 10
 N_WALLS = 2
+BAG = TEST_DATA / "basin.bag"
+SECONDS = 4.0  # between waits for a slow node
 
 
 class HostedDetectors(unittest.TestCase):
@@ -32,9 +35,15 @@ class HostedDetectors(unittest.TestCase):
         for inbox in inboxes:
             inbox.wait_for_link()
         wait_for_subscribers("/sonar/raw", 1)
-        play(TEST_DATA / "basin.bag", rate=15)
+        play(BAG, 15.0, steps_every(SECONDS, BAG, cls.wait_for_shapes))
         for inbox in inboxes:
-            inbox.wait_for(lambda _, inbox=inbox: len(inbox.messages) >= SCANS)
+            inbox.wait_for_number(SCANS)
+
+    @classmethod
+    def wait_for_shapes(cls) -> None:
+        """Wait until every cloud so far has been searched."""
+        for shapes in (cls.walls, cls.circles):
+            shapes.wait_for_number(len(cls.clouds.messages))
 
     def test_the_walls_are_those_of_the_cleaned_clouds(self) -> None:
         """With the parameters of the detector's own namespace."""

@@ -8,11 +8,10 @@ from tempfile import TemporaryDirectory
 from typing import Any, Dict, List
 
 import numpy as np
-import rosbag
 import rospy
 import rostest
 from graph import TEST_DATA, Inbox, launched, rows, wait_for_links, wait_for_subscribers
-from playback import Step, play
+from playback import Step, play, steps_every
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
@@ -112,8 +111,7 @@ def _steps(clouds: Inbox, maps: Inbox) -> List[Step]:
         if newest:
             maps.wait_for(lambda shown: shown.header.stamp >= newest[0].header.stamp)
 
-    with rosbag.Bag(str(BAG)) as bag:
-        return [Step(time, wait) for time in np.arange(bag.get_start_time(), bag.get_end_time(), SECONDS)]
+    return steps_every(SECONDS, BAG, wait)
 
 
 def _made(processes: str, folder: Path) -> Dict[str, Any]:

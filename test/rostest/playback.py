@@ -5,9 +5,11 @@ from argparse import Namespace
 from collections import deque
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable, Sequence
+from typing import Callable, List, Sequence
 
 import genpy
+import numpy as np
+import rosbag
 import rospy
 from graph import nodes_of, wait_for_links
 from rosgraph_msgs.msg import Clock
@@ -48,6 +50,12 @@ def play(bag: Path, rate: float, steps: Sequence[Step] = ()) -> None:
         publishers[played.topic].publish(played.message)
     for step in left:
         step.wait()
+
+
+def steps_every(seconds: float, bag: Path, wait: Callable[[], object]) -> List[Step]:
+    """Return steps of a bag that wait for the same every few seconds."""
+    with rosbag.Bag(str(bag)) as recorded:
+        return [Step(time, wait) for time in np.arange(recorded.get_start_time(), recorded.get_end_time(), seconds)]
 
 
 def _publisher(topic: str, kind: type) -> rospy.Publisher:

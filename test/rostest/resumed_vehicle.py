@@ -13,7 +13,7 @@ from typing import Any, Dict, List, Sequence, Set, Tuple
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
-from graph import PACKAGE_ROOT, Inbox, rows, wait_for_publisher_links, wait_until
+from graph import PACKAGE_ROOT, PATIENCE, Inbox, forget_links, rows, wait_for_publisher_links, wait_until
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
@@ -94,7 +94,8 @@ class ResumedVehicle:
         self._echoes = rospy.Publisher(f"{namespace}/sonar/scan/echoes", StampedIntensityCloud, queue_size=10)
         self._tf = rospy.Publisher(f"{namespace}/tf", TFMessage, queue_size=100)
         self._static = rospy.Publisher(f"{namespace}/tf_static", TFMessage, queue_size=1, latch=True)
-        self._static.publish([self._transform("base_link", "sonar", 0.0, np.append(mission.sonar_in_base, 0.0))])
+        self._mount = TFMessage([self._transform("base_link", "sonar", 0.0, np.append(mission.sonar_in_base, 0.0))])
+        self._static.publish(self._mount)
         self._fixes = Inbox(f"{namespace}/MLSM/odometry", Odometry)
         self._sent_until = mission.scans[0].start - 1.0
         self._fixed_at: Dict[float, float] = {}
@@ -119,6 +120,9 @@ class ResumedVehicle:
     def _end(self, node: "subprocess.Popen[bytes]") -> None:
         node.kill()
         node.wait()
+        forget_links(self._static, self._mount)
+        forget_links(self._tf, TFMessage())
+        forget_links(self._echoes, StampedIntensityCloud())
 
     def _started(self) -> "subprocess.Popen[bytes]":
         names = [f"/{name}:={self._namespace}/{name}" for name in ("tf", "tf_static")]
@@ -126,8 +130,8 @@ class ResumedVehicle:
         node = subprocess.Popen(command, start_new_session=True)
         try:
             for publisher in (self._tf, self._static, self._echoes):
-                wait_for_publisher_links(publisher, 1, timeout=60.0)
-            rospy.wait_for_service(self._get_region, timeout=60.0)
+                wait_for_publisher_links(publisher, 1)
+            rospy.wait_for_service(self._get_region, timeout=PATIENCE)
         except (AssertionError, rospy.ROSException):
             node.kill()
             raise

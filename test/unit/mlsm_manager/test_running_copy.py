@@ -74,8 +74,10 @@ def test_the_lock_is_free_between_two_pieces():
     """Somebody who waits for it changes the map before the copy is complete."""
     surface_map, lock = map_of(5, count=4000), threading.RLock()
     before, copy, seen = surface_map.blocks, surface_map.begin_copy(), []
+    wants_the_lock = threading.Event()
 
     def change():
+        wants_the_lock.set()
         with lock:
             surface_map.insert(np.zeros((1, 4)))
             seen.append(copy.is_complete)
@@ -83,6 +85,7 @@ def test_the_lock_is_free_between_two_pieces():
     lock.acquire()
     changing = threading.Thread(target=change)
     changing.start()
+    wants_the_lock.wait()
     copy.step()
     lock.release()
     copied = finished(copy, lock)
