@@ -7,7 +7,8 @@ import unittest
 import rosgraph
 import rospy
 import rostest
-from graph import TEST_DATA, Diagnostics, Inbox, play, wait_for_subscribers
+from graph import TEST_DATA, Diagnostics, Inbox, wait_for_subscribers
+from playback import play
 
 from sonar_processing.ros.conversions import cloud_from_message
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
