@@ -4,6 +4,8 @@ Each sum adds the same numbers in the same order as numpy does in `linkage`, so 
 bit and in the same rows; only the time differs.
 """
 
+from functools import lru_cache
+
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore
@@ -25,3 +27,11 @@ def insert_points_compiled(store: BlockStore, points: np.ndarray, cell: np.ndarr
     store.write_rows(rows[changed], blocks[changed], np.uint16(0))
     store.chain(rows, owner, slots)
     return cells
+
+
+@lru_cache(maxsize=None)
+def compile_loops() -> None:
+    """Compile all loops, or read them from numba's cache, once in a process: not when the first scan comes."""
+    store = BlockStore(0)
+    for dtype in (np.float64, np.float32):
+        insert_points_compiled(store, np.zeros((2, 4), dtype), np.zeros(2, dtype=np.int64), 1.0)

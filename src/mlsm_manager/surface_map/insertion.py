@@ -23,8 +23,9 @@ def point_inserter(kernel: InsertionKernel) -> PointInserter:
     """Return what inserts points. Raises ImportError, which says what to install, for NUMBA without numba."""
     if kernel is InsertionKernel.NUMPY:
         return insert_points
-    from mlsm_manager.surface_map.compiled_insertion import insert_points_compiled
+    from mlsm_manager.surface_map.compiled_insertion import compile_loops, insert_points_compiled
 
+    compile_loops()
     return insert_points_compiled
 
 

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
-pytest.importorskip("numba")
+compiled_loops = pytest.importorskip("mlsm_manager.surface_map.compiled_loops", reason="numba is not installed")
 # One byte each for x, y, height and strength: hypothesis draws and shrinks them ten times as fast as floats.
 BATCHES = st.lists(st.binary(min_size=4, max_size=240), min_size=1, max_size=4)
 
@@ -58,3 +58,12 @@ def test_a_column_of_thousands_makes_the_same_rows():
         for surface_map in maps:
             surface_map.insert(column)
     _assert_same(maps)
+
+
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_no_loop_is_compiled_after_the_map_was_made(dtype):
+    _, surface_map = _maps(0.5)
+    loops = (compiled_loops.sorted_by_cell, compiled_loops.grouped, compiled_loops.merged)
+    compiled = [len(loop.signatures) for loop in loops]
+    surface_map.insert(np.zeros((3, 4), dtype))
+    assert [len(loop.signatures) for loop in loops] == compiled
