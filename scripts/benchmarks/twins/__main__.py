@@ -9,14 +9,14 @@ from typing import Tuple
 
 import numpy as np
 
+from benchmarks.path_figures import PathFigures, figures_of
 from benchmarks.twins.parameters import TWINS, TwinParameters
 from benchmarks.twins.recording import twin_of
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.path import live_path, solved_path
 from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.evaluation import position_error
+from mlsm_manager.offline.evaluation import positions_at
 from mlsm_manager.offline.recording import Recording, scans_of
 from node_support.geometry.planar import inverse, transformed
 from recordings.reading.reader import Request
@@ -31,21 +31,18 @@ def main() -> None:
     arguments = parser.parse_args()
     source = read_recording(arguments.bag, Request())
     for name in arguments.twins:
-        for path, error in zip(("live", "batch"), errors(twin_of(source, TWINS[name]), TWINS[name])):
-            print(f"{name}, {path}: {error.mean:.2f} m in the mean, {error.max:.2f} m at most")
+        for path, found in zip(("live", "batch"), figures(twin_of(source, TWINS[name]), TWINS[name])):
+            print(f"{name}, {path}: {found.line()}", flush=True)
 
 
-def errors(twin: Recording, conditions: TwinParameters) -> Tuple:
-    """Return the position errors of the live and of the batch path."""
+def figures(twin: Recording, conditions: TwinParameters) -> Tuple[PathFigures, PathFigures]:
+    """Return how far the live and the batch path are from the truth."""
     mode = ExtractionMode.DENSE if conditions.binary else ExtractionMode.MATCHED_FILTER
-    parameters = MultiViewParameters()
-    solver = LiveSolver(parameters, sonar_in_base(twin))
+    solver = LiveSolver(MultiViewParameters(), sonar_in_base(twin))
     for scan, _ in scans_of(twin, EchoExtractorParameters(mode=mode, spacing=1.0)):
         solver.add(scan)
-    batch, times = solved(solver), twin.track.times
-    known = live_path(twin.track, solver.estimates, solver.odometry, parameters.window.lookahead, times)
-    fitted = solved_path(twin.track, solver.odometry, batch.node_times, batch.state.nodes, times)
-    return tuple(position_error(times, path[:, :2], twin.truth) for path in (known, fitted))
+    truth = positions_at(twin.truth.times, twin.truth.positions, solver.log.node_times)
+    return figures_of(solver, solved(solver), truth)
 
 
 def sonar_in_base(recording: Recording) -> np.ndarray:
