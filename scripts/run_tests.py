@@ -6,10 +6,10 @@ import sys
 import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Callable, List, Optional
+from typing import Callable, List, Mapping, Optional
 from xml.etree import ElementTree as ET
 
 from oldest.environment import HOW_TO_GET_ONE, find_python38
@@ -68,7 +68,7 @@ class Load(Enum):
 class Step:
     """One command and how its result is counted.
 
-    report: the JUnit file, or the folder of such files, that it leaves.
+    report: the JUnit file, or the folder of such files, that it leaves. variables: added to its environment.
     """
 
     name: str
@@ -76,6 +76,7 @@ class Step:
     report: Optional[Path] = None
     load: Load = Load.WHOLE
     timeout: float = STEP_TIMEOUT
+    variables: Mapping[str, str] = field(default_factory=dict)
 
     @property
     def prioritised_command(self) -> List[str]:
@@ -110,7 +111,9 @@ def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
 def _rostest(test: Path) -> Step:
     command = ["rostest", "--results-filename=result.xml", str(test)]
     load = Load.WHOLE if test.stem in ALONE else Load.SHARED
-    return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load)
+    # Nodes of one name that run at once would save their maps in one file.
+    variables = {"ROS_HOME": str(RESULTS / test.stem / "ros_home")}
+    return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load, variables=variables)
 
 
 def oldest_versions() -> List[Step]:
@@ -126,7 +129,7 @@ def oldest_versions() -> List[Step]:
 def run_step(step: Step) -> Outcome:
     """Run a step, print what failed and return its counts."""
     start = time.monotonic()
-    environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(step.report or RESULTS)}
+    environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(step.report or RESULTS), **step.variables}
     try:
         done = subprocess.run(
             step.prioritised_command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,

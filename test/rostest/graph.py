@@ -1,4 +1,4 @@
-"""What the rostests share: waiting for events, playing bags, reading diagnostics and maps."""
+"""What the rostests share: waiting for events, launching nodes, reading diagnostics and maps."""
 
 import os
 import subprocess
@@ -12,11 +12,9 @@ from typing import Any, Callable, Dict, Iterator, List, Tuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-import rosbag
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from std_srvs.srv import SetBool
 
 PACKAGE = "underwater_map_construction"
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
@@ -137,18 +135,18 @@ def wait_for_subscribers(topic: str, number: int, timeout: float = PATIENCE) -> 
 def wait_for_links(topic: str, number: int = 1, timeout: float = PATIENCE) -> None:
     """Wait until somebody publishes a topic, `number` nodes listen to it, and all are connected."""
     wait_until(
-        lambda: bool(_nodes_of(topic)[0]) and _is_heard(topic, number),
+        lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number),
         timeout,
         told=f"{topic}: no publisher with {number} connected listeners",
     )
 
 
 def _is_heard(topic: str, number: int) -> bool:
-    publishers, listeners = _nodes_of(topic)
+    publishers, listeners = nodes_of(topic)
     return len(listeners) >= number and all(_links(node, topic) >= number for node in publishers)
 
 
-def _nodes_of(topic: str) -> Tuple[List[str], List[str]]:
+def nodes_of(topic: str) -> Tuple[List[str], List[str]]:
     """Return the nodes that publish a topic, and those that listen to it."""
     publishers, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
     return dict(publishers).get(topic, []), dict(subscribers).get(topic, [])
@@ -175,32 +173,6 @@ def wait_until(
             return False
         ended.wait(0.02)
     return True
-
-
-def play(bag: Path, rate: float, longest: float = 300.0) -> None:
-    """Play a bag to its end, in at most `longest` s, to all who listen.
-
-    Playback starts when every listener is connected to every topic.
-    """
-    # Of a burst after a stop of this process, the player would drop what exceeds its queue.
-    options = ["--quiet", "--clock", "--pause", "--queue=100000", f"--rate={rate}"]
-    command = ["rosbag", "play", *options, str(bag), "__name:=player"]
-    player = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
-    try:
-        rospy.wait_for_service("/player/pause_playback", timeout=PATIENCE)
-        for topic in _topics(bag):
-            # The service is there before the topics are.
-            wait_for_links(topic, len(_nodes_of(topic)[1]))
-        rospy.ServiceProxy("/player/pause_playback", SetBool)(False)
-        assert player.wait(timeout=longest) == 0
-    finally:
-        player.kill()
-
-
-def _topics(bag: Path) -> List[str]:
-    """Return the topics that a player publishes, its clock among them."""
-    with rosbag.Bag(str(bag)) as recorded:
-        return sorted({*recorded.get_type_and_topic_info().topics, "/clock"})
 
 
 @contextmanager

@@ -7,7 +7,8 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import Inbox, play, recording, rows, wait_for_subscribers
+from graph import Inbox, recording, rows, wait_for_subscribers
+from playback import play
 from sensor_msgs.msg import PointCloud2
 
 RINGING = 0.4

@@ -3,12 +3,16 @@
 
 import sys
 import unittest
-from typing import Any, Dict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Dict, List
 
 import numpy as np
+import rosbag
 import rospy
 import rostest
-from graph import TEST_DATA, Inbox, launched, play, rows, wait_for_links, wait_for_subscribers
+from graph import TEST_DATA, Inbox, launched, rows, wait_for_links, wait_for_subscribers
+from playback import Step, play
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
@@ -20,6 +24,8 @@ ECHO_SPREAD, NOISE_SPREAD = 0.15, 4.0
 CELL = 0.5
 # Turns of the head in the bag, which ends in the middle of one.
 SCANS = 10
+BAG = TEST_DATA / "basin.bag"
+SECONDS = 4.0  # between waits for slow nodes
 # Of the beams, in each layout: sonar_to_cloud, and a node for images where it has one.
 LISTENERS = {"one": 1, "many": 2}
 INNER_TOPICS = {"one": (), "many": ("sonarCloud", "thresholded", "cleaned", "polar")}
@@ -38,7 +44,8 @@ class OneAndManyProcesses(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         """Keep the maps and what is made beside them."""
-        made = {processes: _made(processes) for processes in LISTENERS}
+        with TemporaryDirectory() as maps:
+            made = {processes: _made(processes, Path(maps) / processes) for processes in LISTENERS}
         cls.blocks = {processes: rows(messages["map"]) for processes, messages in made.items()}
         cls.beside = made
 
@@ -97,17 +104,33 @@ class OneAndManyProcesses(unittest.TestCase):
         self.assertLess(abs(np.median(short_walls)), CELL / 2)
 
 
-def _made(processes: str) -> Dict[str, Any]:
-    """Return what a layout publishes by the end of the last turn: the newest message of each topic."""
+def _steps(clouds: Inbox, maps: Inbox) -> List[Step]:
+    """Wait every few seconds of the bag until the map holds all clouds that have come."""
+
+    def wait() -> None:
+        newest = clouds.messages[-1:]
+        if newest:
+            maps.wait_for(lambda shown: shown.header.stamp >= newest[0].header.stamp)
+
+    with rosbag.Bag(str(BAG)) as bag:
+        return [Step(time, wait) for time in np.arange(bag.get_start_time(), bag.get_end_time(), SECONDS)]
+
+
+def _made(processes: str, folder: Path) -> Dict[str, Any]:
+    """Return what a layout publishes by the end of the last turn: the newest message of each topic.
+
+    It saves its map in `folder`, in which a node that is started again would go on in its map.
+    """
     inboxes = {name: Inbox(topic, kind) for name, (topic, kind) in TOPICS.items()}
     maps = Inbox("/MLSM/cloud", PointCloud2)
-    with launched("mapping.launch", f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml"):
+    arguments = (f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml", f"map_directory:={folder}")
+    with launched("mapping.launch", *arguments):
         for inbox in (maps, *inboxes.values()):
             inbox.wait_for_link()
         for topic in INNER_TOPICS[processes]:
             wait_for_links(f"/sonar/scan/{topic}", 2 if topic == "cleaned" else 1)
         wait_for_subscribers("/sonar/raw", LISTENERS[processes])
-        play(TEST_DATA / "basin.bag", rate=15)
+        play(BAG, rate=15, steps=_steps(inboxes["cleaned"], maps))
         # Images come more often than turns.
         made = {name: inbox.wait_for_number(SCANS)[-1] for name, inbox in inboxes.items()}
         stamp = made["cleaned"].header.stamp

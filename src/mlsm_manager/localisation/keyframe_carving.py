@@ -85,12 +85,16 @@ class KeyframeCarving:
         clouds: List[TimedPoints],
         points: List[np.ndarray],
         placement: Placement,
+        scans: int = 1,
     ) -> None:
-        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`."""
+        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`.
+
+        scans: how many came since the last look.
+        """
         if self._carver is None or not self._most_followed:
             return
         self._looks.extend([None] * (len(clouds) - len(self._looks)))
-        for number in self._strayed(points, surface_map.resolution):
+        for number in self._strayed(points, surface_map.resolution, self._most_followed * scans):
             cloud, there = clouds[number], points[number]
             beams = FirstEchoes.of_level(there, cloud.times, placement.origins(cloud))
             self._looks[number] = _Look(there, self._carver.findings(surface_map, beams, there))
@@ -120,10 +124,10 @@ class KeyframeCarving:
         more = np.bincount(block[same], weights=beams[entry[same]], minlength=len(blocks))
         return rows[(more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)]
 
-    def _strayed(self, points: List[np.ndarray], resolution: float) -> List[int]:
-        """Return the numbers of the keyframes to be looked at again."""
+    def _strayed(self, points: List[np.ndarray], resolution: float, most: int) -> List[int]:
+        """Return the numbers of the keyframes to be looked at again, at most `most`."""
         moved = np.array([_moved(look, there) for look, there in zip(self._looks, points)])
-        farthest = np.argsort(-moved, kind="stable")[: self._most_followed]
+        farthest = np.argsort(-moved, kind="stable")[:most]
         return farthest[moved[farthest] > _STRAYED * resolution].tolist()
 
     def _last_hit(self, keys: np.ndarray) -> np.ndarray:

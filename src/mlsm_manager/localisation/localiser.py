@@ -101,7 +101,8 @@ class Localiser:
     @property
     def block_count(self) -> int:
         """Number of blocks of the map."""
-        return self.mapper.block_count
+        with self._lock:
+            return self.mapper.block_count
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown whose mean lies from `low` to `high`, (2,) or (3,) m."""
