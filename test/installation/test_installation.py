@@ -4,20 +4,22 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "stopping"))
+
+from stopwatch import free_port
+
 ROOT = Path(__file__).resolve().parents[2]
 WORKSPACE = ROOT / "build/workspace"
 PACKAGE = "underwater_map_construction"
 RAYS = ["sonar.ray_rows=5", "sonar.ray_columns=2"]
-with socket.socket() as probe:
-    probe.bind(("localhost", 0))
-    PORT = probe.getsockname()[1]
+PORT = free_port()
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,7 @@ import rospy
 import rostest
 from benchmarks.foreign_messages import message_classes, sane_message
 from benchmarks.fuzz_beams import Fuzzer
-from graph import Diagnostics, Inbox, rows, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, rows, wait_for_publisher_links
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import String
@@ -46,7 +46,7 @@ class ForeignBeams(unittest.TestCase):
             type(self).published += 1
             time.sleep(0.004)
         self.diagnostics.wait_for("sonar_to_cloud", "messages in", self.published)
-        publisher.unregister()
+        end_publishing(publisher)
 
     def publish_turns(self, kind: str, turns: int) -> None:
         """Publish whole turns of a head in front of a round wall; more than a turn, so that one is complete."""

@@ -11,7 +11,7 @@ import rostest
 import tf2_ros
 from gazebo_scans import FULL_CIRCLE, block_laser, cloud2, header, laser_scan
 from geometry_msgs.msg import TransformStamped
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, wait_for_publisher_links
 from sensor_msgs.msg import JointState, LaserScan, PointCloud, PointCloud2
 from std_msgs.msg import String
 
@@ -56,7 +56,7 @@ class GazeboSonar(unittest.TestCase):
         for number in range(MOST_SCANS):
             beam = self._beam_of(rays, laser_scan(header(1.0 + 0.01 * number, "sonar"), FULL_CIRCLE, 721, WALL))
             if beam.sensorAngle != 0.0 and abs(beam.angle) < BEAM / 2:
-                rays.unregister()
+                end_publishing(rays)
                 return
         raise AssertionError(f"no joint state in {MOST_SCANS} scans")
 
@@ -74,7 +74,7 @@ class GazeboSonar(unittest.TestCase):
             self.assertAlmostEqual(_strongest(beam), WALL / math.cos(beam.angle), delta=0.6)
             self.assertEqual((beam.header.frame_id, len(beam.intensities), beam.maxrange_meters), ("sonar", 500, 50.0))
             self.assertAlmostEqual(beam.sensorAngle, 0.25, places=6)
-            rays.unregister()
+            end_publishing(rays)
 
     def test_a_sensor_on_a_joint_gives_beams_where_tf_says_it_looks(self) -> None:
         """Also when tf comes after the scan."""
@@ -108,7 +108,7 @@ class GazeboSonar(unittest.TestCase):
             rays = _publisher("/sonar/rays", kind)
             rays.publish(message)
             self.diagnostics.wait_for("gazebo_sonar", "scans refused", number)
-            rays.unregister()
+            end_publishing(rays)
         self._beam_of(_publisher("/sonar/rays", LaserScan), scan)
 
 

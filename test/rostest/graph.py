@@ -152,11 +152,11 @@ def nodes_of(topic: str) -> Tuple[List[str], List[str]]:
     return dict(publishers).get(topic, []), dict(subscribers).get(topic, [])
 
 
-def _links(node: str, topic: str) -> int:
-    """Return the number of established connections over which a node publishes a topic."""
+def _links(node: str, topic: str, direction: str = "o") -> int:
+    """Return the number of established connections over which a node publishes a topic, or takes it ("i")."""
     slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
     _, _, connections = slave.getBusInfo("/graph_test")
-    return sum(1 for link in connections if link[2] == "o" and link[4] == topic and link[5])
+    return sum(1 for link in connections if link[2] == direction and link[4] == topic and link[5])
 
 
 def wait_until(
@@ -197,3 +197,14 @@ def wait_for_publisher_links(publisher: rospy.Publisher, number: int, timeout: f
     """Wait until `number` nodes are connected to a publisher of this process."""
     told = f"{publisher.name}: not {number} connections"
     wait_until(lambda: publisher.get_num_connections() >= number, timeout, told=told)
+
+
+def end_publishing(publisher: rospy.Publisher) -> None:
+    """Unregister a publisher of this process, and wait until those that listened have noticed.
+
+    They would take a new publisher of the topic for the old one, whose connections they have, and not connect again.
+    """
+    topic = publisher.resolved_name
+    publisher.unregister()
+    told = f"{topic}: still connected"
+    wait_until(lambda: not any(_links(node, topic, "i") for node in nodes_of(topic)[1]), told=told)

@@ -2,6 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
+from threading import RLock
 from typing import Deque, List, Optional, Tuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from mlsm_manager.surface_map.free_space.carving import BeamFindings, Carver, Ca
 from mlsm_manager.surface_map.free_space.pairing import pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Overlay
+from mlsm_manager.surface_map.running_copy import RunningCopy, finished
 
 _STRAYED = 0.5
 """Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
@@ -50,13 +52,17 @@ class KeyframeCarving:
     @property
     def blocks(self) -> Blocks:
         """A copy of what is known to be free, as all keyframes see it now."""
+        return finished(self.begin_copy(), RLock())
+
+    def begin_copy(self) -> RunningCopy:
+        """Return a copy of what is known to be free now, which is still to be made."""
         overlay = Overlay(self._free)
         for look in self._looks:
             if look is not None:
                 overlay.lay(look.findings.free)
-        blocks = self._free.blocks
+        copy = self._free.begin_copy()
         overlay.take_off()
-        return blocks
+        return copy
 
     def restore(self, free: Blocks) -> None:
         """Take what was known to be free. Raises ValueError for another resolution."""

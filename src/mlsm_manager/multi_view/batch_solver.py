@@ -135,7 +135,7 @@ class _Batch:
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
-        equations = NormalEquations(self._layout.size)
+        equations = NormalEquations(self._layout.size, scattering=self._comparing.scattered)
         odometry, sonar = self._odometry, self._parameters.sonar
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))

@@ -8,7 +8,8 @@ from typing import Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.association import Pairs
-from mlsm_manager.multi_view.compiled_loops import POINT_COLUMNS, shared_neighbours, summed_comparisons
+from mlsm_manager.multi_view.compiled_search import shared_neighbours
+from mlsm_manager.multi_view.compiled_sums import POINT_COLUMNS, scattered_blocks, summed_comparisons
 from mlsm_manager.multi_view.neighbours import TIE
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
@@ -50,6 +51,11 @@ def summed_compiled(
         packed, sources.scans, packed if targets is sources else _packed(targets), targets.scans,
         matching.range_deviation**2, matching.beam_half_width**2, matching.weight, max(1.0, cut / matching.cut),
     )  # fmt: skip
+
+
+def scattered_compiled(matrix: np.ndarray, columns: np.ndarray, blocks: np.ndarray) -> None:
+    """Add blocks to a matrix; see Scattering."""
+    scattered_blocks(matrix, np.ascontiguousarray(columns), np.ascontiguousarray(blocks))
 
 
 def _packed(points: PlacedPoints) -> np.ndarray:

@@ -79,7 +79,7 @@ class LiveWindow:
 
     def step(self, cut: float) -> None:
         """Take one Gauss-Newton step with points up to `cut` [m] apart."""
-        equations = NormalEquations(self._layout.size, len(self._held_covariance))
+        equations = NormalEquations(self._layout.size, len(self._held_covariance), self._comparing.scattered)
         self._add_beliefs(equations)
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)

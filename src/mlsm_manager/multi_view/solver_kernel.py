@@ -16,7 +16,7 @@ class SolverKernel(Enum):
         if self is not SolverKernel.AUTO:
             return self
         try:
-            import mlsm_manager.multi_view.compiled_loops  # noqa: F401
+            import mlsm_manager.multi_view.compiled_comparisons  # noqa: F401
         except (ImportError, RuntimeError):
             # numba raises a RuntimeError where it finds no folder that it may write to.
             return SolverKernel.NUMPY

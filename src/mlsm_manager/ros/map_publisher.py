@@ -118,6 +118,9 @@ class MapPublisher:
         if has_octomap_messages():
             self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, localiser, health))
         self._tell = on_change(parameters.map_period, self._publish, health)
+        # rospy takes connections before it knows the listeners, and tells them of none that came so early.
+        if localiser.block_count:
+            self.replace()
 
     def change(self, stamp_ns: Optional[int] = None) -> None:
         """Publish soon, because the map changed, by a cloud with this stamp where there is one."""

@@ -12,6 +12,7 @@ from mlsm_manager.surface_map.cell_order import cell_order
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
 from mlsm_manager.surface_map.insertion import InsertionKernel, insert_groups, point_inserter
 from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
+from mlsm_manager.surface_map.running_copy import RunningCopy
 
 
 @dataclass(frozen=True)
@@ -66,6 +67,10 @@ class MultiLevelSurfaceMap:
     def blocks(self) -> Blocks:
         """A copy of all blocks, in no particular order."""
         return self._store.blocks(self._store.rows_in_use, self.resolution)
+
+    def begin_copy(self) -> RunningCopy:
+        """Return a copy of all blocks as they are now, which is still to be made; see `finished`."""
+        return self._store.begin_copy(self.resolution)
 
     def in_box(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return a copy of the blocks whose mean lies between `low` and `high`, (2,) x y or (3,) x y z [m].

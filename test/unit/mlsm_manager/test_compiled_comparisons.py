@@ -51,6 +51,17 @@ def test_sums_of_any_comparisons_are_the_same(seed, count, scans):
             np.testing.assert_allclose(found, expected, rtol=SAME, atol=SAME * np.abs(expected).max())
 
 
+@given(st.integers(0, 10**6), st.integers(0, 20))
+@settings(max_examples=30)
+def test_blocks_are_added_to_the_same_places_of_a_matrix(seed, count):
+    rng = np.random.RandomState(seed)
+    columns, blocks = rng.randint(0, 7, (count, 3)), rng.normal(0.0, 1.0, (count, 3, 3))
+    expected, found = np.ones((7, 7)), np.ones((7, 7))
+    Comparing.by(SolverKernel.NUMPY).scattered(expected, columns, blocks)
+    Comparing.by(SolverKernel.NUMBA).scattered(found, columns, blocks)
+    np.testing.assert_allclose(found, expected, atol=SAME)
+
+
 def test_a_run_is_solved_alike_live_and_afterwards():
     runs = []
     for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA):
