@@ -14,13 +14,13 @@ import yaml
 
 from benchmarks.information_bound import bounds
 from benchmarks.matching_scans import KINDS, RAYS, SonarKind
+from benchmarks.path_figures import PathFigures, figures_of
 from benchmarks.tour_scans import BEAMS_AT_ONCE, ROOT, START_NS
 from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.odometry_motion import as_complex
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.offline.echo_length import echo_sigma
@@ -95,18 +95,12 @@ def recorded(tour: Simulated, odometry: Track) -> Recording:
     return Recording([PlacedBeam(beam, place, True) for beam, place in zip(tour.beams, places)], 0, odometry, None)
 
 
-def figures(recording: Recording, truth: Track) -> np.ndarray:
-    """Return (2, 4) of the live and of the batch solver: mean error [m], the same once the path is shifted, turned and
-    scaled to fit best, NEES per state, median told deviation [m].
-    """
+def figures(recording: Recording, truth: Track) -> Tuple[PathFigures, PathFigures]:
+    """Return those of the live and of the batch solver."""
     solver = LiveSolver(MultiViewParameters(), recording.sonar_in_base)
     for scan in _scans(recording):
         solver.add(scan)
-    batch, times = solved(solver), solver.log.node_times[1:]
-    live = np.array([estimate.T_map_base for estimate in solver.estimates])
-    fitted = recording.track.at(times) + batch.state.nodes[1:, :3]
-    covariances = np.array([estimate.pose_covariance for estimate in solver.estimates]), batch.pose_covariances[1:]
-    return np.array([_judged(path, truth.at(times), own) for path, own in zip((live, fitted), covariances)])
+    return figures_of(solver, solved(solver), truth.at(solver.log.node_times)[:, :2])
 
 
 def _scans(recording: Recording) -> List[Scan]:
@@ -118,20 +112,6 @@ def _scans(recording: Recording) -> List[Scan]:
 def _head_step(recording: Recording) -> float:
     """Return the angle between beams [rad]."""
     return float(np.median(np.abs(wrapped(np.diff([placed.beam.angle for placed in recording.beams])))))
-
-
-def _judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> Tuple[float, float, float, float]:
-    error, covariances = (path - truth)[:, :2], covariances[:, :2, :2]
-    squared = np.einsum("na,na->n", error, np.linalg.solve(covariances, error[..., np.newaxis])[..., 0])
-    deviation = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
-    shape = _shape_error(path[:, :2], truth[:, :2])
-    return float(np.hypot(*error.T).mean()), shape, float(squared.mean() / 2.0), float(np.median(deviation))
-
-
-def _shape_error(path: np.ndarray, truth: np.ndarray) -> float:
-    """Return the mean distance [m] of a path (n, 2) from the truth, shifted, turned and scaled to fit best."""
-    own, true = (as_complex(places - places.mean(axis=0)) for places in (path, truth))
-    return float(np.abs(true - np.vdot(own, true) / np.vdot(own, own) * own).mean())
 
 
 def main() -> None:
@@ -149,11 +129,8 @@ def main() -> None:
                 f"{world}, {kind}: bound {least.known:.2f} m with the map known, {least.unknown:.2f} m without, "
                 f"{least.shape:.2f} m for the path's shape", flush=True,
             )  # fmt: skip
-            live, batch = np.mean([figures(*one) for one in made], axis=0)
-            print("    " + "; ".join(
-                f"{name} {error:.2f} m, shape {shape:.2f} m, NEES per state {nees:.2f}, deviation {deviation:.2f} m"
-                for name, (error, shape, nees, deviation) in (("live", live), ("batch", batch))
-            ), flush=True)  # fmt: skip
+            means = np.mean([figures(*one) for one in made], axis=0)
+            print("".join(f"    {name}: {PathFigures(*mean).line()}\n" for name, mean in zip(("live", "batch"), means)))
 
 
 if __name__ == "__main__":

@@ -12,19 +12,16 @@ import numpy as np
 
 from benchmarks.heads import Simulated, recorded, simulated, tour_setup
 from benchmarks.matching_scans import SonarKind
+from benchmarks.solver_input import solver_input
 from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.offline.echo_length import echo_sigma
-from mlsm_manager.offline.echo_shape import EchoShape, suited
-from mlsm_manager.offline.odometry_kind import with_odometry
-from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.echo_shape import EchoShape
+from mlsm_manager.offline.recording import Recording
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour", "harbour_tour", "basin_tour")
 HEAD = SonarKind(500, 0.15, 0.3)  # the demo's
@@ -49,15 +46,6 @@ def drawn(tour: Simulated, kind: OdometryKind, scale: float, seed: int) -> Recor
     if kind is OdometryKind.HEADING:
         made = made * [0.0, 0.0, 1.0]
     return recorded(tour, Track(tour.truth.times, made))
-
-
-def solver_input(recording: Recording, kind: OdometryKind) -> Tuple[List[Scan], MultiViewParameters]:
-    """Return scans and parameters as map_bag has them."""
-    sigma = echo_sigma([placed.beam for placed in recording.beams])
-    parameters = suited(with_odometry(ReplayParameters(), kind, ()), EchoShape.PEAK, (), sigma)
-    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
-    errors = parameters.part(OdometryErrors)
-    return scans, parameters.solver_parameters(errors, parameters.range_scale_deviation)
 
 
 def figures(scans: List[Scan], parameters: MultiViewParameters, sonar_in_base: np.ndarray, truth: Track) -> Figures:
@@ -92,7 +80,7 @@ def main() -> None:
         for kind, scale in _cases():
             for seed in range(arguments.seeds):
                 recording = drawn(tour, kind, scale, seed)
-                found = figures(*solver_input(recording, kind), recording.sonar_in_base, tour.truth)
+                found = figures(*solver_input(recording, kind, EchoShape.PEAK), recording.sonar_in_base, tour.truth)
                 what = kind.value.lower() + (f", true speed {1.0 + scale:g} of it" if scale else "")
                 print(f"{name}, {what}, seed {seed}: {_line(found)}", flush=True)
 

@@ -7,20 +7,18 @@ import argparse
 from pathlib import Path
 from typing import Tuple
 
-import numpy as np
-
-from benchmarks.twins.parameters import TWINS, TwinParameters
+from benchmarks.path_figures import PathFigures, figures_of
+from benchmarks.solver_input import solver_input
+from benchmarks.twins.parameters import TWINS
 from benchmarks.twins.recording import twin_of
+from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.path import live_path, solved_path
 from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.evaluation import position_error
-from mlsm_manager.offline.recording import Recording, scans_of
-from node_support.geometry.planar import inverse, transformed
+from mlsm_manager.offline.echo_shape import echo_shape_of
+from mlsm_manager.offline.evaluation import positions_at
+from mlsm_manager.offline.recording import Recording
 from recordings.reading.reader import Request
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters, ExtractionMode
 
 
 def main() -> None:
@@ -31,28 +29,18 @@ def main() -> None:
     arguments = parser.parse_args()
     source = read_recording(arguments.bag, Request())
     for name in arguments.twins:
-        for path, error in zip(("live", "batch"), errors(twin_of(source, TWINS[name]), TWINS[name])):
-            print(f"{name}, {path}: {error.mean:.2f} m in the mean, {error.max:.2f} m at most")
+        for path, found in zip(("live", "batch"), figures(twin_of(source, TWINS[name]))):
+            print(f"{name}, {path}: {found.line()}", flush=True)
 
 
-def errors(twin: Recording, conditions: TwinParameters) -> Tuple:
-    """Return the position errors of the live and of the batch path."""
-    mode = ExtractionMode.DENSE if conditions.binary else ExtractionMode.MATCHED_FILTER
-    parameters = MultiViewParameters()
-    solver = LiveSolver(parameters, sonar_in_base(twin))
-    for scan, _ in scans_of(twin, EchoExtractorParameters(mode=mode, spacing=1.0)):
+def figures(twin: Recording) -> Tuple[PathFigures, PathFigures]:
+    """Return how far the live and the batch path are from the truth."""
+    scans, parameters = solver_input(twin, OdometryKind.DVL, echo_shape_of([placed.beam for placed in twin.beams]))
+    solver = LiveSolver(parameters, twin.sonar_in_base)
+    for scan in scans:
         solver.add(scan)
-    batch, times = solved(solver), twin.track.times
-    known = live_path(twin.track, solver.estimates, solver.odometry, parameters.window.lookahead, times)
-    fitted = solved_path(twin.track, solver.odometry, batch.node_times, batch.state.nodes, times)
-    return tuple(position_error(times, path[:, :2], twin.truth) for path in (known, fitted))
-
-
-def sonar_in_base(recording: Recording) -> np.ndarray:
-    """Return where the sonar is in base_link (2,) [m]."""
-    first = recording.beams[0]
-    T_odom_base = recording.track.at(np.array([first.beam.stamp_ns * 1e-9]))
-    return transformed(inverse(T_odom_base), first.T_target_sonar[:2, 3][np.newaxis])[0]
+    truth = positions_at(twin.truth.times, twin.truth.positions, solver.log.node_times)
+    return figures_of(solver, solved(solver), truth)
 
 
 if __name__ == "__main__":

@@ -52,6 +52,8 @@ class TwinParameters:
 
 
 TWINS = {
+    "as_recorded": TwinParameters(1),
+    "mounted_aslant": TwinParameters(3, direction=0.1745),
     "mirrored": TwinParameters(11, PathForm.MIRRORED, 0.7, direction=0.1745, scale=-0.012, delay=0.9),
     "reversed": TwinParameters(12, PathForm.REVERSED, 2.1, direction=-0.14, range_scale=0.03, delay=-0.3),
     "end_first": TwinParameters(13, PathForm.END_FIRST, -1.3, direction=0.05, scale=0.015, range_scale=-0.02),

@@ -11,7 +11,7 @@ from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.dvl_factors import DIRECTION, DvlFactors
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration
 from mlsm_manager.multi_view.path import live_path, solved_path
 from mlsm_manager.multi_view.state import DELAY
 from node_support.errors import RefusedInput
@@ -88,6 +88,12 @@ def test_the_frozen_map_s_own_error_counts(made):
 def test_the_frozen_map_s_own_error_counts_in_the_calibration_too(made):
     newest = followed(made.scans, SHORT_WINDOW).estimates[-1]
     assert (newest.run_deviations > 1.001 * np.sqrt(np.diag(newest.own_covariance)[-2:])).all()
+
+
+def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(made):
+    wrong = SonarCalibration(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1)
+    solver = followed(made.scans, MultiViewParameters(sonar=wrong, window=SolverWindow(free_nodes=4)))
+    assert solver.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.3)
 
 
 def test_the_same_scans_give_the_same_bytes(made, live, batch):
