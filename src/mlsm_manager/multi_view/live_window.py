@@ -10,6 +10,7 @@ from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.multi_view.odometry_model import OdometryModel, frozen_deviations
@@ -57,6 +58,19 @@ class LiveWindow:
         self._comparisons = 0
         self._lists: Optional[Tuple[NeighbourLists, NeighbourLists]] = None
         self._met = ()
+        self._lone = LoneComparisons(log, odometry, parameters.matching, self._lone_rows())
+
+    def _lone_rows(self) -> np.ndarray:
+        blocks, last = self._frozen.numbers, self._layout.last
+        return np.unique(
+            np.concatenate(
+                [
+                    np.empty(0, dtype=np.int64),
+                    *(self._log.lone.rows(n * self._scans_per_block, (n + 1) * self._scans_per_block) for n in blocks),
+                    self._log.lone.rows(self._recent, last),
+                ]
+            )
+        )
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
@@ -79,6 +93,7 @@ class LiveWindow:
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)
         self._comparisons = self._add_surfaces(equations, cut)
+        self._comparisons += self._lone.add(equations, self._layout, self._state, cut)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
 
