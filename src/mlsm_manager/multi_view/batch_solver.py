@@ -113,8 +113,8 @@ class _Batch:
         self._solution = None
         self._move = np.zeros(self._layout.size)
         self._lists: Optional[NeighbourLists] = None
-        rows = log.lone.rows(0, log.scan_count)
-        self._lone = LoneComparisons(log, odometry, parameters.matching, rows)
+        scans = np.arange(log.scan_count)
+        self._lone = LoneComparisons(log, odometry, parameters.matching, scans, np.ones(len(scans)))
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""

@@ -58,19 +58,15 @@ class LiveWindow:
         self._comparisons = 0
         self._lists: Optional[Tuple[NeighbourLists, NeighbourLists]] = None
         self._met = ()
-        self._lone = LoneComparisons(log, odometry, parameters.matching, self._lone_rows())
+        self._lone = self._lone_comparisons()
 
-    def _lone_rows(self) -> np.ndarray:
-        blocks, last = self._frozen.numbers, self._layout.last
-        return np.unique(
-            np.concatenate(
-                [
-                    np.empty(0, dtype=np.int64),
-                    *(self._log.lone.rows(n * self._scans_per_block, (n + 1) * self._scans_per_block) for n in blocks),
-                    self._log.lone.rows(self._recent, last),
-                ]
-            )
-        )
+    def _lone_comparisons(self) -> LoneComparisons:
+        """Return those with the frozen blocks and with the scans since."""
+        blocks = self._frozen.numbers[:, np.newaxis] * self._scans_per_block + np.arange(self._scans_per_block)
+        recent = np.arange(self._recent, self._layout.last)
+        importance = np.repeat(self._frozen.block_importance, self._scans_per_block)
+        scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
+        return LoneComparisons(self._log, self._odometry, self._parameters.matching, scans, importance)
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""

@@ -1,7 +1,7 @@
 """Compares echoes that stand alone with those of other scans, along the line of sight and across it."""
 
 from dataclasses import replace
-from typing import Iterator, Tuple
+from typing import Iterator, Optional, Tuple
 
 import numpy as np
 
@@ -22,24 +22,29 @@ _FADING = 0.8  # share of the cut from which on a pair fades out, so that none a
 class LoneComparisons:
     """Comparisons of lone points of free scans with those of all others in view."""
 
-    def __init__(self, log: RunLog, odometry: OdometryModel, matching: SurfaceMatching, rows: np.ndarray) -> None:
-        """rows: (n,) of the log's lone points that are in view, ascending."""
-        self._log, self._odometry, self._rows = log, odometry, rows
+    def __init__(
+        self, log: RunLog, odometry: OdometryModel, matching: SurfaceMatching, scans: np.ndarray, importance: np.ndarray
+    ) -> None:
+        """scans: (s,) those in view, ascending. importance: (s,) factors of what is compared with them."""
+        self._log, self._odometry = log, odometry
+        rows = [log.lone.rows(scan, scan + 1) for scan in scans]
+        self._rows = np.concatenate([np.empty(0, dtype=np.int64), *rows])
+        self._importance = matching.lone_quality * np.repeat(importance, [len(own) for own in rows])
         self._matching = replace(matching, normal_deviation=0.0)
-        self._lists = None
+        self._lists: Optional[NeighbourLists] = None
 
     def add(self, equations: NormalEquations, layout: Layout, state: State, cut: float) -> int:
         """Add the comparisons of points of free scans; return how many there are."""
-        certainty = self._matching.lone_quality
-        if not len(self._rows) or not certainty:
+        if not self._importance.any():
             return 0
         points = place_lone(self._log, self._odometry, state, self._rows)
         sources = points.selected(points.scans >= layout.first)
         if self._lists is None:
             self._lists = NeighbourLists(points, self._matching.block_scans)
         pairs, count = lone_pairs(self._lists, sources, points, cut), 0
+        importance = self._importance[pairs.neighbours]
         for each, heard, met in along_and_across(pairs, sources, points):
-            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut, certainty)
+            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut, importance)
         return count
 
 

@@ -7,8 +7,8 @@ import numpy as np
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.path import NodePath
 from mlsm_manager.multi_view.run_log import RunLog
-from mlsm_manager.multi_view.surface_points import SurfacePoints
 from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE, YAW, State
+from mlsm_manager.multi_view.surface_points import SurfacePoints
 from node_support.geometry.planar import rotated
 
 _HALF_SECOND = 0.5  # s: the velocity of a point is averaged over one second, longer than the odometry's period

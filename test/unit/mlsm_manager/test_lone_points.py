@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_posts import POSTS, SPEED, heard, true_path
+from made_posts import SPEED, heard, true_path
 
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
