@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, Prior, prior_of
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
@@ -38,6 +38,12 @@ def belief_of_match(scan: Scan, result: MatchResult, errors: OdometryErrors) -> 
     belief = belief_at(scan.reference_time, result.pose, errors)
     belief.covariance[POSE, POSE] = result.covariance[POSE, POSE]
     return belief
+
+
+def prior_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Prior:
+    """Return a prior where `correction` T_map_odom (3,) puts the end of a scan, as sure as `expected`."""
+    theta = np.concatenate([composed(correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
+    return prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
 
 
 def correction_of(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:

@@ -1,8 +1,7 @@
 """The joint solver as a ScanMapper: scans in, a map drawn from keyframes and the vehicle's place in it out."""
 
-from collections import deque
 from time import perf_counter
-from typing import Deque, List, Mapping, Optional
+from typing import List, Mapping, Optional
 
 import numpy as np
 
@@ -14,33 +13,30 @@ from mlsm_manager.localisation.joint_belief import (
     correction_of,
     match_of,
     path_times,
+    prior_at,
 )
+from mlsm_manager.localisation.joint_clouds import JointClouds
 from mlsm_manager.localisation.joint_maps import JointMaps
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
-from mlsm_manager.localisation.keyframe_map import Drawn
 from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
-from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of
+from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import POSE
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.state import POSE_COLUMNS
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed, transformed
 
-# Scans of a run that are stored with each save: some hours, and some tens of megabytes.
-_MOST_STORED = 500
 _ORIGIN = np.zeros(3)
 
 
@@ -79,11 +75,10 @@ class JointMapper(ShowsMaps):
         self._end_session()
         self.belief: Optional[Belief] = None
         self._expected: Optional[Belief] = None
-        self._found_at = -np.inf
         self.correction = _ORIGIN
         self._start: Optional[np.ndarray] = None
         self._history = CorrectionHistory()
-        self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
+        self._clouds = JointClouds(self._maps.shown)
 
     @property
     def lookahead(self) -> float:
@@ -118,10 +113,7 @@ class JointMapper(ShowsMaps):
     @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
         """What `restore` needs to go on with the present run, as arrays; none without a run or after a long one."""
-        session = self._session
-        if session is None or len(session.scans) > _MOST_STORED:
-            return {}
-        return self._maps.stored(session).arrays()
+        return {} if self._session is None else self._maps.stored(self._session)
 
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
         """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
@@ -135,26 +127,19 @@ class JointMapper(ShowsMaps):
         if run is None:
             return ""
         try:
-            self._resume_run(run)
-        except KeyError as error:
-            self._take(layers)
-            return f"no {error} is stored"
-        except (RefusedInput, ValueError) as error:
+            session = self._maps.resumed(run, self.parameters)
+        except ValueError as error:
             self._take(layers)
             return str(error)
+        self._session = session
+        self._know(run.scans[-1], session)
         return ""
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
         maps = JointMaps.of_layers(self.settings, layers)
-        self.forget_place()
+        self._end_session()
         self._maps = maps
-
-    def _resume_run(self, run: StoredRun) -> None:
-        """Go on with a stored run in the maps that were stored with it."""
-        session = JointSession.resumed(self.parameters, run.sonar_in_base, run.T_map_odom, run.scans, run.solver)
-        self._maps.resume(run, session)
-        self._session = session
-        self._know(run.scans[-1], session)
+        self.forget_place()
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
         """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
@@ -177,9 +162,7 @@ class JointMapper(ShowsMaps):
         if longer is not None:
             self._expected = None
             return self._taken(scan, longer, start)
-        theta = np.concatenate([composed(self.correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
-        prior = prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
-        result = self.matcher.match(scan, self._matched_map, prior)
+        result = self.matcher.match(scan, self._matched_map, prior_at(self.correction, scan, expected))
         if not result.accepted:
             return ScanUpdate(scan, result, False, self.belief)
         if self._session is None:
@@ -191,45 +174,28 @@ class JointMapper(ShowsMaps):
         """Begin a new run at a pose that was found elsewhere, in the map as it is."""
         self._end_session()
         self._expected = None
-        self._found_at = scan.start
+        self._clouds.found(scan.start)
         self.correction = result.correction(scan)
         self._start = np.sqrt(np.diag(result.covariance)[POSE])
         self.belief = belief_of_match(scan, result, self.errors)
         return ScanUpdate(scan, result, True, self.belief)
 
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
-        """Put a cloud into the map that is shown, or let it wait for the scan of its time.
-
-        One from before the place was found is left out: nobody knows how far the odometry strayed until then.
-        """
-        if not self.matching:
-            return self._show(cloud, self.correction, self._history.origins(cloud.times, self._sonar_in_base))
-        if cloud.end <= self._found_at:
-            return CloudUpdate(NOTHING_INSERTED, False, len(cloud))
-        if self._session is not None and cloud.end <= self._session.start:
-            return self._show(cloud, self._session.T_map_odom, None)
-        if self._session is None or cloud.end > self._session.solver.log.node_times[-1]:
-            self._waiting.append(cloud)
-            return CloudUpdate(NOTHING_INSERTED, True, 0)
-        self._maps.shown.add(cloud)
-        return _cloud_update(self._maps.shown.draw(self._session, self._session.settled_until))
+        """Put a cloud into the map that is shown, or let it wait for the scan of its time; see JointClouds."""
+        if self.matching:
+            return self._clouds.take(cloud, self._session)
+        origins = self._history.origins(cloud.times, self._sonar_in_base)
+        return self._clouds.place(cloud, self.correction, origins)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""
         return CloudUpdate(self._maps.shown.insert(points), False, 0)
 
-    def _show(self, cloud: TimedPoints, T_map_odom: np.ndarray, origins: Optional[np.ndarray]) -> CloudUpdate:
-        points = transformed(T_map_odom, cloud.points)
-        return _cloud_update(self._maps.shown.insert_cloud(points, cloud.times, origins))
-
     def take_waiting(self) -> Optional[CloudUpdate]:
         """Insert the next cloud that waited, if its time is known now; None when there is none."""
-        if not self._waiting:
-            return None
-        known = -np.inf if self._session is None else self._session.solver.log.node_times[-1]
-        if self.matching and self._waiting[0].end > known:
-            return None
-        return self.take_cloud(self._waiting.popleft())
+        known_until = -np.inf if self._session is None else self._session.known_until
+        cloud = self._clouds.next_until(known_until if self.matching else np.inf)
+        return None if cloud is None else self.take_cloud(cloud)
 
     def follow(self, track: Track, time: float) -> None:
         """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
@@ -281,7 +247,3 @@ class JointMapper(ShowsMaps):
             self._maps.settle(self._session)
         self._session = None
         self._start = None
-
-
-def _cloud_update(drawn: Drawn) -> CloudUpdate:
-    return CloudUpdate(drawn.report, False, 0, drawn.carved)

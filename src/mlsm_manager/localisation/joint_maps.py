@@ -1,14 +1,20 @@
 """The two maps of a joint run, drawn from its keyframes."""
 
-from typing import Mapping
+from typing import Dict, Mapping
+
+import numpy as np
 
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
+
+_MOST_STORED = 500
+"""Scans of a run that are stored with each save: some hours, and some tens of megabytes."""
 
 
 class JointMaps:
@@ -35,15 +41,24 @@ class JointMaps:
             maps.shown.free.restore(layers[Layer.FREE])
         return maps
 
-    def stored(self, session: JointSession) -> StoredRun:
-        """Return the run with what the maps hold of it."""
+    def stored(self, session: JointSession) -> Dict[str, np.ndarray]:
+        """Return the run with what the maps hold of it, as arrays to be stored; nothing after a long run."""
+        if len(session.scans) > _MOST_STORED:
+            return {}
         return StoredRun(
             session.T_map_odom, session.solver.log.sonar_in_base, session.scans, session.solver.stored(),
             self.shown.moving, self.shown.covered, self.matched.covered,
-        )  # fmt: skip
+        ).arrays()  # fmt: skip
 
-    def resume(self, run: StoredRun, session: JointSession) -> None:
-        """Draw a stored run, which goes on as `session`, in the maps that were stored with it."""
+    def resumed(self, run: StoredRun, parameters: MultiViewParameters) -> JointSession:
+        """Return a stored run that goes on, and draw it in these maps, which were stored with it.
+
+        Raises ValueError, with some of it drawn already, for a run whose parts do not belong together.
+        """
+        try:
+            session = JointSession.resumed(parameters, run.sonar_in_base, run.T_map_odom, run.scans, run.solver)
+        except KeyError as error:
+            raise ValueError(f"no {error} is stored") from None
         run.shown.uncover(self.shown.map)
         run.matched.uncover(self.matched.map)
         for scan in run.scans:
@@ -53,6 +68,7 @@ class JointMaps:
             self.shown.add(cloud)
         self.shown.draw(session, session.settled_until)
         self.matched.draw(session, session.settled_until)
+        return session
 
     def settle(self, session: JointSession) -> None:
         """Draw all keyframes of a run for the last time."""

@@ -109,6 +109,11 @@ class JointSession:
         return float(self.solver.log.node_times[0])
 
     @property
+    def known_until(self) -> float:
+        """Time [s] of the newest node."""
+        return float(self.solver.log.node_times[-1])
+
+    @property
     def settled_until(self) -> float:
         """Time [s] of the oldest node that may still move."""
         times = self.solver.log.node_times

@@ -23,6 +23,8 @@ def drawn(log: RunLog, odometry: OdometryModel, state: State, points: np.ndarray
 
 def corrected_path(log: RunLog, odometry: OdometryModel, state: State, times: np.ndarray) -> np.ndarray:
     """Return T_map_base (m, 3) at `times` (m,) [s]."""
-    first, last = np.searchsorted(log.node_times, [times.min(), times.max()]) if len(times) else (0, 0)
+    if not len(times):
+        return np.empty((0, 3))
+    first, last = np.searchsorted(log.node_times, [times.min(), times.max()])
     near = slice(max(min(first, len(log.node_times) - 1) - 1, 0), last + 1)
     return NodePath(odometry, log.odometry, log.node_times[near], state.nodes[near]).at(times)

@@ -123,6 +123,14 @@ def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(
     assert not goes_on or np.hypot(*(update.belief.theta[:2] - true_place[:2])) < 0.5
 
 
+def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(killed):
+    _, stored = killed
+    localiser = resumed(stored)
+    silent, heard = HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 2]
+    updates = taken(localiser, [sector_of(silent, beams=0), heard])
+    assert [update.accepted for update in updates] == [False, True]
+
+
 @pytest.mark.newest_only("dear; test_localiser relocalises with every version")
 @pytest.mark.parametrize("has_run", [True, False])
 def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, whole, has_run):

@@ -93,3 +93,12 @@ def test_a_scan_refuses_arrays_that_do_not_belong_together():
 def test_an_empty_scan_starts_at_its_reference_time():
     track = Track(np.array([0.0]), np.zeros((1, 3)))
     assert Scan.from_stamps(np.empty((0, 4)), np.empty(0), 7.0, track).start == 7.0
+
+
+def test_points_from_before_the_track_begins_are_left_out():
+    track = Track(np.array([2.0, 3.0, 4.0]), np.zeros((3, 3)))
+    points, times = np.arange(16.0).reshape(4, 4), np.array([1.0, 1.9, 2.0, 4.0])
+    scan = Scan(points, times, np.ones(4, dtype=bool), track, 4.0).with_odometry()
+    np.testing.assert_array_equal(scan.points, points[2:])
+    np.testing.assert_array_equal(scan.times, times[2:])
+    assert len(scan.moving) == 2

@@ -80,6 +80,13 @@ class Scan:
     def __len__(self) -> int:
         return len(self.points)
 
+    def with_odometry(self) -> "Scan":
+        """Return it without the points from before its track begins: where they were heard is not known."""
+        known = self.times >= self.track.times[0]
+        if known.all():
+            return self
+        return Scan(self.points[known], self.times[known], self.moving[known], self.track, self.reference_time)
+
     @property
     def start(self) -> float:
         """Time of the oldest point, s; the reference time when there is none."""
