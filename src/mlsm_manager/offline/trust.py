@@ -87,7 +87,10 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
         recent_agreement(ends, np.array([estimate.agreement for estimate in estimates])),
         told_deviation(deviations.times, deviations.radii),
         *surfaces_tell(
-            ends, np.array([estimate.surfaces for estimate in estimates]), solver.odometry.distance_deviation
+            float(solver.log.node_times[0]),
+            ends,
+            np.array([estimate.surfaces for estimate in estimates]),
+            solver.odometry.distance_deviation,
         ),
     ]
     found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
