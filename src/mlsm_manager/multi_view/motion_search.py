@@ -14,7 +14,7 @@ _REACH = 3.0  # standard deviations of the step within which is searched
 _KNOWN = 2.0  # so many within the cut, and the solver's own steps do
 _MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
 _CELL = 1.0  # m: about twice the deviation of an echo, so that no place falls between two cells
-_COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
+COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
 _MOST_POINTS = 150  # of the newest scan; neighbours on a wall say the same
 _LONE_NATS = 1.0  # that a point which stands alone is worth where another one stood: there are few
 _NATS = 0.1  # that a point on a surface is worth: neighbours share errors
@@ -34,7 +34,7 @@ def searched_node(
     if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut:
         return newest
     last = log.scan_count
-    before, own = log.rows(max(0, last - 1 - _COMPARED_SCANS), last - 1), log.rows(last - 1, last)
+    before, own = log.rows(max(0, last - 1 - COMPARED_SCANS), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
     sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
@@ -58,7 +58,7 @@ def _lone_fits(
     """Return how many of the newest scan's lone points (k,) lie on earlier ones at `shifts` (k, 2)."""
     last = log.scan_count
     sources = place_lone(log, odometry, state, log.lone.rows(last - 1, last))
-    targets = place_lone(log, odometry, state, log.lone.rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
+    targets = place_lone(log, odometry, state, log.lone.rows(max(0, last - 1 - COMPARED_SCANS), last - 1))
     if not len(sources) or not len(targets):
         return np.zeros(len(shifts))
     moved = _moved(sources, shifts)

@@ -21,8 +21,9 @@ def surfaces_tell(
 ) -> Tuple[Verdict, ...]:
     """Return a verdict on what some following scans together tell of the direction that they tell least of.
 
-    begin: s, of the run. times: (n,) s of the scans' ends. surfaces: (n, 2, 2) sums of the outer products of the normals that each scan met.
-    distance_deviation: relative one of the odometry's distances; there is no verdict where the odometry tells the way.
+    begin: s, of the run. times: (n,) s of the scans' ends. surfaces: (n, 2, 2) sums of the outer products of the
+    normals that each scan met. distance_deviation: relative one of the odometry's distances; there is no verdict where
+    the odometry tells the way.
     limit: least share of what they tell of the direction that they tell most of; normals err by 0.2 rad, which makes
     0.04 of a straight wall.
     """
