@@ -12,11 +12,12 @@ _LIES = 0.5  # share of a scan's points on surfaces heard before, from which on 
 _SCANS = 20  # as many as the check of agreement looks at
 
 
-def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.75) -> Verdict:
+def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.9) -> Verdict:
     """Return which share of any 20 following scans lies on what was heard before, at least.
 
     times: (n,) s of the scans' ends. shares: (n,) of each scan's points that lie on surfaces heard before; NaN for a
-    scan without any. Where the path is right, hardly a scan has less than half of its points there.
+    scan without any. Where the path is right, hardly a scan has less than half of its points there. One or two may, as
+    a vehicle that comes around a corner hears new water.
     """
     known = np.isfinite(shares)
     times, lies = np.asarray(times)[known], np.asarray(shares)[known] >= _LIES
