@@ -16,6 +16,8 @@ from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import Layout, State
 from mlsm_manager.multi_view.surface_points import ramp
 
+_NEAR_IN_TIME = 5  # scans before and after, a minute, in which a vehicle passes a post
+_CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by chance, to something that stays
 _FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
 
 
@@ -49,9 +51,16 @@ class LoneComparisons:
 
 
 def lone_pairs(lists: NeighbourLists, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`."""
+    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
+
+    A point counts if several of the scans around its own heard one there too. Clutter meets clutter by chance, and
+    would say that nothing moves.
+    """
     rows, neighbours, distance, shares = lists.within(sources, targets, cut)
-    importance = shares * ramp(distance, cut, _FADING * cut) * sources.qualities[rows] * targets.qualities[neighbours]
+    met = shares * ramp(distance, cut, _FADING * cut) * targets.qualities[neighbours]
+    near = np.abs(sources.scans[rows] - targets.scans[neighbours]) <= _NEAR_IN_TIME
+    confirmed = ramp(np.bincount(rows, met * near, len(sources)), *_CONFIRMED)
+    importance = met * sources.qualities[rows] * confirmed[rows]
     kept = importance > 0.0
     return Pairs(rows[kept], neighbours[kept], importance[kept])
 

@@ -111,3 +111,23 @@ def test_the_told_deviation_is_smaller_where_posts_tell_the_way(scans):
 
 def test_speed_is_found_from_posts(scans):
     assert solver_of(scans, lone_quality=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
+
+
+def test_clutter_is_not_compared(scans):
+    """Single echoes that no other scan hears say nothing of the way, though some meet others by chance."""
+    rng = np.random.RandomState(1)
+    cluttered = heard(TURNS, posts=np.array([[-500.0, 0.0]]))
+    cluttered = [with_clutter(scan, rng) for scan in cluttered]
+    without, clutter = (solver_of(cluttered, quality).estimates[-1].pose_covariance[0, 0] for quality in (0.0, 1.0))
+    assert clutter > 0.5 * without
+
+
+def with_clutter(scan, rng, count=10):
+    """Return a scan with single strong echoes beyond the walls."""
+    places = rng.uniform([-25.0, 14.0], [25.0, 40.0], (count, 2))
+    places[:, 0] += SPEED * scan.reference_time
+    arms = places - true_path([scan.reference_time])
+    points = np.column_stack([arms, np.zeros(count), np.full(count, STRONG)])
+    times = np.append(scan.times, np.full(count, scan.reference_time))
+    moving = np.ones(len(times), dtype=bool)
+    return Scan(np.vstack([scan.points, points]), times, moving, scan.track, scan.reference_time)
