@@ -6,6 +6,7 @@ from typing import Callable, Dict, List
 
 from benchmarks import (
     carving_figures,
+    compiled_chain,
     compiled_threshold,
     growth_figures,
     large_map_figures,
@@ -30,6 +31,7 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "carving": carving_figures.rows,
     "marina": marina_figures.rows,
     "matching": matching_figures.rows,
+    "chain": compiled_chain.rows,
     "others": lambda: compiled_threshold.rows() + other_libraries.rows() + other_registrations.rows(),
     "processing": processing_figures.rows,
     "simulation": simulation_figures.rows,

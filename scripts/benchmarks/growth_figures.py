@@ -1,15 +1,21 @@
-"""How time and memory grow with the size of the map and of the scan: slopes of straight lines through log-log plots.
+"""How time and memory grow with the size of the map and of the scan and with the length of the run: slopes of straight
+lines through log-log plots.
 
 A slope of 0 means that size does not matter, 1 that twice the size costs twice as much.
 """
 
+import resource
 import time
+from pathlib import Path
 from typing import Callable, List, Sequence
 
 import numpy as np
 
+from benchmarks.long_run import tour_scans
 from benchmarks.map_figures import RESOLUTION, grown_map, scan
 from benchmarks.table import Row, median_seconds
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
@@ -17,6 +23,8 @@ from sonar_processing.filters.threshold import Thresholder, ThresholderParameter
 
 MAP_BLOCKS = (10_000, 30_000, 100_000, 300_000, 1_000_000)
 SCAN_POINTS = (2_000, 6_000, 20_000, 60_000)
+RUN_SCANS = (75, 150, 300)
+RUN_AVERAGED = 25  # scans before each of these: those of one round of the tour
 INSERTED = 20_000
 REPEATS = 7
 
@@ -24,6 +32,27 @@ REPEATS = 7
 def slope(sizes: Sequence[float], costs: Sequence[float]) -> float:
     """Return the slope of log cost over log size."""
     return float(np.polyfit(np.log(sizes), np.log(costs), 1)[0])
+
+
+def run_rows() -> List[Row]:
+    """Measure what a scan costs the live joint solver, and the memory of the process, against the scans before it."""
+    solver = LiveSolver(MultiViewParameters(), np.zeros(2))
+    seconds: List[float] = []
+    before, grown = _resident_bytes(), []
+    for number, new in enumerate(tour_scans(RUN_SCANS[-1]), start=1):
+        seconds.append(median_seconds(lambda s=new: solver.add(s), 1, time.process_time))
+        if number in RUN_SCANS:
+            grown.append(_resident_bytes() - before)
+    costs = [float(np.median(seconds[number - RUN_AVERAGED : number])) for number in RUN_SCANS]
+    return [
+        _row("a scan's time in the joint solver against scans in the run", RUN_SCANS, costs, "s", "about 0"),
+        _row("memory of the joint solver against scans in the run", RUN_SCANS, grown, "bytes", "at most 1"),
+    ]
+
+
+def _resident_bytes() -> int:
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize()
 
 
 def map_rows() -> List[Row]:
@@ -71,4 +100,5 @@ def _row(what: str, sizes: Sequence[float], costs: Sequence[float], unit: str, w
 
 def rows() -> List[Row]:
     """Return all slopes."""
-    return map_rows() + scan_rows()
+    # The run first: it is measured by the memory of the process, which the large maps leave free afterwards.
+    return run_rows() + map_rows() + scan_rows()

@@ -20,6 +20,7 @@ from benchmarks.twins.parameters import TwinParameters
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.odometry_motion import as_complex
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.offline.echo_length import echo_sigma
@@ -95,7 +96,9 @@ def recorded(tour: Simulated, odometry: Track) -> Recording:
 
 
 def figures(recording: Recording, truth: Track) -> np.ndarray:
-    """Return (2, 3) of the live and of the batch solver: mean error [m], NEES per state, median deviation [m]."""
+    """Return (2, 4) of the live and of the batch solver: mean error [m], the same once the path is shifted, turned and
+    scaled to fit best, NEES per state, median told deviation [m].
+    """
     solver = LiveSolver(MultiViewParameters(), recording.sonar_in_base)
     for scan in _scans(recording):
         solver.add(scan)
@@ -117,11 +120,18 @@ def _head_step(recording: Recording) -> float:
     return float(np.median(np.abs(wrapped(np.diff([placed.beam.angle for placed in recording.beams])))))
 
 
-def _judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> Tuple[float, float, float]:
+def _judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> Tuple[float, float, float, float]:
     error, covariances = (path - truth)[:, :2], covariances[:, :2, :2]
     squared = np.einsum("na,na->n", error, np.linalg.solve(covariances, error[..., np.newaxis])[..., 0])
     deviation = np.sqrt(np.trace(covariances, axis1=1, axis2=2))
-    return float(np.hypot(*error.T).mean()), float(squared.mean() / 2.0), float(np.median(deviation))
+    shape = _shape_error(path[:, :2], truth[:, :2])
+    return float(np.hypot(*error.T).mean()), shape, float(squared.mean() / 2.0), float(np.median(deviation))
+
+
+def _shape_error(path: np.ndarray, truth: np.ndarray) -> float:
+    """Return the mean distance [m] of a path (n, 2) from the truth, shifted, turned and scaled to fit best."""
+    own, true = (as_complex(places - places.mean(axis=0)) for places in (path, truth))
+    return float(np.abs(true - np.vdot(own, true) / np.vdot(own, own) * own).mean())
 
 
 def main() -> None:
@@ -134,12 +144,15 @@ def main() -> None:
         for kind in KINDS:
             setup = tour_setup(world, "tour", kind)
             made = recordings(setup, arguments.draws)
-            known, unknown = bounds(_scans(made[0][0]), made[0][1], setup.world, _head_step(made[0][0]))
-            print(f"{world}, {kind}: bound {known:.3f} m with the map known, {unknown:.3f} m without", flush=True)
+            least = bounds(_scans(made[0][0]), made[0][1], setup.world, _head_step(made[0][0]))
+            print(
+                f"{world}, {kind}: bound {least.known:.2f} m with the map known, {least.unknown:.2f} m without, "
+                f"{least.shape:.2f} m for the path's shape", flush=True,
+            )  # fmt: skip
             live, batch = np.mean([figures(*one) for one in made], axis=0)
             print("    " + "; ".join(
-                f"{name} {error:.2f} m, NEES per state {nees:.2f}, deviation {deviation:.2f} m"
-                for name, (error, nees, deviation) in (("live", live), ("batch", batch))
+                f"{name} {error:.2f} m, shape {shape:.2f} m, NEES per state {nees:.2f}, deviation {deviation:.2f} m"
+                for name, (error, shape, nees, deviation) in (("live", live), ("batch", batch))
             ), flush=True)  # fmt: skip
 
 

@@ -1,14 +1,21 @@
 """Several ways to do the same, timed in turn so that all of them see the same machine."""
 
 import time
+from importlib.util import find_spec
 from typing import Callable, Dict, List
 
 import numpy as np
 
 from benchmarks.table import Row
+from node_support.kernels import Kernel
 
 OURS = "ours"
 _EVEN = 0.05  # Ratios as near to 1 as this are no difference on a machine that others use too
+
+
+def kernels() -> List[Kernel]:
+    """Return the kernels that can be measured: without numba only NUMPY."""
+    return [kernel for kernel in Kernel if kernel is Kernel.NUMPY or find_spec("numba") is not None]
 
 
 def seconds_in_turn(calls: Dict[str, Callable[[], object]], repeats: int) -> Dict[str, np.ndarray]:

@@ -1,11 +1,12 @@
 """How far off a path must be at least, whatever solver finds it: the Cramer-Rao bound of a simulated tour.
 
 Each echo tells the distance of a surface along its normal, and of a post in both directions, as well as the echoes of
-the tour are right. The odometry tells what a DVL and a compass do. Which surface was heard is taken as known.
+the tour are right. The odometry tells what a DVL and a compass do; scale of ranges and delay of beams are unknown as
+they are to the solver. Which surface was heard is taken as known.
 """
 
 from dataclasses import dataclass
-from typing import Sequence, Tuple
+from typing import Sequence
 
 import numpy as np
 
@@ -15,8 +16,9 @@ from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
-from mlsm_manager.multi_view.priors import add_belief
-from mlsm_manager.multi_view.state import POSE_COLUMNS, Layout
+from mlsm_manager.multi_view.parameters import SonarCalibration
+from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
+from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS, Layout
 from mlsm_manager.multi_view.surface_points import points_per_echo
 from node_support.geometry.planar import inverse, transformed
 from sonar_simulator.world.world import World
@@ -28,6 +30,8 @@ _POST = 0.6  # m: greatest radius of what is heard as one echo and can be met fr
 _STEP = 0.05  # m for derivatives of distances
 _BACK = 0.3  # m from the surface towards the sonar at which they are taken, beyond where distances bend
 _SHAPE_DEVIATION = 10.0  # m, rad: of a shape of which nothing is known
+_HELD = 1e-6  # m, rad: of one that is known
+_HALF_SECOND = 0.5  # s: the velocity of a beam is averaged over one second
 
 
 @dataclass(frozen=True)
@@ -65,63 +69,141 @@ def echoes_of(scans: Sequence[Scan], truth: Track, world: World) -> Echoes:
     return Echoes(scan, nearest_shape(world, points), points, arms, times, weights, distances(world, points))
 
 
-def bounds(scans: Sequence[Scan], truth: Track, world: World, head_step: float) -> Tuple[float, float]:
-    """Return the median deviations [m] of the path at the scans' ends: with the map known beforehand, and without.
+@dataclass(frozen=True)
+class Bounds:
+    """Deviations [m] of the path at the scans' ends, medians along the tour.
 
-    head_step: rad between beams; an echo may be anywhere within.
+    known: with the map known beforehand. unknown: without. shape: without, of the path once it is shifted, turned and
+    scaled to where it fits best: only a compass, an odometry and a speed of sound that are right tell these.
     """
-    echoes = echoes_of(scans, truth, world)
+
+    known: float
+    unknown: float
+    shape: float
+
+
+def bounds(scans: Sequence[Scan], truth: Track, world: World, head_step: float) -> Bounds:
+    """Return how far off the path must be. head_step: rad between beams; an echo may be anywhere within."""
     ends = np.array([scan.reference_time for scan in scans])
     times = np.append(min(scans[0].start, ends[0] - 1.0), ends)
-    return (
-        _bound(echoes, times, truth, world, head_step, shape_deviation=1e-6),
-        _bound(echoes, times, truth, world, head_step, shape_deviation=_SHAPE_DEVIATION),
+    heard = Heard.of(echoes_of(scans, truth, world), times, truth, world, head_step)
+    unknown = _covariance(heard, times, truth, _SHAPE_DEVIATION)
+    return Bounds(
+        known=_median_deviation(_covariance(heard, times, truth, _HELD)),
+        unknown=_median_deviation(unknown),
+        shape=_median_deviation(_of_shape(unknown, truth.at(times)[1:, :2])),
     )
 
 
-def _bound(
-    echoes: Echoes, times: np.ndarray, truth: Track, world: World, head_step: float, shape_deviation: float
-) -> float:
-    odometry = DvlFactors(DvlOdometry())
+@dataclass(frozen=True)
+class Heard:
+    """What n echoes tell of the unknowns: distances along `directions` (n, 2), each with its weight (n,) [1/m^2].
+
+    scans, shapes, shares, weights: (n,). levers, sights, centred: (n, 2) m, by which the nodes' yaw, the range scale
+    and the shape's yaw move a point. velocities: (n, 2) m/s, by which the delay does. shape_count: of the world.
+    """
+
+    scans: np.ndarray
+    shapes: np.ndarray
+    shares: np.ndarray
+    weights: np.ndarray
+    directions: np.ndarray
+    levers: np.ndarray
+    sights: np.ndarray
+    centred: np.ndarray
+    velocities: np.ndarray
+    shape_count: int
+
+    @classmethod
+    def of(cls, echoes: Echoes, times: np.ndarray, truth: Track, world: World, head_step: float) -> "Heard":
+        """times: (m,) s of the nodes. Echoes of posts are met in two directions, along and across the sight."""
+        near = np.flatnonzero(echoes.distances < min(_INLIER * echoes.deviation, _HEARD))
+        posts = np.array([shape.kind != "box" and shape.size[0] <= _POST for shape in world.shapes])
+        arms = echoes.arms[near]
+        sight = arms / np.maximum(np.hypot(*arms.T), 1e-9)[:, np.newaxis]
+        across = np.column_stack([-sight[:, 1], sight[:, 0]])
+        of_post = posts[echoes.shapes[near]]
+        normals = np.where(of_post[:, np.newaxis], sight, _normals(world, echoes.points[near], sight))
+        kept = np.concatenate([np.arange(len(near)), np.flatnonzero(of_post)])
+        rows, directions = near[kept], np.concatenate([normals, across[of_post]])
+        slants = np.abs(np.einsum("na,na->n", directions, across[kept])) * np.hypot(*arms[kept].T)
+        variances = echoes.deviation**2 + (head_step / np.sqrt(12.0) * slants) ** 2
+        scans, points = echoes.scans[rows], echoes.points[rows, :2]
+        shares = (echoes.times[rows] - times[scans]) / np.diff(times)[scans]
+        centers = np.array([shape.pose[:2, 3] for shape in world.shapes])[echoes.shapes[rows]]
+        return cls(
+            scans=scans, shapes=echoes.shapes[rows], shares=shares, weights=echoes.weights[rows] / variances,
+            directions=directions, levers=points - on_chords(truth.at(times)[:, :2], scans, shares),
+            sights=arms[kept], centred=points - centers,
+            velocities=_beam_velocities(truth, echoes.times[rows], arms[kept]), shape_count=len(world.shapes),
+        )  # fmt: skip
+
+    def add_to(self, equations: NormalEquations, layout: Layout) -> None:
+        """Add what the echoes tell; the shapes' unknowns (x, y, yaw) stand after those of the run."""
+        by_pose = np.column_stack([self.directions, _lever(self.levers, self.directions)])
+        by_shape = -np.column_stack([self.directions, _lever(self.centred, self.directions)])
+        by_run = np.column_stack(
+            [np.einsum("na,na->n", some, self.directions) for some in (self.sights, self.velocities)]
+        )
+        share = self.shares[:, np.newaxis]
+        columns = np.column_stack(
+            [
+                layout.pose_columns(self.scans),
+                layout.pose_columns(self.scans + 1),
+                np.broadcast_to(layout.run_start + np.arange(RUN_COLUMNS), (len(self.scans), RUN_COLUMNS)),
+                layout.size + POSE_COLUMNS * self.shapes[:, np.newaxis] + np.arange(POSE_COLUMNS),
+            ]
+        )
+        jacobian = np.column_stack([(1.0 - share) * by_pose, share * by_pose, by_run, by_shape])
+        equations.add(columns, jacobian, np.zeros(len(self.scans)), self.weights)
+
+
+def _covariance(heard: Heard, times: np.ndarray, truth: Track, shape_deviation: float) -> np.ndarray:
+    """Return (2 n, 2 n) [m^2] of the places at all `times` but the first."""
+    odometry, sonar = DvlFactors(DvlOdometry()), SonarCalibration()
     layout = Layout(0, len(times) - 1, odometry.width)
-    size = layout.run_start + POSE_COLUMNS * len(world.shapes)
-    equations = NormalEquations(size)
+    shapes = POSE_COLUMNS * heard.shape_count
+    equations = NormalEquations(layout.size + shapes)
     nodes = np.zeros((len(times), odometry.width))
-    timeline = OdometryTimeline.of(truth)
     add_belief(equations, 0, nodes[0], nodes[0], odometry.first_deviations())
-    odometry.add_steps(equations, layout, nodes, timeline.motion(times))
-    shapes = size - layout.run_start
-    add_belief(equations, layout.run_start, np.zeros(shapes), np.zeros(shapes), np.full(shapes, shape_deviation))
-    _add_echoes(equations, layout, echoes, times, world, head_step)
-    solution = solution_of(equations)
+    odometry.add_steps(equations, layout, nodes, OdometryTimeline.of(truth).motion(times))
+    add_belief(equations, layout.run_start, run_mean(sonar), run_mean(sonar), run_deviations(sonar))
+    add_belief(equations, layout.size, np.zeros(shapes), np.zeros(shapes), np.full(shapes, shape_deviation))
+    heard.add_to(equations, layout)
     places = layout.pose_columns(np.arange(1, len(times)))[:, :2].ravel()
-    unit = np.zeros((size, len(places)))
+    unit = np.zeros((layout.size + shapes, len(places)))
     unit[places, np.arange(len(places))] = 1.0
-    variances = np.diag(solution.solve(unit)[places]).reshape(-1, 2)
-    return float(np.median(np.sqrt(variances.sum(axis=1))))
+    return solution_of(equations).solve(unit)[places]
 
 
-def _add_echoes(
-    equations: NormalEquations, layout: Layout, echoes: Echoes, times: np.ndarray, world: World, head_step: float
-) -> None:
-    known = np.flatnonzero(echoes.distances < min(_INLIER * echoes.deviation, _HEARD))
-    arms, shapes = echoes.arms[known], echoes.shapes[known]
-    centers = np.array([shape.pose[:2, 3] for shape in world.shapes])[shapes]
-    sight = arms / np.maximum(np.hypot(*arms.T), 1e-9)[:, np.newaxis]
-    across = np.column_stack([-sight[:, 1], sight[:, 0]])
-    posts = np.array([shape.kind != "box" and shape.size[0] <= _POST for shape in world.shapes])[shapes]
-    normals = np.where(posts[:, np.newaxis], sight, _normals(world, echoes.points[known], sight))
-    own = echoes.deviation, head_step / np.sqrt(12.0) * np.hypot(*arms.T)
-    columns = np.column_stack([layout.pose_columns(echoes.scans[known]), layout.pose_columns(echoes.scans[known] + 1)])
-    columns = np.column_stack([columns, layout.run_start + POSE_COLUMNS * shapes[:, np.newaxis] + np.arange(3)])
-    share = (echoes.times[known] - times[echoes.scans[known]]) / np.diff(times)[echoes.scans[known]]
-    for direction, rows in ((normals, slice(None)), (across, posts)):
-        slant = np.abs(np.einsum("na,na->n", direction, across)) * own[1]
-        by_pose = np.column_stack([direction, _lever(arms, direction)])
-        by_shape = -np.column_stack([direction, _lever(echoes.points[known, :2] - centers, direction)])
-        jacobian = np.column_stack([(1.0 - share)[:, np.newaxis] * by_pose, share[:, np.newaxis] * by_pose, by_shape])
-        weight = echoes.weights[known] / (own[0] ** 2 + slant**2)
-        equations.add(columns[rows], jacobian[rows], np.zeros(len(known))[rows], weight[rows])
+def _of_shape(covariance: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Return the covariance (2 n, 2 n) of places (n, 2) once these are shifted, turned and scaled to fit best."""
+    offset = places - places.mean(axis=0)
+    turned = np.column_stack([-offset[:, 1], offset[:, 0]])
+    shifts = np.tile(np.eye(2), (len(places), 1))
+    modes, _ = np.linalg.qr(np.column_stack([shifts, offset.ravel(), turned.ravel()]))
+    left = np.eye(len(covariance)) - modes @ modes.T
+    return left @ covariance @ left
+
+
+def _median_deviation(covariance: np.ndarray) -> float:
+    return float(np.median(np.sqrt(np.diag(covariance).reshape(-1, 2).sum(axis=1))))
+
+
+def _beam_velocities(truth: Track, times: np.ndarray, arms: np.ndarray) -> np.ndarray:
+    """Return by how much (n, 2) [m/s] points at `arms` (n, 2) from the vehicle move with its beams."""
+    change = (truth.at(times + _HALF_SECOND) - truth.at(times - _HALF_SECOND)) / (2.0 * _HALF_SECOND)
+    return change[:, :2] + change[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
+
+
+def on_chords(places: np.ndarray, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return places (n, 2) on the straight lines between nodes at `places` (m, 2).
+
+    Nodes that all turn about one point turn what lies between them about it too, however bent the path is: else a
+    bent path would seem to tell where north is.
+    """
+    share = share[:, np.newaxis]
+    return (1.0 - share) * places[legs] + share * places[legs + 1]
 
 
 def _lever(arms: np.ndarray, directions: np.ndarray) -> np.ndarray:

@@ -1,5 +1,6 @@
 """Files of a million blocks; insertion, fetching and publishing in a map of ten million."""
 
+import threading
 import time
 from io import BytesIO
 from pathlib import Path
@@ -24,6 +25,7 @@ from mlsm_manager.surface_map.files.map_file import (
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.running_copy import finished
 
 RESOLUTION = 0.5
 MILLION = 1_000_000
@@ -34,6 +36,7 @@ _RADIUS = 50.0
 _REACH = 70.0
 _SCANS = 20
 _GROWN, _GROWTH = 10_000_000, 1000
+_SCAN_PERIOD = 0.02
 _MUTATIONS, _MUTATED_BLOCKS = 1000, 2000
 
 
@@ -139,7 +142,34 @@ def growth_rows() -> List[Row]:
         seconds.append(_seconds(lambda points=points: surface_map.insert(points))[1])
     longest, usual = 1e3 * max(seconds), 1e3 * float(np.median(seconds))
     name = f"insertions of {side**2} blocks up to {len(surface_map)}"
-    return [(name, f"median {usual:.0f} ms, longest {longest:.0f} ms of a core", "longest < 100 ms")]
+    row = (name, f"median {usual:.0f} ms, longest {longest:.0f} ms of a core", "longest < 100 ms")
+    return [row, _copy_row(surface_map)]
+
+
+def _copy_row(surface_map: MultiLevelSurfaceMap) -> Row:
+    """Measure how long scans wait while the map is copied to be saved, as Localiser.stored does."""
+    lock, rng, waits = threading.RLock(), np.random.default_rng(7), []
+    copying = threading.Thread(target=lambda: finished(surface_map.begin_copy(), lock))
+    begun = time.perf_counter()
+    copying.start()
+    while copying.is_alive():
+        asked = time.perf_counter()
+        with lock:
+            waits.append(time.perf_counter() - asked)
+            surface_map.insert(echoes(rng))
+        time.sleep(_SCAN_PERIOD)
+    seconds = time.perf_counter() - begun
+    name = f"longest wait of {len(waits)} scans while {len(surface_map)} blocks are copied to be saved"
+    figure = f"{1e3 * max(waits):.0f} ms, {1e3 * _longest_piece(surface_map):.1f} ms of a core"
+    return (name, f"{figure}; the copy takes {seconds:.1f} s", "< 100 ms")
+
+
+def _longest_piece(surface_map: MultiLevelSurfaceMap) -> float:
+    """Return the seconds of a core that the longest piece of a copy takes."""
+    copy, seconds = surface_map.begin_copy(), []
+    while not copy.is_complete:
+        seconds.append(_seconds(copy.step)[1])
+    return max(seconds)
 
 
 def mutation_rows() -> List[Row]:

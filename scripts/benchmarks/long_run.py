@@ -13,6 +13,7 @@ import numpy as np
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.geometry.planar import inverse, rotated, transformed
 
 SCANS = 10_000
@@ -73,7 +74,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(prog="benchmarks.long_run", description=__doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
     scans = parser.parse_args().scans
-    solver, seconds = LiveSolver(MultiViewParameters(), np.zeros(2)), []
+    solver, seconds = LiveSolver(MultiViewParameters(kernel=SolverKernel.AUTO), np.zeros(2)), []
     for number, scan in enumerate(tour_scans(scans), start=1):
         start = time.process_time()
         estimate = solver.add(scan)

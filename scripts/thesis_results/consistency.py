@@ -70,7 +70,7 @@ def _joint(world: str, kind: SonarKind) -> List[str]:
     runs = np.array([figures(*made) for made in recordings(tour_setup(world, "tour", kind), DRAWS)])
     cells = [
         text
-        for error, nees, deviation in runs.mean(axis=0)
+        for error, _, nees, deviation in runs.mean(axis=0)
         for text in (f"{error:.2f} m", f"{deviation:.2f} m", f"{nees:.2f}")
     ]
     return [world, str(kind), *cells]

@@ -8,6 +8,7 @@ from matplotlib.axes import Axes
 
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.strengths import count_strengths
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
 from sonar_processing.shapes.lines import Line, LineDetector, LineDetectorParameters
 from thesis_results.pictures import Pictures, new_figure, to_scale
@@ -40,8 +41,7 @@ class Processed:
 def processed(raw: IntensityCloud, place: np.ndarray, lines: LineDetectorParameters) -> Processed:
     """Return what the stages with their default parameters, and the line detector, make of an organised scan."""
     parameters = ThresholderParameters()
-    strengths = raw.points[raw.valid, 3]
-    otsu = Thresholder(replace(parameters, mode=ThresholdMode.OTSU)).threshold(strengths)
+    otsu = Thresholder(replace(parameters, mode=ThresholdMode.OTSU)).threshold(count_strengths(raw))
     thresholder = Thresholder(parameters)
     thresholded = thresholder(raw)
     cleaned = OutlierRemover(OutlierRemoverParameters())(thresholded)

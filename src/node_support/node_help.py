@@ -76,6 +76,8 @@ def host_help(host: str) -> str:
         "parameters:",
         "  chain: a list of node names",
         *_wrapped("the stages that are hosted; default [thresholder, outlier_remover, echo_extractor]", "      "),
+        "  detectors: a list of node names",
+        *_wrapped("line_detector, circle_detector or both; default [], launch files set it if shapes:=true", "      "),
     ]
     return "\n".join(lines)
 

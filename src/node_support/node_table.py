@@ -290,7 +290,10 @@ NODES: Dict[str, NodeDescription] = {
     ),
 }
 
-_PROCESSING = ("sonar_to_cloud", "thresholder", "outlier_remover", "echo_extractor", "sonar_image")
+_PROCESSING = (
+    "sonar_to_cloud", "thresholder", "outlier_remover", "echo_extractor", "line_detector", "circle_detector",
+    "sonar_image",
+)  # fmt: skip
 
 HOSTS: Dict[str, HostDescription] = {
     "sonar_processing": HostDescription(

@@ -46,9 +46,7 @@ class IntensityCloud:
     @property
     def valid(self) -> np.ndarray:
         """(n,) bool: points whose coordinates, strength and stamp are all finite."""
-        finite = np.ascontiguousarray(np.isfinite(self.points))
-        # Four booleans compared as one number take a tenth of the time of all(axis=1).
-        return (finite.view(np.uint32)[:, 0] == _FOUR_TRUE) & np.isfinite(self.time_stamps)
+        return are_finite(self.points, self.time_stamps)
 
     @property
     def broken(self) -> int:
@@ -68,5 +66,22 @@ class IntensityCloud:
         if self.is_organized:
             points = np.where(keep[:, np.newaxis], self.points, np.float32(np.nan))
             return replace(self, points=points)
-        kept = np.flatnonzero(keep)
-        return replace(self, points=self.points.take(kept, axis=0), time_stamps=self.time_stamps.take(kept))
+        return self._taken(np.flatnonzero(keep))
+
+    def take(self, places: np.ndarray) -> "IntensityCloud":
+        """Return the cloud with the points of these numbers (m,), ascending, as `select` does."""
+        if not self.is_organized:
+            return self._taken(places)
+        keep = np.zeros(len(self), dtype=bool)
+        keep[places] = True
+        return self.select(keep)
+
+    def _taken(self, places: np.ndarray) -> "IntensityCloud":
+        return replace(self, points=self.points.take(places, axis=0), time_stamps=self.time_stamps.take(places))
+
+
+def are_finite(points: np.ndarray, stamps: np.ndarray) -> np.ndarray:
+    """Return (n,) bool: which points (n, 4) with stamps (n,) are finite in all their values."""
+    finite = np.ascontiguousarray(np.isfinite(points))
+    # Four booleans compared as one number take a tenth of the time of all(axis=1).
+    return (finite.view(np.uint32)[:, 0] == _FOUR_TRUE) & np.isfinite(stamps)

@@ -4,20 +4,22 @@ import os
 import re
 import shutil
 import signal
-import socket
 import subprocess
+import sys
 import threading
 from pathlib import Path
 
 import pytest
 
+sys.path.append(str(Path(__file__).resolve().parents[1] / "stopping"))
+
+from stopwatch import free_port
+
 ROOT = Path(__file__).resolve().parents[2]
 WORKSPACE = ROOT / "build/workspace"
 PACKAGE = "underwater_map_construction"
 RAYS = ["sonar.ray_rows=5", "sonar.ray_columns=2"]
-with socket.socket() as probe:
-    probe.bind(("localhost", 0))
-    PORT = probe.getsockname()[1]
+PORT = free_port()
 
 
 @pytest.fixture(scope="module")
@@ -47,7 +49,7 @@ def _shell(prefix, command):
 def _run(prefix, command):
     done = subprocess.run(
         _shell(prefix, command), env=_environment(), cwd=str(prefix), stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, text=True, timeout=60,
+        stderr=subprocess.STDOUT, text=True, timeout=240,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     return done.stdout
@@ -84,10 +86,10 @@ def test_the_demo_maps_until_it_is_interrupted(prefix):
     reader = threading.Thread(target=lambda: output.extend(demo.stdout), daemon=True)
     reader.start()
     try:
-        listen = 'timeout 40 rostopic echo -n 1 --noarr --filter "m.width > 100" /MLSM/cloud'
+        listen = 'timeout 200 rostopic echo -n 1 --noarr --filter "m.width > 100" /MLSM/cloud'
         told = _run(prefix, f"bash -c 'until rostopic list >/dev/null 2>&1; do sleep 0.2; done; {listen}'")
         width = int(re.search(r"^width: (\d+)$", told, re.MULTILINE)[1])
     finally:
         demo.send_signal(signal.SIGINT)
-        demo.wait(timeout=20)
+        demo.wait(timeout=60)
     assert width > 100, "".join(output)

@@ -7,7 +7,7 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 
 from sonar_processing.cloud import IntensityCloud
@@ -46,9 +46,11 @@ class BadClouds(unittest.TestCase):
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         inputs = {**STAGES, "matching": "/sonar/scan/echoes"}
-        cls.inputs = {s: rospy.Publisher(topic, StampedIntensityCloud, queue_size=10) for s, topic in inputs.items()}
+        cls.inputs = {s: rospy.Publisher(topic, StampedIntensityCloud, queue_size=100) for s, topic in inputs.items()}
         for publisher in cls.inputs.values():
             wait_for_publisher_links(publisher, 1)
+        wait_for_links("/sonar/scan/thresholded", 1)
+        wait_for_links("/sonar/scan/cleaned", 1)
 
     def send_to_all(self, cloud: StampedIntensityCloud) -> None:
         """Publish on every stage's input."""
@@ -111,6 +113,7 @@ class BadClouds(unittest.TestCase):
 
     def test_7_a_good_cloud_still_goes_all_the_way(self) -> None:
         """Beams, threshold, outliers, map."""
+        self.map.wait_for_link()
         self.inputs["thresholder"].publish(message(wall() + np.float32([100, 0, 0, 0])))
         self.map.wait_for(lambda cloud: np.any(np.frombuffer(cloud.data, np.float32).reshape(-1, 7)[:, 0] > 99.0))
 

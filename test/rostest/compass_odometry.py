@@ -66,7 +66,7 @@ class DeadReckoning(unittest.TestCase):
         newest = self.transforms.wait_for(lambda message: message.transforms[0].header.stamp == end.header.stamp)
         transform = newest.transforms[0]
         self.assertEqual((transform.header.frame_id, transform.child_frame_id), ("odom", "base_link"))
-        self.assertEqual(transform.transform.translation.x, end.pose.pose.position.x)
+        self.assertAlmostEqual(transform.transform.translation.x, end.pose.pose.position.x, places=6)
 
     def test_3_headings_that_nobody_can_use_are_counted_and_the_next_one_is_taken(self) -> None:
         """A quaternion of zeros, NaN, no orientation, and a stamp beyond what tf2 takes."""

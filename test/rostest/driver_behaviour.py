@@ -6,16 +6,16 @@ from typing import Any, Callable, ClassVar, Dict, List
 
 import numpy as np
 import rospy
-from driver_listener import ERROR, PATIENCE, beams, diagnostics, level, values
+from driver_listener import ERROR, beams, diagnostics, level, values
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE_ROOT
+from graph import PACKAGE_ROOT, PATIENCE
 from sensor_msgs.msg import JointState
 
 from underwater_map_construction.srv import OrderFault
 
 PACKAGE = "underwater_map_construction"
-# s: a process that starts loads some hundred modules, on a machine that may be busy.
-START_PATIENCE = 60.0
+# A ping that a change has not reached may be on its way, and one more may be ordered.
+PINGS_BEFORE_A_CHANGE = 2
 
 
 class DriverBehaviour:
@@ -41,13 +41,25 @@ class DriverBehaviour:
         """Begin with the defaults."""
         self.client.update_configuration(self.defaults)
         self.beams = beams()
-        self.wait_for_beam(self.is_of_defaults)
-        # The ping after the change may still have been on its way.
-        self.beams.wait_for_more(2)
+        assert self.is_of_defaults(self.fresh_beams(1)[0])
 
     def is_of_defaults(self, beam: Any) -> bool:
         """Return whether a beam shows that the defaults hold."""
         raise NotImplementedError
+
+    def fresh_beams(self, count: int) -> List[Any]:
+        """Return the next `count` beams that know of every change until now.
+
+        Beams and the answer of the service that changed something come on connections of their own: older beams may
+        come after the answer.
+        """
+        now = rospy.Time.now()
+
+        def fresh() -> List[Any]:
+            return [beam for beam in self.beams.received if beam.header.stamp > now][PINGS_BEFORE_A_CHANGE:]
+
+        assert self.beams.wait(lambda _: len(fresh()) >= count), f"no {count} beams after {now.to_sec():.3f}"
+        return fresh()[:count]
 
     def wait_for_beam(self, wanted: Callable[[Any], bool]) -> Any:
         """Return the newest beam once it is as wanted."""
@@ -60,18 +72,18 @@ class DriverBehaviour:
         return round(2.0 * math.pi / self.step)
 
     def assert_turns_by(self, step: float) -> None:
-        """The pings after a change may still have been on their way."""
-        angles = np.unwrap([beam.angle for beam in self.beams.wait_for_more(12)[2:]])
+        """The head turns by `step` rad from each beam to the next one from now on."""
+        angles = np.unwrap([beam.angle for beam in self.fresh_beams(10)])
         np.testing.assert_allclose(np.diff(angles), step, atol=1e-5)
 
     def test_a_full_turn_has_a_beam_at_every_step_clockwise(self) -> None:
         """And none is left out."""
-        angles = np.unwrap([beam.angle for beam in self.beams.wait_for_more(self.beams_per_turn + 1)])
+        angles = np.unwrap([beam.angle for beam in self.fresh_beams(self.beams_per_turn + 1)])
         np.testing.assert_allclose(np.diff(angles), -self.step, atol=1e-5)
 
     def test_every_beam_of_a_turn_sees_its_wall(self) -> None:
         """As its strongest echo."""
-        for beam in self.beams.wait_for_more(self.beams_per_turn):
+        for beam in self.fresh_beams(self.beams_per_turn):
             wall = self.wall / max(abs(math.cos(beam.angle)), abs(math.sin(beam.angle)))
             strengths = np.frombuffer(beam.intensities, dtype=np.uint8)
             seen = (np.argmax(strengths) + 0.5) * beam.range_resolution
@@ -79,9 +91,11 @@ class DriverBehaviour:
 
     def test_stamps_grow_and_are_of_now(self) -> None:
         """They are the times of the pings."""
-        stamps = [beam.header.stamp.to_sec() for beam in self.beams.wait_for_more(20)]
+        start = rospy.get_time()
+        stamps = [beam.header.stamp.to_sec() for beam in self.fresh_beams(20)]
         assert np.all(np.diff(stamps) > 0)
-        assert abs(rospy.get_time() - stamps[-1]) < 2.0
+        assert start < stamps[0]
+        assert stamps[-1] < rospy.get_time()
 
     def test_an_inverted_head_is_mirrored(self) -> None:
         """It turns the other way."""
@@ -95,24 +109,23 @@ class DriverBehaviour:
         assert abs(self.wait_for_beam(lambda beam: beam.sensorAngle != 0.0).sensorAngle - 0.3) < 1e-6
 
     def test_scanning_goes_on_when_the_port_returns(self) -> None:
-        """Within two seconds; until then the diagnostics report an error."""
+        """Until then the diagnostics report an error; how soon it goes on is shown in virtual time by unit tests."""
         health = diagnostics(f"{self.sonar}_driver")
         absence = rospy.get_param(f"{self.sonar}_emulator/absence_duration")
         last = self.beams.wait_for_more(1)[0].header.stamp.to_sec()
         assert self.order_fault("disappearance", 1).success
-        assert health.wait(lambda arrays: bool(arrays) and level(arrays[-1]) == ERROR)
+        assert health.wait(lambda arrays: any(level(array) == ERROR for array in arrays))
         self.wait_for_beam(lambda beam: beam.header.stamp.to_sec() > last + absence)
         gap = max(np.diff([beam.header.stamp.to_sec() for beam in self.beams.received]))
         print(f"port gone for {absence:g} s, {gap - absence:.2f} s from its return to the next beam")
         assert gap > absence
-        assert gap < absence + 2.0
         assert health.wait(lambda arrays: values(arrays[-1])["connected"] == "true")
 
     def start_driver(self, argument: str) -> List[str]:
         """Run a second driver until it ends with status 1; return the lines it printed."""
         command = [str(PACKAGE_ROOT / f"nodes/{self.sonar}_driver"), "__name:=second_driver", argument]
         done = subprocess.run(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=START_PATIENCE, check=False
+            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE, check=False
         )
         rospy.delete_param("second_driver")
         assert done.returncode == 1, done.stdout

@@ -5,10 +5,9 @@ from typing import Any, Callable, Dict, List
 
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray, DiagnosticStatus
+from graph import PATIENCE
 
 from underwater_map_construction.msg import SonarScanLine
-
-PATIENCE = 20.0
 
 
 class Listener:

@@ -11,7 +11,7 @@ import rospy
 import rostest
 from benchmarks.foreign_messages import message_classes, sane_message
 from benchmarks.fuzz_beams import Fuzzer
-from graph import Diagnostics, Inbox, rows, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, rows, wait_for_publisher_links
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import String
@@ -29,6 +29,7 @@ class ForeignBeams(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         """Listen to all that the node makes of turns."""
+        cls.published = 0
         cls.diagnostics, cls.log = Diagnostics(), Inbox("/rosout", Log)
         cls.turns = Inbox("/sonar/scan/turn", PointCloud2)
         cls.scans = Inbox("/sonar/scan/sonarCloud/cloud", PointCloud2)
@@ -37,13 +38,15 @@ class ForeignBeams(unittest.TestCase):
             inbox.wait_for_link()
 
     def publish(self, kind: type, messages: Any) -> None:
-        """Publish messages of one class on sonar/raw, and give the topic back for another."""
+        """Publish messages of one class on sonar/raw, and give the topic back for another when all have arrived."""
         publisher = rospy.Publisher("/sonar/raw", kind, queue_size=1000)
         wait_for_publisher_links(publisher, 1)
         for message in messages:
             publisher.publish(message)
+            type(self).published += 1
             time.sleep(0.004)
-        publisher.unregister()
+        self.diagnostics.wait_for("sonar_to_cloud", "messages in", self.published)
+        end_publishing(publisher)
 
     def publish_turns(self, kind: str, turns: int) -> None:
         """Publish whole turns of a head in front of a round wall; more than a turn, so that one is complete."""
@@ -53,7 +56,7 @@ class ForeignBeams(unittest.TestCase):
         """Publish turns of a kind until one has come through, and see that it is the wall."""
         before = len(self.turns.messages)
         self.publish_turns(kind, 3)
-        cloud = rows(self.turns.wait_for(lambda _: len(self.turns.messages) > before))
+        cloud = rows(self.turns.wait_for_number(before + 1)[-1])
         wall = np.linalg.norm(cloud[cloud[:, 3] == 120][:, :2], axis=1)
         self.assertGreater(wall.size, STEPS)
         np.testing.assert_allclose(wall, WALL, atol=1.0)
@@ -84,6 +87,7 @@ class ForeignBeams(unittest.TestCase):
         other = rospy.Publisher("/ping360/data", kind, queue_size=1)
         scan = LaserScan(angle_min=-3.14, angle_increment=6.28 / RAYS, range_max=50.0, ranges=[WALL] * RAYS)
         scan.header.frame_id, scan.header.stamp = "sonar", rospy.Time.now()
+        self.diagnostics.wait_for("sonar_to_cloud", "messages in", self.published)
         before = int(self.diagnostics.values("sonar_to_cloud")["beams placed"])
         self.publish(LaserScan, [scan])
         self.diagnostics.wait_for("sonar_to_cloud", "beams placed", before + RAYS)
@@ -99,7 +103,6 @@ class ForeignBeams(unittest.TestCase):
 
     def test_6_damaged_messages_end_nothing(self) -> None:
         """Each is counted, and the node goes on."""
-        before = int(self.diagnostics.values("sonar_to_cloud")["messages in"])
         fuzzer, sent = Fuzzer(seed=3), message_classes(ECHO)[ECHO]
 
         class Damaged(sent):
@@ -114,13 +117,12 @@ class ForeignBeams(unittest.TestCase):
             return message
 
         self.publish(Damaged, (damaged(number) for number in range(DAMAGED)))
-        self.diagnostics.wait_for("sonar_to_cloud", "messages in", before + DAMAGED)
         self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
         self.wait_for_a_turn(ECHO)
 
     def test_7_laser_scans_come_of_every_turn(self) -> None:
         """One stamp, no time between the rays, angles that increase."""
-        scan = self.lasers.messages[0]
+        scan = self.lasers.wait_for_number(1)[0]
         self.assertEqual(scan.time_increment, 0.0)
         self.assertGreater(scan.angle_increment, 0.0)
         ranges = np.array(scan.ranges)

@@ -23,7 +23,7 @@ import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
-from graph import Inbox, wait_for_publisher_links, wait_until
+from graph import PATIENCE, Inbox, wait_for_publisher_links, wait_until
 from random_messages import RandomMessages
 from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
@@ -115,7 +115,7 @@ class Fuzz(unittest.TestCase):
     def _expect_a_scan(self) -> None:
         """Send good beams far away from all others until the map has them."""
         rospy.Publisher("/startMatching", Bool, queue_size=1, latch=True).publish(Bool(False))
-        rospy.wait_for_service("/mlsm_core/reset_map", timeout=20.0)
+        rospy.wait_for_service("/mlsm_core/reset_map", timeout=PATIENCE)
         rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)()
         transforms = tf2_ros.StaticTransformBroadcaster()
         transforms.sendTransform(_mount())

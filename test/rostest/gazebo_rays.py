@@ -11,7 +11,7 @@ import rostest
 import tf2_ros
 from gazebo_scans import FULL_CIRCLE, block_laser, cloud2, header, laser_scan
 from geometry_msgs.msg import TransformStamped
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, wait_for_publisher_links
 from sensor_msgs.msg import JointState, LaserScan, PointCloud, PointCloud2
 from std_msgs.msg import String
 
@@ -20,6 +20,7 @@ from underwater_map_construction.msg import SonarScanLine
 PACKAGE = "underwater_map_construction"
 WALL = 12.0
 BEAM = math.radians(2.5)
+MOST_SCANS = 1200  # ten turns
 
 
 def _publisher(topic: str, kind: type) -> rospy.Publisher:
@@ -49,12 +50,23 @@ class GazeboSonar(unittest.TestCase):
         rays.publish(message)
         return self.swept.wait_for(lambda beam: beam.header.stamp == message.header.stamp)
 
+    def _sweep_until_the_joint_is_known(self) -> None:
+        """Send scans until a beam straight ahead is tilted: the joint state may come after some scans."""
+        rays = _publisher("/sonar/rays", LaserScan)
+        for number in range(MOST_SCANS):
+            beam = self._beam_of(rays, laser_scan(header(1.0 + 0.01 * number, "sonar"), FULL_CIRCLE, 721, WALL))
+            if beam.sensorAngle != 0.0 and abs(beam.angle) < BEAM / 2:
+                end_publishing(rays)
+                return
+        raise AssertionError(f"no joint state in {MOST_SCANS} scans")
+
     def test_a_full_circle_of_each_type_gives_one_beam_after_the_other(self) -> None:
         """The head steps by one beam with every scan, whatever its type."""
         joints = _publisher("/joint_states", JointState)
         joints.publish(JointState(name=["sonar_servo_joint"], position=[0.25]))
+        self._sweep_until_the_joint_is_known()
         kinds = ((LaserScan, laser_scan), (PointCloud, block_laser), (PointCloud2, cloud2))
-        for number, (kind, make) in enumerate(kinds):
+        for number, (kind, make) in enumerate(kinds, 1):
             rays = _publisher("/sonar/rays", kind)
             message = make(header(100.0 + number, "sonar"), FULL_CIRCLE, 721, WALL)
             beam = self._beam_of(rays, message)
@@ -62,16 +74,18 @@ class GazeboSonar(unittest.TestCase):
             self.assertAlmostEqual(_strongest(beam), WALL / math.cos(beam.angle), delta=0.6)
             self.assertEqual((beam.header.frame_id, len(beam.intensities), beam.maxrange_meters), ("sonar", 500, 50.0))
             self.assertAlmostEqual(beam.sensorAngle, 0.25, places=6)
-            rays.unregister()
+            end_publishing(rays)
 
     def test_a_sensor_on_a_joint_gives_beams_where_tf_says_it_looks(self) -> None:
         """Also when tf comes after the scan."""
         start = float(round(rospy.get_time()))
-        rays = _publisher("/turning/sonar/rays", PointCloud)
+        rays, transforms = _publisher("/turning/sonar/rays", PointCloud), tf2_ros.StaticTransformBroadcaster()
+        # The scan waits a few seconds for its transform, and a new connection may take as long on a busy machine.
+        wait_for_publisher_links(transforms.pub_tf, 1)
         rays.publish(block_laser(header(start, "sonar_head"), BEAM, 5, WALL))
         turned = TransformStamped(header=header(0.0, "sonar"), child_frame_id="sonar_head")
         turned.transform.rotation.z, turned.transform.rotation.w = math.sin(-0.6), math.cos(-0.6)
-        tf2_ros.StaticTransformBroadcaster().sendTransform(turned)
+        transforms.sendTransform(turned)
         beam = self.turned.wait_for()
         self.assertAlmostEqual(beam.angle, -1.2, places=6)
         self.assertAlmostEqual(_strongest(beam), WALL, delta=0.5)
@@ -94,7 +108,7 @@ class GazeboSonar(unittest.TestCase):
             rays = _publisher("/sonar/rays", kind)
             rays.publish(message)
             self.diagnostics.wait_for("gazebo_sonar", "scans refused", number)
-            rays.unregister()
+            end_publishing(rays)
         self._beam_of(_publisher("/sonar/rays", LaserScan), scan)
 
 

@@ -1,23 +1,26 @@
-"""What the rostests share: waiting for events, playing bags, reading diagnostics and maps."""
+"""What the rostests share: waiting for events, launching nodes, reading diagnostics and maps."""
 
 import os
 import subprocess
 import threading
+import time
 import unittest
 import xmlrpc.client
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Dict, List
+from typing import Any, Callable, Dict, Iterator, List, Tuple
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-import rosbag
 import rosgraph
 import rospy
 from diagnostic_msgs.msg import DiagnosticArray
-from std_srvs.srv import SetBool
 
+PACKAGE = "underwater_map_construction"
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 TEST_DATA = PACKAGE_ROOT / "test/data"
+# s: for an event that comes. A busy machine takes a quarter of it to start one process.
+PATIENCE = 60.0
 
 
 def recording(name: str) -> Path:
@@ -62,21 +65,34 @@ class Inbox:
             self._messages.append(message)
             self._condition.notify_all()
 
-    def wait_for_link(self, timeout: float = 20.0) -> None:
+    def wait_for_link(self, timeout: float = PATIENCE) -> None:
         """Wait until a publisher is connected, so that no message is missed from then on."""
-        ended = threading.Event()
-        for _ in range(int(timeout / 0.05)):
-            if self._subscriber.get_num_connections():
-                return
-            ended.wait(0.05)
-        raise AssertionError(f"{self._topic}: nobody publishes it after {timeout} s")
+        told = f"{self._topic}: nobody publishes it"
+        wait_until(lambda: self._subscriber.get_num_connections() > 0, timeout, told=told)
 
-    def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = 20.0) -> Any:
-        """Return the newest message once it fits; raises AssertionError after `timeout` seconds of wall time."""
+    def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = PATIENCE) -> Any:
+        """Return the first message that fits, of the newest and of all that come after it.
+
+        One that fits is found though others follow at once. Raises AssertionError after `timeout` s of wall time.
+        """
+        end = time.monotonic() + timeout
         with self._condition:
-            if self._condition.wait_for(lambda: bool(self._messages) and fits(self._messages[-1]), timeout):
-                return self._messages[-1]
-        raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {len(self._messages)} messages came")
+            seen = max(len(self._messages) - 1, 0)
+            while True:
+                found = next((message for message in self._messages[seen:] if fits(message)), None)
+                if found is not None:
+                    return found
+                seen = len(self._messages)
+                if not self._condition.wait(max(end - time.monotonic(), 0.0)):
+                    raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {seen} messages came")
+
+    def wait_for_number(self, number: int, timeout: float = PATIENCE) -> List[Any]:
+        """Return all messages once at least `number` have come; raises AssertionError after `timeout` seconds."""
+        with self._condition:
+            if self._condition.wait_for(lambda: len(self._messages) >= number, timeout):
+                return list(self._messages)
+            count = len(self._messages)
+        raise AssertionError(f"{self._topic}: not {number} messages in {timeout} s but {count}")
 
 
 class Diagnostics:
@@ -94,7 +110,7 @@ class Diagnostics:
                 self._values[stage] = {item.key: item.value for item in status.values}
             self._condition.notify_all()
 
-    def wait_for(self, stage: str, counter: str, number: int, timeout: float = 20.0) -> None:
+    def wait_for(self, stage: str, counter: str, number: int, timeout: float = PATIENCE) -> None:
         """Wait until a counter has reached `number`; raises AssertionError with what is known of the stage."""
         with self._condition:
             if self._condition.wait_for(lambda: self._number(stage, counter) >= number, timeout):
@@ -111,61 +127,64 @@ class Diagnostics:
         return int(self._values.get(stage, {}).get(counter, -1))
 
 
-def wait_for_subscribers(topic: str, number: int, timeout: float = 20.0) -> None:
+def wait_for_subscribers(topic: str, number: int, timeout: float = PATIENCE) -> None:
     """Wait until `number` nodes listen to a topic and every publisher that it has is connected to all of them."""
-    ended = threading.Event()
-    for _ in range(int(timeout / 0.1)):
-        publishers, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
-        listeners = dict(subscribers).get(topic, [])
-        if len(listeners) >= number and all(_links(node, topic) >= number for node in dict(publishers).get(topic, [])):
-            return
-        ended.wait(0.1)
-    raise AssertionError(f"{topic}: not {number} connected listeners after {timeout} s")
+    wait_until(lambda: _is_heard(topic, number), timeout, told=f"{topic}: not {number} connected listeners")
 
 
-def _links(node: str, topic: str) -> int:
-    """Return the number of established connections over which a node publishes a topic."""
+def wait_for_links(topic: str, number: int = 1, timeout: float = PATIENCE) -> None:
+    """Wait until somebody publishes a topic, `number` nodes listen to it, and all are connected."""
+    wait_until(
+        lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number),
+        timeout,
+        told=f"{topic}: no publisher with {number} connected listeners",
+    )
+
+
+def _is_heard(topic: str, number: int) -> bool:
+    publishers, listeners = nodes_of(topic)
+    return len(listeners) >= number and all(_links(node, topic) >= number for node in publishers)
+
+
+def nodes_of(topic: str) -> Tuple[List[str], List[str]]:
+    """Return the nodes that publish a topic, and those that listen to it."""
+    publishers, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
+    return dict(publishers).get(topic, []), dict(subscribers).get(topic, [])
+
+
+def _links(node: str, topic: str, direction: str = "o") -> int:
+    """Return the number of established connections over which a node publishes a topic, or takes it ("i")."""
     slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
     _, _, connections = slave.getBusInfo("/graph_test")
-    return sum(1 for link in connections if link[2] == "o" and link[4] == topic and link[5])
+    return sum(1 for link in connections if link[2] == direction and link[4] == topic and link[5])
 
 
-def wait_until(holds: Callable[[], bool], timeout: float = 20.0, required: bool = True) -> bool:
+def wait_until(
+    holds: Callable[[], bool], timeout: float = PATIENCE, required: bool = True, told: str = "not reached"
+) -> bool:
     """Wait until a state holds that nobody tells of, and return whether it does.
 
-    Raises AssertionError after `timeout` seconds where it is `required`.
+    Raises AssertionError, which says what is `told`, after `timeout` seconds where it is `required`.
     """
-    ended = threading.Event()
-    for _ in range(int(timeout / 0.02)):
-        if holds():
-            return True
+    ended, end = threading.Event(), time.monotonic() + timeout
+    while not holds():
+        if time.monotonic() > end:
+            assert not required, f"{told} after {timeout} s"
+            return False
         ended.wait(0.02)
-    if required:
-        raise AssertionError(f"not after {timeout} s")
-    return False
+    return True
 
 
-def play(bag: Path, rate: float, longest: float = 120.0) -> None:
-    """Play a bag to its end, in at most `longest` s, to all who listen.
-
-    Playback starts when every listener is connected to every topic.
-    """
-    command = ["rosbag", "play", "--quiet", "--clock", "--pause", f"--rate={rate}", str(bag), "__name:=player"]
-    player = subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL)
+@contextmanager
+def launched(launch_file: str, *arguments: str) -> Iterator[None]:
+    """Run a launch file of the package: what a test listens to from before the first message to the last one."""
+    command = ["roslaunch", PACKAGE, launch_file, *arguments]
+    launch = subprocess.Popen(command, stdin=subprocess.DEVNULL)
     try:
-        rospy.wait_for_service("/player/pause_playback", timeout=20.0)
-        _, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
-        for topic in _topics(bag):
-            wait_for_subscribers(topic, len(dict(subscribers).get(topic, [])))
-        rospy.ServiceProxy("/player/pause_playback", SetBool)(False)
-        assert player.wait(timeout=longest) == 0
+        yield
     finally:
-        player.kill()
-
-
-def _topics(bag: Path) -> List[str]:
-    with rosbag.Bag(str(bag)) as recorded:
-        return sorted(recorded.get_type_and_topic_info().topics)
+        launch.terminate()
+        launch.wait(timeout=PATIENCE)
 
 
 def rows(cloud: Any) -> np.ndarray:
@@ -174,11 +193,18 @@ def rows(cloud: Any) -> np.ndarray:
     return data[np.lexsort(data.T[::-1])]
 
 
-def wait_for_publisher_links(publisher: rospy.Publisher, number: int, timeout: float = 20.0) -> None:
+def wait_for_publisher_links(publisher: rospy.Publisher, number: int, timeout: float = PATIENCE) -> None:
     """Wait until `number` nodes are connected to a publisher of this process."""
-    ended = threading.Event()
-    for _ in range(int(timeout / 0.05)):
-        if publisher.get_num_connections() >= number:
-            return
-        ended.wait(0.05)
-    raise AssertionError(f"{publisher.name}: not {number} connections after {timeout} s")
+    told = f"{publisher.name}: not {number} connections"
+    wait_until(lambda: publisher.get_num_connections() >= number, timeout, told=told)
+
+
+def end_publishing(publisher: rospy.Publisher) -> None:
+    """Unregister a publisher of this process, and wait until those that listened have noticed.
+
+    They would take a new publisher of the topic for the old one, whose connections they have, and not connect again.
+    """
+    topic = publisher.resolved_name
+    publisher.unregister()
+    told = f"{topic}: still connected"
+    wait_until(lambda: not any(_links(node, topic, "i") for node in nodes_of(topic)[1]), told=told)

@@ -23,7 +23,7 @@ class TestDriver(DriverBehaviour, unittest.TestCase):
         return beam.maxrange_meters == 20.0
 
     def test_a_beam_says_how_it_was_made(self):
-        beam = self.beams.wait_for_more(1)[0]
+        beam = self.fresh_beams(1)[0]
         made = (beam.header.frame_id, beam.maxrange_meters, len(beam.intensities), beam.gain)
         assert made == ("sonar", 20.0, 500, 20)
         assert abs(beam.range_resolution - 0.04) < 1e-6
@@ -41,7 +41,7 @@ class TestDriver(DriverBehaviour, unittest.TestCase):
         for bad in ({"max_range": 25}, {"train_angle_deg": 60}, {"data_points": 300}, {"max_range": 1000}):
             config = self.client.update_configuration(bad)
             assert {name: config[name] for name in bad} == {name: DEFAULTS[name] for name in bad}
-        assert self.beams.wait_for_more(2)[-1].maxrange_meters == 20.0
+        assert self.fresh_beams(1)[0].maxrange_meters == 20.0
 
     def test_an_unknown_fault_is_refused(self):
         answer = self.order_fault("explosion", 1)

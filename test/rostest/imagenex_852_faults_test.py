@@ -10,7 +10,7 @@ import rostest
 _HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path.insert(0, os.path.join(_HERE, os.pardir, "unit", "imagenex_852_driver"))
 
-from driver_listener import PATIENCE, beams, diagnostics, values  # noqa: E402
+from driver_listener import beams, diagnostics, values  # noqa: E402
 from fault_experiment import GOOD, NumberedEchoes, RecordingInjector, fault_rates  # noqa: E402
 
 from imagenex_852_driver.emulator import Emulated852  # noqa: E402
@@ -18,7 +18,6 @@ from imagenex_852_driver.line.timing import LineTiming  # noqa: E402
 from sonar_driver.emulator import Fault, HeadServer, PtyLine  # noqa: E402
 
 _TIMING = LineTiming(baud_rate=1152000, speed_of_sound=15000.0)
-_DRIVERS_MARGIN = 0.25
 
 
 class TestFaults(unittest.TestCase):
@@ -27,13 +26,13 @@ class TestFaults(unittest.TestCase):
         cls.beams = beams()
         cls.beams.wait_for_publisher()
         out_of_commands = threading.Event()
-        rates = fault_rates(rospy.get_param("~rate"), _DRIVERS_MARGIN)
+        rates = fault_rates(rospy.get_param("~rate"), rospy.get_param("imagenex_852_driver/reply_margin"))
         cls.faults = RecordingInjector(rates, 0, rospy.get_param("~commands"), out_of_commands)
         head = Emulated852(NumberedEchoes(), cls.faults, _TIMING)
         with HeadServer(head, PtyLine(rospy.get_param("~port"))):
             assert out_of_commands.wait(rospy.get_param("~time_limit"))
             cls.expected = [number for number, fault in enumerate(cls.faults.of_pings) if fault in GOOD]
-            cls.beams.wait(lambda received: len(received) >= len(cls.expected), PATIENCE)
+            cls.beams.wait(lambda received: len(received) >= len(cls.expected))
             cls.health = values(diagnostics().wait_for_more(2)[-1])
         cls.delivered = [int.from_bytes(bytes(beam.intensities[:4]), "big") for beam in cls.beams.received]
         print({fault.value: count for fault, count in cls.faults.counts.items()})

@@ -10,8 +10,8 @@ from pathlib import Path
 import rosbag
 import rospy
 import rostest
-from driver_listener import PATIENCE, beams, diagnostics, values
-from graph import recording
+from driver_listener import beams, diagnostics, values
+from graph import PATIENCE, recording
 
 from imagenex_852_driver.logs import log_file
 from imagenex_852_driver.logs.log_record import LoggedPing

@@ -37,7 +37,7 @@ class MapServices(unittest.TestCase):
         wait_for_publisher_links(cls.publisher, 1)
         cls.publisher.publish(cloud_to_message(cloud))
         inbox = Inbox("/MLSM/Markers", MarkerArray)
-        inbox.wait_for(lambda array: len(array.markers) > 1)
+        inbox.wait_for(lambda array: sum(len(marker.points) > 0 for marker in array.markers) > 1)
         inbox.close()
 
     @classmethod
@@ -48,7 +48,7 @@ class MapServices(unittest.TestCase):
     def test_a_late_subscriber_sees_the_whole_map(self) -> None:
         """Though nothing changes any more, and they show true extents: 2.8 m of pillar."""
         inbox = Inbox("/MLSM/Markers", MarkerArray)
-        array = inbox.wait_for()
+        array = inbox.wait_for(lambda array: any(marker.points for marker in array.markers))
         inbox.close()
         vertical = [marker for marker in array.markers if marker.ns == "vertical"]
         horizontal = [marker for marker in array.markers if marker.ns == "horizontal"]
@@ -63,8 +63,7 @@ class MapServices(unittest.TestCase):
     def test_map_to_odom_comes_steadily_and_never_twice_with_one_stamp(self) -> None:
         """20 times a second, stamped ahead."""
         inbox = Inbox("/tf", TFMessage)
-        inbox.wait_for(lambda _: len(inbox.messages) >= 41, timeout=10.0)
-        transforms = [message.transforms[0] for message in inbox.messages]
+        transforms = [message.transforms[0] for message in inbox.wait_for_number(41)]
         stamps = np.array([transform.header.stamp.to_sec() for transform in transforms])
         self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in transforms}, {("map", "odom")})
         self.assertEqual(len(np.unique(stamps)), len(stamps))
@@ -111,7 +110,7 @@ class MapServices(unittest.TestCase):
 
     def test_a_grid_is_sent_to_who_asks_for_it(self) -> None:
         """Two cells are occupied, nothing else is known."""
-        grid = Inbox("/MLSM/grid", OccupancyGrid).wait_for()
+        grid = Inbox("/MLSM/grid", OccupancyGrid).wait_for(lambda grid: bool(grid.data))
         self.assertEqual((grid.info.width, grid.info.height, grid.info.resolution), (11, 11, 0.5))
         self.assertEqual([value for value in grid.data if value != -1], [100, 100])
 
@@ -124,7 +123,7 @@ class MapServices(unittest.TestCase):
     def test_reset_forgets_the_map_and_clears_the_display(self) -> None:
         """Runs on the same map as the others and puts it back."""
         inbox = Inbox("/MLSM/Markers", MarkerArray)
-        shown = inbox.wait_for()
+        shown = inbox.wait_for(lambda array: any(marker.points for marker in array.markers))
         self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)().success)
         cleared = inbox.wait_for(lambda array: all(marker.action == Marker.DELETE for marker in array.markers))
         inbox.close()

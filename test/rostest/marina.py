@@ -4,15 +4,17 @@
 import sys
 import tempfile
 import unittest
+from functools import partial
 from pathlib import Path
-from typing import Any, Tuple
+from typing import Any, List, Tuple
 
 import numpy as np
 import rosbag
 import rospy
 import rostest
-from graph import TEST_DATA, Diagnostics, Inbox, play, recording, rows, wait_for_subscribers, wait_until
+from graph import TEST_DATA, Diagnostics, Inbox, recording, rows, wait_for_subscribers, wait_until
 from nav_msgs.msg import Odometry
+from playback import Step, play
 from scipy.spatial import cKDTree
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
@@ -28,6 +30,7 @@ from sonar_processing.beams.beam_correction import BeamCorrection
 TOPICS = ("/sonar/raw", "/tf", "/tf_static", "/cmd_vel")
 SECONDS = 300.0
 RATE = 14.0
+AFTERWARDS = 1.0  # s until the next beam has shown that a turn has ended
 SAME_PLACE = 0.02
 SAME_HEADING = 0.001
 
@@ -46,13 +49,16 @@ class Marina(unittest.TestCase):
             cut(whole, minutes)
             cls.replayed = replayed(minutes)
             wait_for_subscribers("/sonar/raw", 1)
-            play(minutes, RATE)
+            fixes.wait_for_link()
+            play(minutes, RATE, steps(cls.replayed, fixes))
         diagnostics.wait_for("mlsm_core", "scans in", len(cls.replayed.updates))
-        wait_until(lambda: len(fixes.messages) >= cls.replayed.matched, timeout=5.0, required=False)
+        wait_until(lambda: len(fixes.messages) >= cls.replayed.matched, required=False)
         cls.fixes = [(stamp(fix), planar(fix.pose.pose.position, fix.pose.pose.orientation)) for fix in fixes.messages]
+        last = cls.replayed.updates[-1].scan.reference_time
+        wait_until(lambda: corrections(transforms)[0][-1] >= last)
         cls.corrections = corrections(transforms)
         whole_map = cls.replayed.mapper.block_count
-        wait_until(lambda: maps.messages[-1:] and maps.messages[-1].width >= whole_map, timeout=5.0, required=False)
+        wait_until(lambda: maps.messages[-1:] and maps.messages[-1].width >= whole_map, required=False)
         cls.map = rows(maps.messages[-1])
 
     def test_the_scans_that_map_bag_matches_are_matched(self) -> None:
@@ -83,6 +89,15 @@ class Marina(unittest.TestCase):
         live = composed(sent[np.searchsorted(times, ends) - 1], run.odometry[known])
         self.assertLess(np.median(np.hypot(*(live - run.corrected[known])[:, :2].T)), 0.1)
         self.assertGreater(np.median(np.hypot(*(run.odometry - run.corrected)[known, :2].T)), 0.3)
+
+
+def steps(run: Replayed, fixes: Inbox) -> List[Step]:
+    """Wait for the fix of each scan that map_bag matches, shortly after what it is matched with is played."""
+    found, counts = [], np.cumsum([update.result is not None for update in run.updates])
+    for update, count in zip(run.updates, counts):
+        wait = partial(fixes.wait_for_number, int(count))
+        found.append(Step(update.scan.reference_time + run.mapper.lookahead + AFTERWARDS, wait))
+    return found
 
 
 def cut(whole: Path, minutes: Path) -> None:

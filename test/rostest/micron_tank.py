@@ -7,7 +7,8 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import Inbox, play, recording, rows, wait_for_subscribers
+from graph import Inbox, recording, rows, wait_for_subscribers
+from playback import play
 from sensor_msgs.msg import PointCloud2
 
 RINGING = 0.4
@@ -32,9 +33,9 @@ class MicronTank(unittest.TestCase):
         maps = Inbox("/MLSM/cloud", PointCloud2)
         scans = Inbox("/sonar/scan/cleaned/cloud", PointCloud2)
         wait_for_subscribers("/sonar/raw", 1)
-        wait_for_subscribers("/sonar/scan/cleaned/cloud", 1)
+        scans.wait_for_link()
         play(bag, rate=4)
-        last = scans.wait_for(lambda _: len(scans.messages) >= 2)
+        last = scans.wait_for_number(2)[-1]
         cls.blocks = rows(maps.wait_for(lambda cloud: cloud.header.stamp == last.header.stamp))
 
     def test_four_walls_stand_as_straight_lines(self) -> None:

@@ -3,12 +3,16 @@
 
 import sys
 import unittest
-from typing import Any, Dict
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import Any, Dict, List
 
 import numpy as np
+import rosbag
 import rospy
 import rostest
-from graph import TEST_DATA, Inbox, play, rows, wait_for_subscribers
+from graph import TEST_DATA, Inbox, launched, rows, wait_for_links, wait_for_subscribers
+from playback import Step, play
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
@@ -20,31 +24,30 @@ ECHO_SPREAD, NOISE_SPREAD = 0.15, 4.0
 CELL = 0.5
 # Turns of the head in the bag, which ends in the middle of one.
 SCANS = 10
+BAG = TEST_DATA / "basin.bag"
+SECONDS = 4.0  # between waits for slow nodes
+# Of the beams, in each layout: sonar_to_cloud, and a node for images where it has one.
+LISTENERS = {"one": 1, "many": 2}
+INNER_TOPICS = {"one": (), "many": ("sonarCloud", "thresholded", "cleaned", "polar")}
+TOPICS = {
+    "cleaned": ("/sonar/scan/cleaned", StampedIntensityCloud),
+    "echoes": ("/sonar/scan/echoes", StampedIntensityCloud),
+    "laserScan": ("/sonar/scan/laserScan", LaserScan),
+    "threshold": ("/thresholder/threshold", Float32),
+    "image": ("/sonar/image", Image),
+}
 
 
 class OneAndManyProcesses(unittest.TestCase):
-    """Plays the bag once for all tests."""
+    """Plays the bag to one layout after the other, once for all tests: both would publish map -> odom."""
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Play the bag and wait for both maps."""
-        layouts = ("one", "many")
-        maps = {name: Inbox(f"/{name}/MLSM/cloud", PointCloud2) for name in layouts}
-        scans = {name: Inbox(f"/{name}/sonar/scan/cleaned", StampedIntensityCloud) for name in layouts}
-        beside = {name: _beside(name) for name in layouts}
-        wait_for_subscribers("/many/sonar/scan/cleaned", 2)
-        wait_for_subscribers("/many/sonar/scan/thresholded", 1)
-        wait_for_subscribers("/many/sonar/scan/sonarCloud", 1)
-        wait_for_subscribers("/one/sonar/scan/cleaned", 1)
-        wait_for_subscribers("/many/sonar/scan/polar", 1)
-        wait_for_subscribers("/sonar/raw", 3)
-        play(TEST_DATA / "basin.bag", rate=15)
-        cls.blocks, cls.beside = {}, {}
-        for name in layouts:
-            last = scans[name].wait_for(lambda _, inbox=scans[name]: len(inbox.messages) >= SCANS)
-            stamp = last.header.stamp
-            cls.blocks[name] = rows(maps[name].wait_for(lambda cloud, stamp=stamp: cloud.header.stamp == stamp))
-            cls.beside[name] = {what: newest(beside[name][what]) for what in beside[name]}
+        """Keep the maps and what is made beside them."""
+        with TemporaryDirectory() as maps:
+            made = {processes: _made(processes, Path(maps) / processes) for processes in LISTENERS}
+        cls.blocks = {processes: rows(messages["map"]) for processes, messages in made.items()}
+        cls.beside = made
 
     def test_both_layouts_make_the_same_blocks(self) -> None:
         """Not one bit differs."""
@@ -101,18 +104,40 @@ class OneAndManyProcesses(unittest.TestCase):
         self.assertLess(abs(np.median(short_walls)), CELL / 2)
 
 
-def _beside(layout: str) -> Dict[str, Inbox]:
-    return {
-        "echoes": Inbox(f"/{layout}/sonar/scan/echoes", StampedIntensityCloud),
-        "laserScan": Inbox(f"/{layout}/sonar/scan/laserScan", LaserScan),
-        "threshold": Inbox(f"/{layout}/thresholder/threshold", Float32),
-        "image": Inbox(f"/{layout}/sonar/image", Image),
-    }
+def _steps(clouds: Inbox, maps: Inbox) -> List[Step]:
+    """Wait every few seconds of the bag until the map holds all clouds that have come."""
+
+    def wait() -> None:
+        newest = clouds.messages[-1:]
+        if newest:
+            maps.wait_for(lambda shown: shown.header.stamp >= newest[0].header.stamp)
+
+    with rosbag.Bag(str(BAG)) as bag:
+        return [Step(time, wait) for time in np.arange(bag.get_start_time(), bag.get_end_time(), SECONDS)]
 
 
-def newest(inbox: Inbox) -> Any:
-    """Return what came after the last turn (images come more often)."""
-    return inbox.wait_for(lambda _: len(inbox.messages) >= SCANS)
+def _made(processes: str, folder: Path) -> Dict[str, Any]:
+    """Return what a layout publishes by the end of the last turn: the newest message of each topic.
+
+    It saves its map in `folder`, in which a node that is started again would go on in its map.
+    """
+    inboxes = {name: Inbox(topic, kind) for name, (topic, kind) in TOPICS.items()}
+    maps = Inbox("/MLSM/cloud", PointCloud2)
+    arguments = (f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml", f"map_directory:={folder}")
+    with launched("mapping.launch", *arguments):
+        for inbox in (maps, *inboxes.values()):
+            inbox.wait_for_link()
+        for topic in INNER_TOPICS[processes]:
+            wait_for_links(f"/sonar/scan/{topic}", 2 if topic == "cleaned" else 1)
+        wait_for_subscribers("/sonar/raw", LISTENERS[processes])
+        play(BAG, rate=15, steps=_steps(inboxes["cleaned"], maps))
+        # Images come more often than turns.
+        made = {name: inbox.wait_for_number(SCANS)[-1] for name, inbox in inboxes.items()}
+        stamp = made["cleaned"].header.stamp
+        made["map"] = maps.wait_for(lambda cloud: cloud.header.stamp == stamp)
+    for inbox in (maps, *inboxes.values()):
+        inbox.close()
+    return made
 
 
 def walls() -> list:

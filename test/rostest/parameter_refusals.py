@@ -13,15 +13,14 @@ from typing import Any, Dict, List, Tuple
 import rospy
 import rostest
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE_ROOT, Diagnostics
+from graph import PACKAGE, PACKAGE_ROOT, PATIENCE, Diagnostics
 
-PACKAGE = "underwater_map_construction"
 sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
 
-from document import LIVE_NODES  # noqa: E402
+from document import LIVE_NODES
 
-from node_support.node_table import HOSTS  # noqa: E402
-from node_support.parameters import describe  # noqa: E402
+from node_support.node_table import HOSTS
+from node_support.parameters import describe
 
 # Beyond what dynamic_reconfigure itself refuses to send: an integer has 32 bits there.
 INT_LIMIT = 2**31 - 1
@@ -72,7 +71,13 @@ def start(case: Tuple[int, Tuple[str, str]]) -> "subprocess.CompletedProcess[str
         command.append("__ns:=elsewhere")
     environment = {**os.environ, "ROSCONSOLE_FORMAT": "${message}"}
     return subprocess.run(
-        command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=60, check=False
+        command,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.STDOUT,
+        text=True,
+        timeout=2 * PATIENCE,
+        check=False,
     )
 
 
@@ -83,8 +88,8 @@ class ParameterRefusals(unittest.TestCase):
         """The answer holds the value from before, and the diagnostics count every refusal."""
         diagnostics, accepted, sent = Diagnostics(), [], 0
         for node in sorted(LIVE_NODES):
-            client = Client(f"/{node}", timeout=20)
-            before = client.get_configuration(timeout=20)
+            client = Client(f"/{node}", timeout=PATIENCE)
+            before = client.get_configuration(timeout=PATIENCE)
             refused = 0
             for field in LIVE_NODES[node].parameters.tunable_fields():
                 for value in bad_values(field):

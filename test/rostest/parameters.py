@@ -8,15 +8,15 @@ import unittest
 import rospy
 import rostest
 from dynamic_reconfigure.client import Client
-from graph import Diagnostics
-
-PACKAGE = "underwater_map_construction"
+from graph import PACKAGE, PATIENCE, Diagnostics
 
 
 def start(node: str, parameter: str, name: str) -> "subprocess.CompletedProcess[str]":
     """Run a node that must end by itself."""
     command = ["rosrun", PACKAGE, node, f"__name:={name}", f"_{parameter}"]
-    return subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=30, check=False)
+    return subprocess.run(
+        command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE, check=False
+    )
 
 
 class Parameters(unittest.TestCase):
@@ -44,7 +44,7 @@ class Parameters(unittest.TestCase):
 
     def test_a_good_change_is_taken_while_running(self) -> None:
         """As dynparam or rqt_reconfigure send it."""
-        client = Client("/thresholder", timeout=20)
+        client = Client("/thresholder", timeout=PATIENCE)
         self.assertEqual(client.update_configuration({"otsu_multiplier": 2.0})["otsu_multiplier"], 2.0)
         self.assertEqual(rospy.get_param("/thresholder/otsu_multiplier"), 2.0)
         client.close()
@@ -52,7 +52,7 @@ class Parameters(unittest.TestCase):
     def test_a_bad_change_is_refused_and_the_old_value_stays(self) -> None:
         """It is counted, and neither bent into the range nor stored."""
         diagnostics = Diagnostics()
-        client = Client("/outlier_remover", timeout=20)
+        client = Client("/outlier_remover", timeout=PATIENCE)
         answer = client.update_configuration({"mode": "RADIUSES", "mean_k": 30})
         self.assertEqual((answer["mode"], answer["mean_k"]), ("STATISTICAL", 20))
         self.assertEqual(client.update_configuration({"min_radius": -3.0})["min_radius"], 1.0)

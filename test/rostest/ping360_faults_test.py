@@ -10,7 +10,7 @@ import rostest
 _HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path[:0] = [os.path.join(_HERE, os.pardir, "unit", name) for name in ("ping360_driver", "sonar_driver")]
 
-from driver_listener import PATIENCE, beams, diagnostics, values  # noqa: E402
+from driver_listener import beams, diagnostics, values  # noqa: E402
 from numbered_pings import RecordingInjector  # noqa: E402
 from ping360_fault_experiment import fault_rates  # noqa: E402
 from ping360_line import emulated, served_line  # noqa: E402
@@ -32,7 +32,7 @@ class TestFaults(unittest.TestCase):
         with HeadServer(emulated(port, cls.faults), served_line(port)):
             assert out_of_commands.wait(rospy.get_param("~time_limit"))
             cls.expected = [number for number, fault in enumerate(cls.faults.of_pings) if fault in _GOOD]
-            cls.beams.wait(lambda received: len(received) >= len(cls.expected), PATIENCE)
+            cls.beams.wait(lambda received: len(received) >= len(cls.expected))
             cls.health = values(diagnostics("ping360_driver").wait_for_more(2)[-1])
         cls.delivered = [int.from_bytes(bytes(beam.intensities[:4]), "big") for beam in cls.beams.received]
         print({fault.value: count for fault, count in cls.faults.counts.items()})

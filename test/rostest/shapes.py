@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -50,6 +50,7 @@ class Shapes(unittest.TestCase):
         cls.wall_markers = Inbox("/sonar/scan/line/markers", MarkerArray)
         cls.clouds = rospy.Publisher("clouds", StampedIntensityCloud, queue_size=10)
         wait_for_publisher_links(cls.clouds, 2)
+        wait_for_links("/tf_static", 2)
         for inbox in (cls.walls, cls.circles, cls.wall_points, cls.wall_markers):
             inbox.wait_for_link()
 

@@ -7,7 +7,7 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
@@ -31,6 +31,8 @@ class Standing(unittest.TestCase):
         cls.diagnostics = Diagnostics()
         publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
         wait_for_publisher_links(publisher, 1)
+        wait_for_links("/tf_static")
+        cls.fixes.wait_for_link()
         cls.transforms.wait_for()
         start = rospy.Time.now().to_sec()
         for turn in range(SCANS):
@@ -40,13 +42,12 @@ class Standing(unittest.TestCase):
 
     def test_every_scan_after_the_first_gives_a_fix(self) -> None:
         """They lie 0.5 m from where the first was taken."""
-        self.fixes.wait_for(lambda _: len(self.fixes.messages) >= SCANS - 1, timeout=10.0)
-        places = [fix.pose.pose.position.x for fix in self.fixes.messages]
+        places = [fix.pose.pose.position.x for fix in self.fixes.wait_for_number(SCANS - 1)]
         np.testing.assert_allclose(places, 0.5, atol=0.1)
 
     def test_map_to_odom_comes_to_the_fix_and_stays(self) -> None:
         """Within the blend time."""
-        found = self.transforms.wait_for(lambda message: message.transforms[0].transform.translation.x > 0.4, 10.0)
+        found = self.transforms.wait_for(lambda message: message.transforms[0].transform.translation.x > 0.4)
         self.assertAlmostEqual(found.transforms[0].transform.translation.x, 0.5, delta=0.1)
 
     def test_the_place_can_be_searched_for(self) -> None:

@@ -12,23 +12,24 @@ import rosbag
 import rosgraph
 import rospy
 import rostest
-from graph import TEST_DATA, Diagnostics
+from graph import TEST_DATA, Diagnostics, launched
 
 STOP = 2.0  # s
 
 
 class StoppedProcess(unittest.TestCase):
-    """The launch file plays the recording once."""
+    """Plays a recording of three minutes in fifteen seconds."""
 
     def test_every_beam_is_placed(self) -> None:
         """After stops at the beginning, in the middle and before the last beam."""
         with rosbag.Bag(str(TEST_DATA / "basin.bag")) as bag:
             beams = bag.get_message_count("/sonar/raw")
         diagnostics = Diagnostics()
-        for placed in (1, beams // 2, beams - 150):
-            diagnostics.wait_for("sonar_to_cloud", "beams placed", placed)
-            stop("/mapping")
-        diagnostics.wait_for("sonar_to_cloud", "beams placed", beams)
+        with launched("play_bag.launch", f"bag:={TEST_DATA}/basin.bag", "rate:=12", "rviz:=false"):
+            for placed in (1, beams // 2, beams - 150):
+                diagnostics.wait_for("sonar_to_cloud", "beams placed", placed)
+                stop("/mapping")
+            diagnostics.wait_for("sonar_to_cloud", "beams placed", beams)
 
 
 def stop(node: str) -> None:

@@ -8,7 +8,7 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import Diagnostics, Inbox
+from graph import PATIENCE, Diagnostics, Inbox
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, UInt32
 
@@ -59,15 +59,15 @@ class SonarControl(unittest.TestCase):
         beams = Inbox("/sonar/raw", SonarScanLine)
         cloud = Inbox("/MLSM/cloud", PointCloud2)
         commands = Inbox("/sonar_servo/command", Float64)
-        Inbox("/sonar_control/sweeps", UInt32).wait_for(timeout=60.0)
+        Inbox("/sonar_control/sweeps", UInt32).wait_for()
         # The count of sweeps may overtake beams and commands: topics have no common order.
-        beams.wait_for(lambda _: follow([-20, 0, 20], whole_scans(beams)), timeout=60.0)
-        commands.wait_for(lambda _: follow([0, 20, 0], sent(commands)), timeout=60.0)
-        cloud.wait_for(lambda message: points_on_floor(message) > 50, timeout=60.0)
+        beams.wait_for(lambda _: follow([-20, 0, 20], whole_scans(beams)))
+        commands.wait_for(lambda _: follow([0, 20, 0], sent(commands)))
+        cloud.wait_for(lambda message: points_on_floor(message) > 50)
 
     def test_2_a_mode_that_does_not_exist_is_refused(self) -> None:
         """The answer says which there are."""
-        rospy.wait_for_service("/sonar_control/set_mode", 20.0)
+        rospy.wait_for_service("/sonar_control/set_mode", PATIENCE)
         answer = rospy.ServiceProxy("/sonar_control/set_mode", SetScanMode)("VERTICAL")
         self.assertFalse(answer.success)
         self.assertIn("must be one of STATIC_MAPPING, HORIZONTAL", answer.message)

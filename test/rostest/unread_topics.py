@@ -115,9 +115,9 @@ class UnreadTopics(unittest.TestCase):
             if wait_until(lambda: all(inbox.messages for inbox in inboxes.values()), timeout=0.2, required=False):
                 break
         received = {topic: inbox.wait_for() for topic, inbox in inboxes.items()}
+        moved = inboxes["/sonar/scan/sonarCloud"].wait_for(lambda cloud: min(cloud.timeStamps) > 0.0)
         self.assertGreaterEqual(self.counting.serialised, len(TOPICS))
-        stamps = received["/sonar/scan/sonarCloud"].timeStamps
-        self.assertGreater(min(stamps), 0.0)
+        self.assertEqual(len(moved.timeStamps), moved.cloud.width * moved.cloud.height)
         self.assertEqual(len(received["/sonar/scan/laserScan"].ranges), BEAMS)
         self.assertEqual(received["/sonar/scan/polar"].cloud.height, BEAMS)
         self.assertEqual(received["/sonar/image"].encoding, "mono8")

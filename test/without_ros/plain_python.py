@@ -40,7 +40,7 @@ def run(*command: object, folder: Path) -> str:
     environment = {"HOME": str(folder), "PATH": os.pathsep.join([str(ENVIRONMENT / "bin"), "/usr/bin", "/bin"])}
     done = subprocess.run(
         [str(ENVIRONMENT / "bin" / program), *arguments], env=environment, cwd=str(folder), stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, text=True, timeout=60, check=False,
+        stderr=subprocess.STDOUT, text=True, timeout=600, check=False,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     return done.stdout

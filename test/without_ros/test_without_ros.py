@@ -8,7 +8,7 @@ from plain_python import install, run
 
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 # What needs ROS, and what needs a library that is installed where it is wanted.
-_OPTIONAL = {"ros", "compiled_loops", "compiled_insertion"}
+_OPTIONAL = {"ros", "compiled_loops", "compiled_insertion", "compiled_comparisons", "compiled_search", "compiled_sums"}
 IMPORT_ALL = """
 import importlib, sys
 for name in sys.argv[1:]:

@@ -17,6 +17,7 @@ def reported(path: Track, parameters: TwinParameters, rng: np.random.RandomState
     steps = np.gradient(path.times)
     heading = path.poses[:, 2] + parameters.heading_deviation * lasting(rng, steps, _HEADING_TIME)
     heading = heading + _QUICK_HEADING[0] * lasting(rng, steps, _QUICK_HEADING[1])
+    heading = heading + parameters.soft_iron * np.sin(2.0 * path.poses[:, 2])
     heading = heading + parameters.heading_walk * np.cumsum(rng.normal(size=len(steps)) * np.sqrt(np.abs(steps)))
     velocity = rotated(np.gradient(path.poses[:, :2], path.times, axis=0), -path.poses[:, 2] - parameters.direction)
     noise = np.column_stack([lasting(rng, steps, _SPEED_TIME) for _ in range(2)])

@@ -23,7 +23,9 @@ class TwinParameters:
     by which the compass drifts besides. speed_deviation: m/s, lasting 12 s. strength: level [dB] of an echo at 10 m.
     half_width: of the beam at half power. echo_length: of a plateau, m per 10 dB above the threshold. objects: piers,
     boats and posts. clutter: share of beams with a false echo. basin_radius, canal_radius: m of water kept free.
-    rotation: of the path. binary: strengths are 0 or 127, else graded.
+    rotation: of the path. binary: strengths are 0 or 127, else graded. soft_iron: of the compass, amplitude of an error
+    that turns twice with the heading. ebb: m by which all banks and objects grow into the water during the run, as
+    where sloping banks fall dry. ships: that pass within hearing, one after the other, at 1 m/s.
     """
 
     seed: int = 1
@@ -44,6 +46,9 @@ class TwinParameters:
     basin_radius: float = 20.0
     canal_radius: float = 11.0
     binary: bool = True
+    soft_iron: float = 0.0
+    ebb: float = 0.0
+    ships: int = 0
 
 
 TWINS = {
@@ -54,5 +59,12 @@ TWINS = {
     "poor_compass": TwinParameters(15, rotation=1.0, heading_deviation=0.035, heading_walk=0.001, direction=0.03),
     "weak": TwinParameters(16, rotation=2.5, strength=20.0, objects=25, clutter=0.12, direction=-0.06, echo_length=2.0),
     "wide_beam": TwinParameters(17, rotation=-0.5, half_width=0.04, basin_radius=26.0, canal_radius=15.0, delay=1.0),
+    "soft_iron": TwinParameters(19, rotation=0.3, soft_iron=0.07, direction=-0.05),
+    "short_odometry": TwinParameters(20, rotation=1.7, scale=0.05, direction=0.09),
+    "late": TwinParameters(21, rotation=-2.2, delay=1.5, direction=0.04),
+    "warm": TwinParameters(22, rotation=2.9, range_scale=0.03, scale=-0.01, direction=-0.08),
+    "ebb": TwinParameters(23, rotation=0.9, ebb=2.0, direction=0.06),
+    "ships": TwinParameters(24, rotation=-0.9, ships=12, direction=-0.03),
+    "open": TwinParameters(25, rotation=1.3, basin_radius=70.0, canal_radius=70.0, objects=8, direction=0.06),
     "graded": TwinParameters(18, PathForm.MIRRORED, 3.0, binary=False, direction=0.08, range_scale=0.015, scale=-0.01),
 }

@@ -4,13 +4,14 @@ from dataclasses import dataclass
 from typing import Tuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter
+from scipy.ndimage import distance_transform_edt, gaussian_filter
 
 from benchmarks.twins.parameters import TwinParameters
 
 RESOLUTION = 0.2  # m: a tenth of the accuracy that is looked for
 _MARGIN = 80.0  # m around the path, more than the sonar's range
 _CLEARANCE = 5.0  # m around the path in which nothing stands
+_SHIP = (12.0, 3.5)  # m, length and beam
 _CANAL_SMOOTHING = 600  # samples of the path, 60 s: banks do not follow a vehicle's weaving
 
 
@@ -51,6 +52,25 @@ def water_of(free: np.ndarray, origin: np.ndarray) -> Water:
     return Water(free, origin, np.stack(np.gradient(blurred)))
 
 
+def ebbed(water: Water, fall: float) -> Water:
+    """Return the water when banks and objects have grown into it by `fall` [m]."""
+    if fall <= 0.0:
+        return water
+    return Water(distance_transform_edt(water.free) * RESOLUTION > fall, water.origin, water.slopes)
+
+
+def with_ship(water: Water, place: np.ndarray, heading: float) -> Water:
+    """Return the water with a ship's hull in it, at `place` (2,) [m]."""
+    free = water.free.copy()
+    _add_hull(free, np.zeros_like(free), water.origin, place, heading, *_SHIP)
+    low, high = (np.maximum(((place + side * _SHIP[0] - water.origin) / RESOLUTION).astype(int), 0) for side in (-1, 1))
+    part = (slice(low[0], high[0]), slice(low[1], high[1]))
+    slopes = water.slopes.copy()
+    if min(free[part].shape) > 1:
+        slopes[(slice(None), *part)] = water_of(free[part], water.origin).slopes
+    return Water(free, water.origin, slopes)
+
+
 def _smoothed(path: np.ndarray) -> np.ndarray:
     window = min(_CANAL_SMOOTHING, len(path) // 4) * 2 + 1
     padded = np.pad(path, ((window // 2, window // 2), (0, 0)), mode="edge")
@@ -83,6 +103,13 @@ def _add_object(
 ) -> None:
     angle = rng.choice([0.2, 1.77]) + rng.normal(0.0, 0.1)
     length, width = (rng.uniform(4.0, 14.0), rng.uniform(0.5, 2.0)) if rng.rand() < 0.7 else (0.8, 0.8)
+    _add_hull(free, kept, origin, place, angle, length, width)
+
+
+def _add_hull(
+    free: np.ndarray, kept: np.ndarray, origin: np.ndarray, place: np.ndarray, angle: float, length: float, width: float
+) -> None:
+    """Fill a rectangle that stands at `angle` [rad], but for what is `kept` free."""
     low = np.maximum(((place - length - origin) / RESOLUTION).astype(int), 0)
     high = np.maximum(((place + length - origin) / RESOLUTION).astype(int), 0)
     part, held = (raster[low[0] : high[0], low[1] : high[1]] for raster in (free, kept))

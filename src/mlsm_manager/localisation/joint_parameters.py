@@ -2,13 +2,15 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from importlib.util import find_spec
 
 import numpy as np
 
 from mlsm_manager.localisation.odometry_choice import OdometryChoice
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
-from node_support.parameters import parameter
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from node_support.parameters import ParameterError, parameter
 
 # Deviations by which beams may be later than their stamps, and s of odometry that are worth waiting for.
 _LATE = 3.0
@@ -57,6 +59,16 @@ class JointParameters(OdometryChoice):
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
     )
+    solver_kernel: SolverKernel = parameter(
+        SolverKernel.NUMPY,
+        "what compares echoes with surfaces: NUMBA is faster and needs python3-numba; AUTO: NUMBA if installed",
+        tunable=False,
+    )
+
+    def check(self) -> None:
+        """Refuse what is not installed."""
+        if self.solver_kernel is SolverKernel.NUMBA and find_spec("numba") is None:
+            raise ParameterError("solver_kernel = NUMBA: needs numba; install it with: apt install python3-numba")
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.
@@ -87,4 +99,5 @@ class JointParameters(OdometryChoice):
                 lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
                 max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),
             ),
+            kernel=self.solver_kernel.resolved,
         )

@@ -2,6 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
+from threading import RLock
 from typing import Deque, List, Optional, Tuple
 
 import numpy as np
@@ -15,6 +16,7 @@ from mlsm_manager.surface_map.free_space.carving import BeamFindings, Carver, Ca
 from mlsm_manager.surface_map.free_space.pairing import pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Overlay
+from mlsm_manager.surface_map.running_copy import RunningCopy, finished
 
 _STRAYED = 0.5
 """Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
@@ -50,13 +52,17 @@ class KeyframeCarving:
     @property
     def blocks(self) -> Blocks:
         """A copy of what is known to be free, as all keyframes see it now."""
+        return finished(self.begin_copy(), RLock())
+
+    def begin_copy(self) -> RunningCopy:
+        """Return a copy of what is known to be free now, which is still to be made."""
         overlay = Overlay(self._free)
         for look in self._looks:
             if look is not None:
                 overlay.lay(look.findings.free)
-        blocks = self._free.blocks
+        copy = self._free.begin_copy()
         overlay.take_off()
-        return blocks
+        return copy
 
     def restore(self, free: Blocks) -> None:
         """Take what was known to be free. Raises ValueError for another resolution."""
@@ -85,12 +91,16 @@ class KeyframeCarving:
         clouds: List[TimedPoints],
         points: List[np.ndarray],
         placement: Placement,
+        scans: int = 1,
     ) -> None:
-        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`."""
+        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`.
+
+        scans: how many came since the last look.
+        """
         if self._carver is None or not self._most_followed:
             return
         self._looks.extend([None] * (len(clouds) - len(self._looks)))
-        for number in self._strayed(points, surface_map.resolution):
+        for number in self._strayed(points, surface_map.resolution, self._most_followed * scans):
             cloud, there = clouds[number], points[number]
             beams = FirstEchoes.of_level(there, cloud.times, placement.origins(cloud))
             self._looks[number] = _Look(there, self._carver.findings(surface_map, beams, there))
@@ -120,10 +130,10 @@ class KeyframeCarving:
         more = np.bincount(block[same], weights=beams[entry[same]], minlength=len(blocks))
         return rows[(more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)]
 
-    def _strayed(self, points: List[np.ndarray], resolution: float) -> List[int]:
-        """Return the numbers of the keyframes to be looked at again."""
+    def _strayed(self, points: List[np.ndarray], resolution: float, most: int) -> List[int]:
+        """Return the numbers of the keyframes to be looked at again, at most `most`."""
         moved = np.array([_moved(look, there) for look, there in zip(self._looks, points)])
-        farthest = np.argsort(-moved, kind="stable")[: self._most_followed]
+        farthest = np.argsort(-moved, kind="stable")[:most]
         return farthest[moved[farthest] > _STRAYED * resolution].tolist()
 
     def _last_hit(self, keys: np.ndarray) -> np.ndarray:

@@ -26,7 +26,8 @@ class Drawn:
 class KeyframeMap:
     """What is settled stays in the map; above it lies what the newest keyframes add, which can be taken off again.
 
-    The cost of drawing depends on the keyframes that are not settled, not on the map.
+    The cost of drawing depends on the keyframes that are not settled, not on the map. These are drawn when somebody
+    looks at the map, the others when they settle.
     """
 
     def __init__(
@@ -42,14 +43,29 @@ class KeyframeMap:
 
         The rest as MultiLevelSurfaceMap.
         """
-        self.map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
-        self.free = KeyframeCarving(resolution, limit, carver, most_followed)
+        self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
+        self._free = KeyframeCarving(resolution, limit, carver, most_followed)
+        self._kernel = kernel
         self._moving: Deque[TimedPoints] = deque()
-        self._overlay = Overlay(self.map)
+        self._overlay = Overlay(self._map)
         self._above = self._new().blocks
+        self._due: Optional[Placement] = None
+        self._left_out = 0
 
     def _new(self) -> MultiLevelSurfaceMap:
-        return MultiLevelSurfaceMap(self.map.resolution, self.map.limit)
+        return MultiLevelSurfaceMap(self._map.resolution, self._map.limit, kernel=self._kernel)
+
+    @property
+    def map(self) -> MultiLevelSurfaceMap:
+        """The map with all keyframes where they are now."""
+        self._draw_what_is_due()
+        return self._map
+
+    @property
+    def free(self) -> KeyframeCarving:
+        """The free space that all keyframes see."""
+        self._draw_what_is_due()
+        return self._free
 
     @property
     def moving(self) -> List[TimedPoints]:
@@ -59,6 +75,7 @@ class KeyframeMap:
     @property
     def covered(self) -> Covered:
         """What the map holds without them, in the cells that they changed."""
+        self._draw_what_is_due()
         return self._overlay.covered
 
     def insert(self, points: np.ndarray) -> InsertReport:
@@ -71,9 +88,10 @@ class KeyframeMap:
         origins: (n, 2) m, where they were heard from; None where that is not known, and nothing is carved.
         """
         self._overlay.take_off()
-        report = self.map.insert(points)
-        carved = None if origins is None else self.free.carve(self.map, points, times, origins)
-        self._overlay.lay(self._above)
+        report = self._map.insert(points)
+        carved = None if origins is None else self._free.carve(self._map, points, times, origins)
+        if self._due is None:
+            self._overlay.lay(self._above)
         return Drawn(report, carved)
 
     def add(self, cloud: TimedPoints) -> None:
@@ -81,15 +99,20 @@ class KeyframeMap:
         self._moving.append(cloud)
 
     def draw(self, placement: Placement, settled_until: float) -> Drawn:
-        """Draw all keyframes where they are now; those that end by `settled_until` [s] stay as they are drawn."""
+        """Draw all keyframes where they are now; those that end by `settled_until` [s] stay as they are drawn.
+
+        The others are where `placement` says when somebody looks at the map.
+        """
         self._overlay.take_off()
-        drawn = Drawn(InsertReport(0, 0, 0), None)
+        self._due, drawn = None, Drawn(InsertReport(0, 0, 0), None)
         while self._moving and self._moving[0].end <= settled_until:
             drawn = self._settled(self._moving.popleft(), placement, drawn.carved)
         if not self._moving:
             self._above = self._new().blocks
             return drawn
-        return Drawn(self._draw_moving(placement), drawn.carved)
+        self._due = placement
+        self._left_out += 1
+        return Drawn(self._map.admitted(placement.points(self._moving[-1])).report, drawn.carved)
 
     def settle(self, placement: Placement) -> None:
         """Draw all keyframes for the last time."""
@@ -98,22 +121,22 @@ class KeyframeMap:
 
     def _settled(self, cloud: TimedPoints, placement: Placement, before: Optional[CarveReport]) -> Drawn:
         """Draw the oldest keyframe for ever; `before`: what older ones carved."""
-        self.free.forget_oldest()
+        self._free.forget_oldest()
         points = placement.points(cloud)
-        report = self.map.insert(points)
-        carved = self.free.carve(self.map, points, cloud.times, placement.origins(cloud))
+        report = self._map.insert(points)
+        carved = self._free.carve(self._map, points, cloud.times, placement.origins(cloud))
         return Drawn(report, carved if before is None or carved is None else before + carved)
 
-    def _draw_moving(self, placement: Placement) -> InsertReport:
-        clouds, above = list(self._moving), self._new()
-        ends = np.cumsum([len(cloud) for cloud in clouds])
+    def _draw_what_is_due(self) -> None:
+        """Draw the keyframes that may still move, if that was put off."""
+        if self._due is None:
+            return
+        (placement, self._due), clouds, above = (self._due, None), list(self._moving), self._new()
         everything = placement.points(TimedPoints.joined(clouds))
-        points = np.split(everything, ends[:-1])
-        # All but the newest at once, whose report is wanted: blocks do not depend on the order.
-        above.insert(everything[: len(everything) - len(points[-1])])
-        report = above.insert(points[-1])
+        points = np.split(everything, np.cumsum([len(cloud) for cloud in clouds])[:-1])
+        above.insert(everything)
         self._above = above.blocks
         self._overlay.lay(self._above)
-        self.free.look(self.map, clouds, points, placement)
-        self._overlay.hide(self.free.outworn(self.map))
-        return report
+        self._free.look(self._map, clouds, points, placement, self._left_out)
+        self._left_out = 0
+        self._overlay.hide(self._free.outworn(self._map))

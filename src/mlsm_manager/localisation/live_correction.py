@@ -1,5 +1,6 @@
 """The correction map -> odom between scans, without jumps: the odometry's errors that were found go on."""
 
+import math
 import threading
 from collections import deque
 from typing import Deque, Optional, Tuple
@@ -86,10 +87,8 @@ class LiveCorrection:
         if self._jump_time is None:
             self._jump_time = time
         left = self._share_left(time - self._jump_time)
-        self._shown = composed(self._state[POSE], left * self._jump)
-        correction = composed(self._shown, inverse(odometry))
-        correction[2] = wrapped(correction[2])
-        return correction
+        self._shown = composed(self._state[POSE], left * self._jump) if left else self._state[POSE].copy()
+        return _correction(self._shown, odometry)
 
     def _follow(self, time: float, odometry: np.ndarray) -> None:
         if self._state is None or not self._samples:
@@ -100,4 +99,12 @@ class LiveCorrection:
     def _share_left(self, seconds: float) -> float:
         if self.blend_time <= 0.0:
             return 0.0
-        return float(np.clip(1.0 - seconds / self.blend_time, 0.0, 1.0))
+        return min(max(1.0 - seconds / self.blend_time, 0.0), 1.0)
+
+
+def _correction(T_map_base: np.ndarray, T_odom_base: np.ndarray) -> np.ndarray:
+    """Return T_map_odom (3,), with its yaw in [-pi, pi); in plain numbers, which is faster for a single pose."""
+    x, y, yaw = T_odom_base.tolist()
+    turn = float(T_map_base[2]) - yaw
+    cos, sin = math.cos(turn), math.sin(turn)
+    return np.array([T_map_base[0] - cos * x + sin * y, T_map_base[1] - sin * x - cos * y, wrapped(turn)])

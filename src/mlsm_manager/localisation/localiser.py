@@ -19,6 +19,7 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.running_copy import finished
 from node_support.errors import RefusedInput
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
@@ -70,6 +71,7 @@ class Localiser:
         self._newest: Optional[Scan] = None
         self._newest_came = 0.0
         self._search = PlaceSearch()
+        self._resumed_at: Optional[StoredPlace] = None
         self._changes = 0
         self.use(settings)
 
@@ -95,13 +97,13 @@ class Localiser:
     @property
     def blocks(self) -> Blocks:
         """The map that is shown and saved, as it is now."""
-        with self._lock:
-            return self.mapper.blocks
+        return self._copied(Layer.SHOWN)
 
     @property
     def block_count(self) -> int:
         """Number of blocks of the map."""
-        return self.mapper.block_count
+        with self._lock:
+            return self.mapper.block_count
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown whose mean lies from `low` to `high`, (2,) or (3,) m."""
@@ -116,8 +118,12 @@ class Localiser:
     @property
     def free(self) -> Blocks:
         """What is known to be free."""
+        return self._copied(Layer.FREE)
+
+    def _copied(self, layer: Layer) -> Blocks:
         with self._lock:
-            return self.mapper.layers[Layer.FREE]
+            copy = self.mapper.begin_copy(layer)
+        return finished(copy, self._lock)
 
     @property
     def changes(self) -> int:
@@ -198,7 +204,7 @@ class Localiser:
             self.mapper.forget_place()
             self._live.clear()
             self._search.jump()
-            self._newest = None
+            self._newest = self._resumed_at = None
         return until - time
 
     def check_time(self, time: float) -> None:
@@ -207,6 +213,10 @@ class Localiser:
         if until is not None and time < until - _JUMP_BACK:
             detail = f"by {until - time:.1f} s, since the odometry was followed without them; the machine is too slow"
             raise RefusedInput("scans too late", detail)
+
+    def bridged(self, track: Track) -> Track:
+        """Return a track that begins where the vehicle was when its place was stored; see StoredPlace.bridged."""
+        return track if self._resumed_at is None else self._resumed_at.bridged(track)
 
     def silent_since(self, time: float) -> Optional[float]:
         """Return the time [s] of the belief when it is so old at `time` that `follow` must be called, else None."""
@@ -256,10 +266,11 @@ class Localiser:
         Keyframes are only stored with the name of a run of the graph, in which a node can go on with them.
         """
         with self._lock:
-            belief, layers = self.mapper.belief, dict(self.mapper.layers)
+            belief, copies = self.mapper.belief, {layer: self.mapper.begin_copy(layer) for layer in Layer}
             keyframes = self.mapper.keyframes if run else {}
             correction = self.mapper.correction.copy()
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
+        layers = {layer: finished(copy, self._lock) for layer, copy in copies.items()}
         return StoredMap(frame, layers, calibration, made, arrays, run)
 
     def restore(self, stored: StoredMap, same_odometry: bool) -> str:
@@ -276,6 +287,7 @@ class Localiser:
             self._newest = None
             self._search.lose()
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
+            self._resumed_at = place
             if place is not None:
                 self.mapper.start_from(place.widened, place.correction)
                 self._live.start_from(place.correction)
@@ -290,5 +302,5 @@ class Localiser:
             self.mapper.clear()
             self._live.clear()
             self._search.forget()
-            self._newest = None
+            self._newest = self._resumed_at = None
         return count

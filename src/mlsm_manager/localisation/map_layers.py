@@ -11,6 +11,7 @@ from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.carving import Carver
 from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.running_copy import RunningCopy
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,9 @@ class HasBlocks(Protocol):
     @property
     def blocks(self) -> Blocks:
         """A copy of all of them."""
+
+    def begin_copy(self) -> RunningCopy:
+        """Return a copy of all of them as they are now, which is still to be made."""
 
 
 class LayerCopies(Mapping[Layer, Blocks]):
@@ -91,8 +95,15 @@ class ShowsMaps(ABC):
     @property
     def layers(self) -> Mapping[Layer, Blocks]:
         """Copies of all maps, to be stored, each made when it is asked for."""
-        maps = {Layer.SHOWN: self._shown_map, Layer.MATCHED: self._matched_map, Layer.FREE: self._free_space}
-        return LayerCopies(maps)
+        return LayerCopies(self._by_layer)
+
+    def begin_copy(self, layer: Layer) -> RunningCopy:
+        """Return a copy of a map as it is now, which is still to be made."""
+        return self._by_layer[layer].begin_copy()
+
+    @property
+    def _by_layer(self) -> Dict[Layer, HasBlocks]:
+        return {Layer.SHOWN: self._shown_map, Layer.MATCHED: self._matched_map, Layer.FREE: self._free_space}
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""

@@ -18,6 +18,7 @@ from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.surface_map.insertion import InsertionKernel
@@ -91,7 +92,8 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
     @property
     def chosen_kernel(self) -> InsertionKernel:
         """What inserts points into the map that is shown."""
-        return InsertionKernel.NUMPY
+        compiled = self.solver_kernel.resolved is SolverKernel.NUMBA
+        return InsertionKernel.NUMBA if compiled else InsertionKernel.NUMPY
 
     @property
     def matches_from_start(self) -> bool:
@@ -177,6 +179,7 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
 
     def check(self) -> None:
         """Refuse an extent that cannot be reserved, what is not installed, and a map that would correct itself."""
+        super().check()
         if self.expected_blocks > MAX_PREALLOCATED_CELLS:
             raise ParameterError(
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "

@@ -6,10 +6,14 @@ from typing import Dict, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.matching.problem.prediction import Belief
+from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.matching.problem.state import POSE, STATES
+from node_support.geometry.planar import composed, inverse
 
 # m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
 _STRAYED = np.array([1.0, 1.0, 0.1])
+# s: in one or two turns of a head a vehicle hardly leaves a straight line.
+_LONGEST_BRIDGE = 30.0
 # So many scans in a row that do not match show that the vehicle is elsewhere.
 _MOST_REJECTED = 3
 
@@ -41,6 +45,18 @@ class StoredPlace:
             return None
         belief = Belief(float(arrays["time"][0]), arrays["state"], arrays["covariance"])
         return StoredPlace(arrays["T_map_odom"], belief)
+
+    def bridged(self, track: Track) -> Track:
+        """Return a track that goes straight from here to its beginning, where that is some seconds later.
+
+        A node that is started again within a scan has no odometry of the seconds before. Where it was when it was saved
+        is known, and with the odometry along a straight line the echoes of those seconds lie better than without any.
+        """
+        if not 0.0 < track.times[0] - self.belief.time < _LONGEST_BRIDGE:
+            return track
+        T_odom_base = composed(inverse(self.correction), self.belief.theta[POSE])
+        times, poses = np.append(self.belief.time, track.times), np.vstack([T_odom_base, track.poses])
+        return Track(times, poses)
 
     @property
     def widened(self) -> Belief:

@@ -13,6 +13,7 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.running_copy import RunningCopy
 
 
 class ScanMapper(Protocol):
@@ -53,6 +54,9 @@ class ScanMapper(Protocol):
     @property
     def layers(self) -> Mapping[Layer, Blocks]:
         """Copies of all maps, to be stored, each made when it is asked for."""
+
+    def begin_copy(self, layer: Layer) -> RunningCopy:
+        """Return a copy of a map as it is now, which is still to be made."""
 
     def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return the blocks of the map that is shown in a box; see MultiLevelSurfaceMap.in_box."""

@@ -1,10 +1,10 @@
 """Which points are compared with which: each with its nearest neighbour in every block of scans."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Protocol, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.surface_points import ramp
@@ -24,9 +24,24 @@ class Pairs:
     neighbours: np.ndarray
     importance: np.ndarray
 
+    def weighted(self, factors: np.ndarray) -> "Pairs":
+        """Return the comparisons with their importance times the factor of their neighbour; factors: (k,)."""
+        return replace(self, importance=self.importance * factors[self.neighbours])
+
+
+class Neighbours(Protocol):
+    """Finds neighbours in a set of targets."""
+
+    def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
+        """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
+
+        For each source and each block of scans these are the nearest targets of other scans, and their shares add up
+        to 1. Sources and targets are those of the beginning, perhaps moved.
+        """
+
 
 def pairs_of(
-    lists: NeighbourLists, sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
+    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
 

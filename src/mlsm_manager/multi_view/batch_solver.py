@@ -5,13 +5,13 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.association import Pairs, pairs_of
+from mlsm_manager.multi_view.association import Neighbours, Pairs, pairs_of
+from mlsm_manager.multi_view.comparing import Comparing
 from mlsm_manager.multi_view.comparisons import add_comparisons, support
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.loops import Loop, add_loops, loops_of
-from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -112,7 +112,8 @@ class _Batch:
         self._loops, self._start = list(loops), state.copy()
         self._solution = None
         self._move = np.zeros(self._layout.size)
-        self._lists: Optional[NeighbourLists] = None
+        self._comparing = Comparing.by(parameters.kernel)
+        self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
         self._lone = LoneComparisons(log, odometry, parameters.matching, scans, np.ones(len(scans)))
 
@@ -121,7 +122,7 @@ class _Batch:
         equations, matching = self._expected(), self._parameters.matching
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self._met()
-        add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
+        add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut, self._comparing.summed)
         self._lone.add(equations, self._layout, self.state, matching.cut)
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
@@ -138,7 +139,7 @@ class _Batch:
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
-        equations = NormalEquations(self._layout.size)
+        equations = NormalEquations(self._layout.size, scattering=self._comparing.scattered)
         odometry, sonar = self._odometry, self._parameters.sonar
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
@@ -150,7 +151,7 @@ class _Batch:
         matching = self._parameters.matching
         points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
         if self._lists is None:
-            self._lists = NeighbourLists(points, matching.block_scans)
+            self._lists = self._comparing.neighbours(points, matching.block_scans)
         return points, pairs_of(self._lists, points, points, matching.cut, matching)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:

@@ -1,6 +1,6 @@
 """Residuals of points against the surfaces that other scans heard, as normal equations."""
 
-from typing import Tuple
+from typing import Callable, Tuple
 
 import numpy as np
 
@@ -13,6 +13,10 @@ from mlsm_manager.multi_view.weak_directions import discounted
 
 _PAIR_COLUMNS = 4 * POSE_COLUMNS + RUN_COLUMNS
 _PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
+Summation = Callable[[Pairs, PlacedPoints, PlacedPoints, SurfaceMatching, float], Tuple[np.ndarray, ...]]
+"""Takes pairs, sources, targets, matching and the cut [m]; returns the scans of sources (g,) and of targets (g,) of all
+pairs of scans that are compared, their information (g, 14, 14) and gradients (g, 14); the columns are those of
+`linearised`."""
 _MOST_SCANS = 10**8  # two scan numbers fit into one integer key
 
 
@@ -24,23 +28,26 @@ def add_comparisons(
     targets: PlacedPoints,
     matching: SurfaceMatching,
     cut: float,
-    importance: float = 1.0,
+    summation: Summation,
 ) -> int:
-    """Add the distances of `sources` from their neighbours' surfaces; return how many there are.
-
-    importance: factor of the weights, one or one per target.
-    """
+    """Add the distances of `sources` from their neighbours' surfaces; return how many there are."""
     if not len(pairs.rows):
         return 0
+    scans, other_scans, information, gradient = summation(pairs, sources, targets, matching, cut)
+    if matching.normal_deviation > 0.0:
+        information, gradient = discounted(information, gradient, scans, _PLACES, matching.normal_deviation)
+    equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
+    return len(pairs.rows)
+
+
+def summed(
+    pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, matching: SurfaceMatching, cut: float
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Return what the comparisons of each pair of scans say; see Summation."""
     residual, jacobian = linearised(pairs, sources, targets)
     weight = weights(residual, sources.slants[pairs.rows], targets.slants[pairs.neighbours], matching, cut)
-    weight = weight * pairs.importance * np.broadcast_to(importance, len(targets))[pairs.neighbours]
-    scans, other_scans, information, gradient = _summed(
-        sources.scans[pairs.rows], targets.scans[pairs.neighbours], residual, jacobian, weight
-    )
-    information, gradient = discounted(information, gradient, scans, _PLACES, matching.normal_deviation)
-    equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
-    return len(residual)
+    weight = weight * pairs.importance
+    return _summed(sources.scans[pairs.rows], targets.scans[pairs.neighbours], residual, jacobian, weight)
 
 
 def linearised(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> Tuple[np.ndarray, np.ndarray]:

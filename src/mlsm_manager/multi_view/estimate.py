@@ -52,8 +52,8 @@ class LiveEstimate:
 
     @property
     def run_deviations(self) -> np.ndarray:
-        """(2,) standard deviations of `run` if the frozen map had no error."""
-        return np.sqrt(np.diag(self.own_covariance)[-RUN_COLUMNS:])
+        """(2,) standard deviations of `run`: errors of the frozen map bend it as they bend the path."""
+        return np.sqrt(np.diag(self.covariance)[-RUN_COLUMNS:])
 
     @property
     def velocity(self) -> np.ndarray:

@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.multi_view.association import Pairs, faded
+from mlsm_manager.multi_view.neighbours import shares_of
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.state import BEFORE_THE_RUN
@@ -13,6 +14,7 @@ from mlsm_manager.multi_view.surface_points import LEAST_REACH, surface_normals
 from mlsm_manager.surface_map.blocks import cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
 
+_CANDIDATES = 3  # blocks that are looked at for each point: more than there usually are as near as the nearest one
 _SQUARE = 32.0
 """m: side of the squares into which blocks are sorted, to find those of an area without looking at all."""
 _MARGIN = 64.0
@@ -59,19 +61,22 @@ class KnownSurfaces:
     def compared(self, sources: PlacedPoints, cut: float, matching: SurfaceMatching) -> tuple:
         """Return the Pairs of `sources` with their nearest blocks within `cut` [m], and these as PlacedPoints.
 
-        The blocks' normals point as those of the sources do.
+        Blocks that are as near share the comparison. The blocks' normals point as those of the sources do.
         """
         if len(sources):
             self._reach(sources.places, cut)
         if self._tree is None or not len(sources):
             nothing = np.empty(0, dtype=np.int64)
             return Pairs(nothing, nothing, np.empty(0)), self._points.selected(nothing)
-        distance, index = self._tree.query(sources.places, k=1, distance_upper_bound=cut)
-        rows = np.flatnonzero(np.isfinite(distance))
-        targets = self._points.selected(index[rows])
+        distance, index = self._tree.query(sources.places, k=_CANDIDATES, distance_upper_bound=cut)
+        near = np.flatnonzero(np.isfinite(distance[:, 0]))
+        share = shares_of(distance[near].T, distance[near, 0]).T
+        own, rank = np.nonzero(share)
+        rows, distance, share = near[own], distance[near[own], rank], share[own, rank]
+        targets = self._points.selected(index[rows, rank])
         cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals)
         targets = replace(targets, normals=targets.normals * np.where(cosine < 0.0, -1.0, 1.0)[:, np.newaxis])
-        importance = faded(distance[rows], np.abs(cosine), cut, matching)
+        importance = share * faded(distance, np.abs(cosine), cut, matching)
         importance = importance * sources.qualities[rows] * targets.qualities
         kept = importance > 0.0
         return Pairs(rows[kept], np.flatnonzero(kept), importance[kept]), targets

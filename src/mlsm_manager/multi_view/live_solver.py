@@ -50,12 +50,12 @@ class LiveSolver:
         self._start, self._known = start, known
 
     def stored(self) -> Dict[str, np.ndarray]:
-        """Return all but the scans that `resumed` needs, as arrays by name."""
+        """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
         return {
             "odometry": _name_of(self.odometry),
-            "nodes": self._nodes.values,
-            "node_covariances": self._node_covariances.values,
-            "run_unknowns": self._run,
+            "nodes": self._nodes.values.copy(),
+            "node_covariances": self._node_covariances.values.copy(),
+            "run_unknowns": self._run.copy(),
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             **stacked(self.estimates, _ESTIMATE),

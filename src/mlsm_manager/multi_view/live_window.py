@@ -5,13 +5,13 @@ from typing import Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.agreement import agreement, surfaces_met
-from mlsm_manager.multi_view.association import pairs_of
+from mlsm_manager.multi_view.association import Neighbours, pairs_of
+from mlsm_manager.multi_view.comparing import Comparing
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
-from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.multi_view.odometry_model import OdometryModel, frozen_deviations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -56,7 +56,8 @@ class LiveWindow:
         self._start, self._known = start, known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
-        self._lists: Optional[Tuple[NeighbourLists, NeighbourLists]] = None
+        self._comparing = Comparing.by(parameters.kernel)
+        self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
         self._met = ()
         self._lone = self._lone_comparisons()
 
@@ -84,7 +85,7 @@ class LiveWindow:
 
     def step(self, cut: float) -> None:
         """Take one Gauss-Newton step with points up to `cut` [m] apart."""
-        equations = NormalEquations(self._layout.size, len(self._held_covariance))
+        equations = NormalEquations(self._layout.size, len(self._held_covariance), self._comparing.scattered)
         self._add_beliefs(equations)
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)
@@ -127,19 +128,21 @@ class LiveWindow:
         sources = recent.selected(recent.scans >= self._layout.first)
         frozen = self._frozen.moved_by_run(self._state.run)
         if self._lists is None:
-            self._lists = tuple(NeighbourLists(targets, matching.block_scans) for targets in (frozen, recent))
+            self._lists = tuple(
+                self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
+            )
         to_frozen, to_recent = (
             pairs_of(lists, sources, targets, cut, matching) for lists, targets in zip(self._lists, (frozen, recent))
         )
-        importance = self._frozen.importance
-        self._met = ()
-        count = add_comparisons(equations, self._layout, to_frozen, sources, frozen, matching, cut, importance)
+        met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
+        summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, matching)
-            count += add_comparisons(equations, self._layout, to_known, sources, known, matching, cut)
-            self._met += ((to_known, sources, known),)
-        self._met += ((to_frozen, sources, frozen), (to_recent, sources, recent))
-        return count + add_comparisons(equations, self._layout, to_recent, sources, recent, matching, cut)
+            met.insert(0, (to_known, sources, known))
+            summed.insert(1, met[0])
+        self._met = tuple(met)
+        by = self._comparing.summed
+        return sum(add_comparisons(equations, self._layout, *some, matching, cut, by) for some in summed)
 
     def _move(self, step: np.ndarray) -> None:
         nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)

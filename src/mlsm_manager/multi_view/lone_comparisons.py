@@ -6,7 +6,7 @@ from typing import Iterator, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.association import Pairs
-from mlsm_manager.multi_view.comparisons import add_comparisons
+from mlsm_manager.multi_view.comparisons import add_comparisons, summed
 from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import OdometryModel
@@ -44,9 +44,9 @@ class LoneComparisons:
         if self._lists is None:
             self._lists = NeighbourLists(points, self._matching.block_scans)
         pairs, count = lone_pairs(self._lists, sources, points, cut), 0
-        importance = self._importance[pairs.neighbours]
+        pairs = replace(pairs, importance=pairs.importance * self._importance[pairs.neighbours])
         for each, heard, met in along_and_across(pairs, sources, points):
-            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut, importance)
+            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut, summed)
         return count
 
 

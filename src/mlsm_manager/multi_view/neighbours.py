@@ -14,6 +14,15 @@ _CANDIDATES = 6  # kept of each point and block: more than there usually are wit
 _MARGIN = 1.0  # m beyond the cut that is looked up too: so far may points move before all is looked up anew
 
 
+def shares_of(distance: np.ndarray, nearest: np.ndarray) -> np.ndarray:
+    """Return which shares (k, n) of the comparison of a point its k candidates at `distance` (k, n) [m] have.
+
+    nearest: (n,) the least distance of each point. The shares add up to 1.
+    """
+    share = np.maximum(1.0 - (distance - nearest) / TIE, 0.0)
+    return share / share.sum(axis=0)
+
+
 class NeighbourLists:
     """For each point and each block of scans, the nearest points of other scans, found anew where they may be wrong.
 
@@ -29,11 +38,7 @@ class NeighbourLists:
         self._cut = -np.inf
 
     def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
-        """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
-
-        The shares of what one source meets in one block add up to 1. Sources and targets are those of the beginning,
-        perhaps moved.
-        """
+        """See association.Neighbours."""
         if not len(sources) or not len(targets):
             nothing = np.empty(0, dtype=np.int64)
             return nothing, nothing, np.empty(0), np.empty(0)
@@ -55,8 +60,7 @@ class NeighbourLists:
         """Share each comparison among the candidates that are hardly farther than the nearest."""
         entries = np.flatnonzero(nearest < cut)
         distance = distance[:, entries]
-        share = np.maximum(1.0 - (distance - nearest[entries]) / TIE, 0.0)
-        share /= share.sum(axis=0)
+        share = shares_of(distance, nearest[entries])
         rank, entry = np.nonzero(share)
         listed = entries[entry]
         return self._rows[listed], self._candidates[rank, listed], distance[rank, entry], share[rank, entry]

@@ -1,6 +1,6 @@
 """Sums of weighted residuals as normal equations, gathered in small blocks of columns."""
 
-from typing import Tuple, Union
+from typing import Callable, Tuple, Union
 
 import numpy as np
 import scipy.linalg
@@ -11,10 +11,21 @@ _REGULARISATION = 1e-9  # of a column that no residual touches: it stays where i
 _MOST_DENSE = 2500  # unknowns, about 500 scans: up to there 50 MB and faster than a sparse solution
 
 
+Scattering = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
+"""Takes a matrix (n, n), columns (m, c) and blocks (m, c, c), and adds each block to the matrix in its columns."""
+
+
+def scattered(matrix: np.ndarray, columns: np.ndarray, blocks: np.ndarray) -> None:
+    """Add blocks to a matrix; see Scattering."""
+    places = columns[:, :, np.newaxis] * len(matrix) + columns[:, np.newaxis]
+    matrix += np.bincount(places.ravel(), blocks.ravel(), matrix.size).reshape(matrix.shape)
+
+
 class NormalEquations:
     """information @ step = -gradient of `size` free unknowns; after them come the columns of `held` ones."""
 
-    def __init__(self, size: int, held: int = 0) -> None:
+    def __init__(self, size: int, held: int = 0, scattering: Scattering = scattered) -> None:
+        self._scattering = scattering
         self.size = size
         self._columns_end = size + held
         self.gradient = np.zeros(size)
@@ -48,11 +59,10 @@ class NormalEquations:
         For problems of bounded size.
         """
         side = self._columns_end + 1
-        result = np.zeros(side * side)
-        for columns, block in zip(self._columns, self._blocks):
-            places = columns[:, :, np.newaxis] * side + columns[:, np.newaxis]
-            result += np.bincount(places.ravel(), block.ravel(), side * side)
-        result = result.reshape(side, side)[: self.size, : self._columns_end]
+        result = np.zeros((side, side))
+        for columns, blocks in zip(self._columns, self._blocks):
+            self._scattering(result, columns, blocks)
+        result = result[: self.size, : self._columns_end]
         return result[:, : self.size] + _REGULARISATION * np.eye(self.size), result[:, self.size :]
 
     def sparse(self) -> scipy.sparse.csc_matrix:

@@ -78,4 +78,12 @@ class OdometryTimeline:
 
 
 def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values (..., c) at `times` (...) between those (n, c) at `known` (n,).
+
+    Only what lies around `times` is touched: the cost does not grow with the run.
+    """
+    if times.size and len(known):
+        first, last = np.searchsorted(known, [times.min(), times.max()])
+        near = slice(max(first - 1, 0), last + 2)
+        known, values = known[near], values[near]
     return np.stack([np.interp(times, known, column) for column in values.T], axis=-1)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, field
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.parameters import ParameterSet, parameter
 
 
@@ -101,9 +102,13 @@ class SolverWindow(ParameterSet):
 
 @dataclass(frozen=True)
 class MultiViewParameters:
-    """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters."""
+    """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters.
+
+    kernel: what compares points with surfaces.
+    """
 
     odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
     sonar: SonarCalibration = SonarCalibration()
     matching: SurfaceMatching = SurfaceMatching()
     window: SolverWindow = SolverWindow()
+    kernel: SolverKernel = SolverKernel.NUMPY

@@ -1,6 +1,6 @@
 """The vehicle's path at any time: as it was known then, or as it is known from the whole run."""
 
-from typing import Sequence
+from typing import Sequence, Tuple
 
 import numpy as np
 
@@ -31,10 +31,10 @@ class NodePath:
         """Return T_map_base (m, 3) at `times` (m,) [s] between nodes `legs` (m,) and the next ones, or about there."""
         return self._poses_of(self._timeline.motion(times), legs)
 
-    def bows(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
-        """Return how far (m, 2) [m] in map the path at `times` (m,) lies beside the straight line from node to node."""
-        bow = self._bow_of(self._timeline.motion(times), legs, self.shares(times, legs))
-        return np.column_stack([bow.real, bow.imag])
+    def poses_and_bows(self, times: np.ndarray, legs: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return `poses`, and how far (m, 2) [m] in map these lie beside the straight line from node to node."""
+        poses, bow = self._with_bow(self._timeline.motion(times), legs)
+        return poses, np.column_stack([bow.real, bow.imag])
 
     def velocities(self, times: np.ndarray, legs: np.ndarray, half_window: float) -> np.ndarray:
         """Return the mean velocities (m, 3) in map from `half_window` [s] before `times` (m,) to as long after."""
@@ -60,18 +60,17 @@ class NodePath:
         return poses + np.column_stack([beyond.real, beyond.imag, turn])
 
     def _poses_of(self, motion: Motion, legs: np.ndarray) -> np.ndarray:
-        share = self.shares(motion.times, legs)
-        place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1]
-        place = place + self._bow_of(motion, legs, share)
-        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + self._yaw(legs, share)])
+        return self._with_bow(motion, legs)[0]
 
-    def _bow_of(self, motion: Motion, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
+    def _with_bow(self, motion: Motion, legs: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the poses (m, 3), and how far beside the straight line x + i y (m,) they lie."""
+        share = self.shares(motion.times, legs)
+        yaw = (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
         from_node = self._odometry.reference(motion) - self._reference[legs]
         bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
-        return product(product(self._gain[legs], turned(self._yaw(legs, share))), bow)
-
-    def _yaw(self, legs: np.ndarray, share: np.ndarray) -> np.ndarray:
-        return (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
+        bow = product(product(self._gain[legs], turned(yaw)), bow)
+        place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1] + bow
+        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw]), bow
 
 
 def live_path(

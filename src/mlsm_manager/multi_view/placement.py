@@ -63,14 +63,14 @@ def _placed(
     nodes = np.unique(np.concatenate([scans, scans + 1]))
     legs = np.searchsorted(nodes, scans)
     path = NodePath(odometry, log.odometry, log.node_times[nodes], state.nodes[nodes])
-    poses = path.poses(times, legs)
+    poses, bows = path.poses_and_bows(times, legs)
     sight = _unit(points.bearings + poses[:, YAW]) * points.ranges[:, np.newaxis]
     mounting = rotated(np.broadcast_to(log.sonar_in_base, sight.shape), poses[:, YAW])
     arms = mounting + (1.0 + state.run[RANGE_SCALE]) * sight
     velocity = path.velocities(times, legs, _HALF_SECOND)
     by_delay = velocity[:, :2] + velocity[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
     return PlacedPoints(
-        scans=scans, places=poses[:, :2] + arms, arms=arms + path.bows(times, legs),
+        scans=scans, places=poses[:, :2] + arms, arms=arms + bows,
         normals=rotated(points.normals, poses[:, YAW]),
         slants=points.slants, qualities=points.qualities, shares=path.shares(times, legs),
         by_run=np.stack([sight, by_delay], axis=2),

@@ -50,7 +50,8 @@ class Calibration:
         """Return what one of the estimates of `solver` knows."""
         columns = solver.odometry.calibrated
         of_node, of_run = list(columns.values()), list(_OF_RUN.values())
-        deviations = np.append(_of_run(estimate.run_deviations, solver), estimate.node_deviations[of_node])
+        of_nodes = np.sqrt(np.diag(estimate.covariance)[of_node])
+        deviations = np.append(_of_run(estimate.run_deviations, solver), of_nodes)
         return cls((*_OF_RUN, *columns), np.append(estimate.run[of_run], estimate.node[of_node]), deviations)
 
     @classmethod

@@ -111,6 +111,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         "beams_without_transform": recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(recording.seconds / seconds, 1),
+        "solver_kernel": parameters.solver_kernel.resolved.value,
         "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
         **({} if found is None else found.to_mapping()),
         **({"sessions": [session.to_mapping() for session in sessions]} if sessions else {}),
@@ -228,7 +229,8 @@ def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session]
 def _report(summary: Dict[str, Any], options: Namespace) -> List[str]:
     lines = [
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
-        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time",
+        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time with "
+        f"{summary['solver_kernel'].lower()}",
         f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
     ]
     for name in (ODOMETRY, CORRECTED, REFINED):

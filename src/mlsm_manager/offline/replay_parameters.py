@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.parameters import LocaliserParameters
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.parameters import with_defaults
 from recordings.reading.parameters import ReadingParameters
 from sonar_processing.beams.beam_correction import BeamCorrection
@@ -13,6 +14,7 @@ from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 @dataclass(frozen=True)
 @with_defaults(
     estimator=Estimator.JOINT,
+    solver_kernel=SolverKernel.AUTO,
     range_scale_deviation=0.02,
     sonar_delay_deviation=1.0,
     scale_deviation=0.01,

@@ -118,6 +118,9 @@ class MapPublisher:
         if has_octomap_messages():
             self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, localiser, health))
         self._tell = on_change(parameters.map_period, self._publish, health)
+        # rospy takes connections before it knows the listeners, and tells them of none that came so early.
+        if localiser.block_count:
+            self.replace()
 
     def change(self, stamp_ns: Optional[int] = None) -> None:
         """Publish soon, because the map changed, by a cloud with this stamp where there is one."""
@@ -139,13 +142,17 @@ class MapPublisher:
             topic.publish_if_due()
 
     def _cloud(self) -> PointCloud2:
-        return map_cloud(self._localiser.blocks, self._stamp_ns, self._parameters.map_frame)
+        # In each message the stamp is read before the map: a cloud that comes between them may be there early, but
+        # none that the stamp tells of is missing.
+        stamp_ns = self._stamp_ns
+        return map_cloud(self._localiser.blocks, stamp_ns, self._parameters.map_frame)
 
     def _grid(self) -> OccupancyGrid:
-        parameters = self._parameters
+        parameters, stamp_ns = self._parameters, self._stamp_ns
         grid = occupancy(self._localiser.blocks, self._localiser.free, parameters.grid_low, parameters.grid_high)
-        return occupancy_grid(grid, self._stamp_ns, parameters.map_frame)
+        return occupancy_grid(grid, stamp_ns, parameters.map_frame)
 
     def _octomap(self) -> Any:
+        stamp_ns = self._stamp_ns
         tree = octree(self._localiser.blocks, self._localiser.free)
-        return octomap_message(tree, header(self._stamp_ns, self._parameters.map_frame))
+        return octomap_message(tree, header(stamp_ns, self._parameters.map_frame))

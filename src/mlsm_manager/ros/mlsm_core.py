@@ -179,7 +179,7 @@ class MlsmCore:
             if self._localiser.matching:
                 raise
             return None
-        scan = Scan.from_stamps(cloud.points, cloud.time_stamps, time, track)
+        scan = Scan.from_stamps(cloud.points, cloud.time_stamps, time, self._localiser.bridged(track))
         known = scan.with_odometry()
         # A node that was started within a scan has no odometry of its beginning: it has no reason to warn.
         self.health.count("echoes without odometry", len(scan) - len(known))

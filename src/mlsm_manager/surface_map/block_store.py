@@ -1,6 +1,7 @@
 """Where a map keeps its blocks: one float64 row each, found through the first block of their cell and a chain."""
 
 from typing import Tuple
+from weakref import WeakSet
 
 import numpy as np
 
@@ -8,6 +9,7 @@ from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, MOST_CROSSINGS,
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
 from mlsm_manager.surface_map.large_array import LargeArray
 from mlsm_manager.surface_map.linkage import Extents, Intervals
+from mlsm_manager.surface_map.running_copy import RunningCopy
 
 _MIN_ROWS = 1024
 """Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
@@ -24,6 +26,7 @@ class BlockStore:
         self._index = CellIndex(expected_blocks)
         self._used = 0
         self._free = np.empty(0, dtype=np.int64)
+        self._copies: WeakSet[RunningCopy] = WeakSet()
 
     def __len__(self) -> int:
         return self._used - len(self._free)
@@ -55,6 +58,16 @@ class BlockStore:
         """Return a copy of the blocks in `rows` (n,)."""
         return Blocks(self._rows[rows], resolution, self._crossed[rows])
 
+    def begin_copy(self, resolution: float) -> RunningCopy:
+        """Return a copy of all blocks as they are now, which is still to be made."""
+        copy = RunningCopy(self._row_array, self._crossed_array, self._used, resolution)
+        self._copies.add(copy)
+        return copy
+
+    def _before_change(self, rows: np.ndarray) -> None:
+        for copy in self._copies:
+            copy.before_change(rows)
+
     def slots(self, cells: np.ndarray) -> np.ndarray:
         """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
         return self._index.slots(cells)
@@ -83,6 +96,7 @@ class BlockStore:
 
     def release(self, rows: np.ndarray) -> None:
         """Give back rows (n,); the chain must be told by `chain`."""
+        self._before_change(rows)
         self._rows[rows, COUNT] = 0.0
         self._free = np.concatenate([self._free, rows])
 
@@ -106,11 +120,13 @@ class BlockStore:
 
     def write_rows(self, rows: np.ndarray, data: np.ndarray, crossed: np.ndarray) -> None:
         """Write data (n, ROW_WIDTH) and crossings (n,), or one number for all, into `rows` (n,)."""
+        self._before_change(rows)
         self._rows[rows] = data
         self._crossed[rows] = crossed
 
     def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks at `rows` (n,), none twice."""
+        self._before_change(rows)
         self._crossed[rows] = np.minimum(self._crossed[rows] + beams, MOST_CROSSINGS)
 
     def chain(self, rows: np.ndarray, cell: np.ndarray, slots: np.ndarray) -> None:

@@ -1,7 +1,7 @@
 """The Multi Level Surface Map: a grid of cells, each with blocks at several heights (thesis 6.2, 6.5.6)."""
 
 from dataclasses import dataclass
-from typing import Tuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
@@ -12,6 +12,7 @@ from mlsm_manager.surface_map.cell_order import cell_order
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
 from mlsm_manager.surface_map.insertion import InsertionKernel, insert_groups, point_inserter
 from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
+from mlsm_manager.surface_map.running_copy import RunningCopy
 
 
 @dataclass(frozen=True)
@@ -21,6 +22,13 @@ class InsertReport:
     inserted: int
     not_finite: int
     outside: int
+
+
+class Admitted(NamedTuple):
+    """points: (m, 4) that an insertion takes. report: of what becomes of all."""
+
+    points: np.ndarray
+    report: InsertReport
 
 
 class MultiLevelSurfaceMap:
@@ -59,6 +67,10 @@ class MultiLevelSurfaceMap:
     def blocks(self) -> Blocks:
         """A copy of all blocks, in no particular order."""
         return self._store.blocks(self._store.rows_in_use, self.resolution)
+
+    def begin_copy(self) -> RunningCopy:
+        """Return a copy of all blocks as they are now, which is still to be made; see `finished`."""
+        return self._store.begin_copy(self.resolution)
 
     def in_box(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return a copy of the blocks whose mean lies between `low` and `high`, (2,) x y or (3,) x y z [m].
@@ -131,17 +143,22 @@ class MultiLevelSurfaceMap:
 
         Points that are not finite or beyond the limit are left out and counted.
         """
+        kept, report = self.admitted(points)
+        if len(kept):
+            keys = cell_keys(cells_of(kept, self.resolution))
+            self._changed.note(self._insert_points(self._store, kept, keys, self.resolution))
+        return report
+
+    def admitted(self, points: np.ndarray) -> Admitted:
+        """Return those of points (n, 4) that `insert` would take, and what it would report."""
         points = np.asarray(points, dtype=np.float64)
         finite = np.isfinite(points).all(axis=1)
         with np.errstate(invalid="ignore"):
             inside = (np.abs(points[:, :3]) <= self.limit).all(axis=1)
         keep = finite & inside
         kept = points if keep.all() else points[keep]
-        if len(kept):
-            keys = cell_keys(cells_of(kept, self.resolution))
-            self._changed.note(self._insert_points(self._store, kept, keys, self.resolution))
         not_finite = len(points) - int(np.count_nonzero(finite))
-        return InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
+        return Admitted(kept, InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite))
 
     def insert_blocks(self, blocks: Blocks) -> InsertReport:
         """Insert blocks of the same resolution; each goes where its mean lies, as if its points came with it.

@@ -84,10 +84,15 @@ class BagWriter:
     def _append(self, topic: _Topic, data: bytes, stamp_ns: int) -> None:
         """Do what rosbags's Writer.write does, without making the record's header anew for each message."""
         chunk = self._writer.chunks[-1]
-        chunk.connections[topic.connection].append((stamp_ns, chunk.data.tell()))
-        chunk.start, chunk.end = min(chunk.start, stamp_ns), max(chunk.end, stamp_ns)
-        chunk.data.write(topic.head + _TIME_AND_SIZE.pack(*divmod(stamp_ns, 10**9), len(data)) + data)
-        if chunk.data.tell() > self._writer.chunk_threshold:
+        place = chunk.data.tell()
+        chunk.connections[topic.connection].append((stamp_ns, place))
+        if stamp_ns < chunk.start:
+            chunk.start = stamp_ns
+        if stamp_ns > chunk.end:
+            chunk.end = stamp_ns
+        record = topic.head + _TIME_AND_SIZE.pack(*divmod(stamp_ns, 10**9), len(data)) + data
+        chunk.data.write(record)
+        if place + len(record) > self._writer.chunk_threshold:
             self._writer.write_chunk(chunk)
 
 

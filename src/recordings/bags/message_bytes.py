@@ -101,6 +101,7 @@ def _of_length(values: Any, length: int, path: str) -> Any:
     return values
 
 
+@lru_cache(maxsize=1000)  # Texts: names of frames and joints mostly, which come with every message
 def _text(text: str) -> bytes:
     encoded = text.encode()
     return _LENGTH.pack(len(encoded)) + encoded

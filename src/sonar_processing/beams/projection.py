@@ -1,5 +1,7 @@
 """Places the bins of a beam in space (thesis 6.5.2)."""
 
+from typing import Sequence
+
 import numpy as np
 
 from sonar_processing.beams.beam import Beam
@@ -11,9 +13,23 @@ def project_beam(beam: Beam, T_target_sonar: np.ndarray, dispersed_points: int, 
     Every bin is drawn as `dispersed_points` points side by side across the horizontal `beam_width` [rad]; one point
     lies on the beam's axis. Points come ordered by side, then by range. T_target_sonar is (4, 4).
     """
-    headings = beam.angle + _offsets(dispersed_points, beam_width)
-    origins = np.broadcast_to(T_target_sonar[:3, 3], (dispersed_points, 3))
-    return bin_points(origins, beam_directions(headings, T_target_sonar), beam.ranges, beam.intensities).reshape(-1, 4)
+    return project_beams([beam], T_target_sonar[np.newaxis], dispersed_points, beam_width)[0]
+
+
+def project_beams(
+    beams: Sequence[Beam], T_target_sonar: np.ndarray, dispersed_points: int, beam_width: float
+) -> np.ndarray:
+    """Return (n, dispersed_points * bins, 4) float32: each beam as `project_beam` does, all of them at once.
+
+    The n beams have the same ranges; T_target_sonar is (n, 4, 4).
+    """
+    headings = np.array([beam.angle for beam in beams])[:, np.newaxis] + _offsets(dispersed_points, beam_width)
+    poses, strengths = (
+        np.repeat(values, dispersed_points, axis=0)
+        for values in (T_target_sonar, np.stack([beam.intensities for beam in beams]))
+    )
+    directions = beam_directions(headings.ravel(), poses)
+    return bin_points(poses[:, :3, 3], directions, beams[0].ranges, strengths).reshape(len(beams), -1, 4)
 
 
 def beam_directions(headings: np.ndarray, T_target_sonar: np.ndarray) -> np.ndarray:
@@ -31,7 +47,11 @@ def bin_points(origins: np.ndarray, directions: np.ndarray, ranges: np.ndarray, 
     origins: (n, 3) m; directions: (n, 3) unit vectors; ranges: (bins,) m; strengths: (bins,) or (n, bins).
     """
     points = np.empty((len(origins), ranges.size, 4), dtype=np.float32)
-    points[..., :3] = directions[:, np.newaxis] * ranges[:, np.newaxis] + origins[:, np.newaxis]
+    # One axis after the other takes a third of the time of all at once: numpy's inner loops are long then.
+    for axis in range(3):
+        along = np.multiply.outer(directions[:, axis], ranges)
+        along += origins[:, axis, np.newaxis]
+        points[..., axis] = along
     points[..., 3] = strengths
     return points
 

@@ -5,6 +5,7 @@ import numpy as np
 from node_support.errors import RefusedInput
 
 HIGHEST_LEVEL = 255
+EQUAL = 1e-12  # Share by which between-class variances differ because of rounding
 _LEVELS = np.arange(HIGHEST_LEVEL + 1)
 
 
@@ -17,9 +18,13 @@ def otsu_threshold(strengths: np.ndarray) -> float:
     """
     if strengths.size == 0:
         raise RefusedInput("clouds without points", "no strength to take a threshold of")
-    histogram = level_histogram(strengths)
+    return threshold_of_levels(level_histogram(strengths))
+
+
+def threshold_of_levels(histogram: np.ndarray) -> float:
+    """Return Otsu's threshold as otsu_threshold does, for the number of points in each level (256,), not all 0."""
     count_below = histogram.cumsum()
-    lowest, highest = count_below.searchsorted([1, strengths.size])
+    lowest, highest = count_below.searchsorted([1, count_below[-1]])
     if lowest == highest:
         return float(lowest)
     separating = slice(lowest, highest)
@@ -27,7 +32,7 @@ def otsu_threshold(strengths: np.ndarray) -> float:
     w1, sum1 = count_below[separating], sum_below[separating]
     w2, sum2 = count_below[-1] - w1, sum_below[-1] - sum1
     between = w1 * w2 * (sum1 / w1 - sum2 / w2) ** 2
-    best = np.flatnonzero(between >= between.max() * (1.0 - 1e-12)) + lowest
+    best = np.flatnonzero(between >= between.max() * (1.0 - EQUAL)) + lowest
     return float(best[0] + best[-1]) / 2.0
 
 

@@ -6,9 +6,10 @@ from typing import Optional
 
 import numpy as np
 
+from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.otsu import otsu_threshold
+from sonar_processing.filters.strengths import StrengthCounts, strength_loops
 
 
 class ThresholdMode(Enum):
@@ -63,6 +64,13 @@ class ThresholderParameters(ParameterSet):
         high=255.0,
         thesis_name="minThresholdValue",
     )
+    kernel: Kernel = parameter(
+        Kernel.NUMPY, "what runs the loops: NUMBA is two to three times faster and needs python3-numba", tunable=False
+    )
+
+    def check(self) -> None:
+        """Raise ParameterError for a kernel that is not installed."""
+        check_kernel("kernel", self.kernel)
 
 
 class Thresholder:
@@ -70,6 +78,7 @@ class Thresholder:
 
     def __init__(self, parameters: ThresholderParameters) -> None:
         self.parameters = parameters
+        self._loops = strength_loops(parameters.kernel)
         self.newest_threshold: Optional[float] = None
         """The threshold of the newest cloud; None before the first and for a cloud without a finite point."""
 
@@ -78,17 +87,14 @@ class Thresholder:
 
         Echoes are what lies above the threshold, as in Otsu's upper class.
         """
-        valid = cloud.valid
-        if not valid.any():
-            self.newest_threshold = None
-            return cloud.select(valid)
-        strengths = np.ascontiguousarray(cloud.points[:, 3])
-        self.newest_threshold = threshold = self.threshold(strengths if valid.all() else strengths[valid])
-        with np.errstate(invalid="ignore"):
-            return cloud.select(valid & (strengths > threshold))
+        counts = self._loops.count(cloud)
+        self.newest_threshold = None if counts.is_empty else self.threshold(counts)
+        if self.newest_threshold is None:
+            return cloud.take(np.empty(0, dtype=np.int64))
+        return cloud.take(self._loops.strong(cloud, self.newest_threshold))
 
-    def threshold(self, strengths: np.ndarray) -> float:
-        """Return the threshold for `strengths` (n,), n > 0, all finite.
+    def threshold(self, counts: StrengthCounts) -> float:
+        """Return the threshold of a cloud with a finite point.
 
         OTSU and OTSU+PROPORTIONAL separate strong echoes from weak ones. Where all strengths above 0 are the same,
         somebody has separated them already (a recording of detections): then their threshold is 0, or min_threshold if
@@ -98,16 +104,14 @@ class Thresholder:
         if parameters.mode is ThresholdMode.FIXED:
             value = parameters.fixed_threshold
         elif parameters.mode is ThresholdMode.PROPORTIONAL:
-            value = parameters.max_proportion * strengths.max() + parameters.min_proportion * strengths.min()
+            value = parameters.max_proportion * counts.highest + parameters.min_proportion * counts.lowest
         elif parameters.mode is ThresholdMode.OTSU:
-            value = self._otsu(strengths)
+            value = self._otsu(counts)
         else:
-            value = parameters.otsu_multiplier * self._otsu(strengths)
-        return max(float(value), parameters.min_threshold)
+            value = parameters.otsu_multiplier * self._otsu(counts)
+        return max(value, parameters.min_threshold)
 
-    def _otsu(self, strengths: np.ndarray) -> float:
-        # By index, because a mask with many changes takes four times as long.
-        echoes = strengths.take(np.flatnonzero(strengths > 0))
-        if not echoes.size or echoes.min() == echoes.max():
+    def _otsu(self, counts: StrengthCounts) -> float:
+        if not counts.echoes_differ:
             return 0.0
-        return otsu_threshold(echoes if self.parameters.otsu_nonzero else strengths)
+        return self._loops.separate(counts.levels if self.parameters.otsu_nonzero else counts.all_levels)

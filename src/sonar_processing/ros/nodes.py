@@ -22,14 +22,14 @@ def run_line_detector() -> None:
     """Run line_detector."""
     from sonar_processing.ros.shape_detectors import LineDetectorNode
 
-    run("line_detector", LineDetectorNode)
+    run("line_detector", LineDetectorNode.as_node)
 
 
 def run_circle_detector() -> None:
     """Run circle_detector."""
     from sonar_processing.ros.shape_detectors import CircleDetectorNode
 
-    run("circle_detector", CircleDetectorNode)
+    run("circle_detector", CircleDetectorNode.as_node)
 
 
 def run_sonar_control() -> None:

@@ -1,6 +1,7 @@
 """sonar_to_cloud and the chain of stages in one process: arrays go from stage to stage, nothing is copied."""
 
-from typing import List, Optional
+from collections import defaultdict
+from typing import TYPE_CHECKING, Collection, Dict, Iterable, List, Mapping, Optional, Sequence
 
 import rospy
 
@@ -13,61 +14,98 @@ from sonar_processing.ros.sonar_image import SonarImage
 from sonar_processing.ros.sonar_to_cloud import SonarToCloud
 from sonar_processing.ros.stage_runner import StageRunner
 
+if TYPE_CHECKING:
+    from sonar_processing.ros.hosted_detectors import HostedDetector
+
+DETECTORS = ("line_detector", "circle_detector")
 DEFAULT_CHAIN = ["thresholder", "outlier_remover", "echo_extractor"]
 
 
 class StageChain:
     """Stages one after the other; each gets what the one before made."""
 
-    def __init__(self, runners: List[StageRunner], sink: Optional[CloudSink] = None) -> None:
-        """`sink` receives what leaves the last stage."""
-        self._runners = runners
-        self._sink = sink
+    def __init__(self, runners: List[StageRunner], sinks: Mapping[str, Sequence[CloudSink]]) -> None:
+        """`sinks` receive what stages make, by the output topics of these stages."""
+        self._links = [(runner, sinks.get(runner.output_topic, ())) for runner in runners]
 
     def is_wanted(self) -> bool:
         """Return whether anybody takes anything that the stages make."""
-        is_taken = self._sink is not None and self._sink.is_wanted()
-        return bool(self._runners) and (is_taken or any(runner.is_read for runner in self._runners))
+        return any(runner.is_read or any(sink.is_wanted() for sink in sinks) for runner, sinks in self._links)
 
     def process(self, scan: IntensityCloud) -> None:
         """Take a cloud through all stages."""
         cloud: Optional[IntensityCloud] = scan
-        for runner in self._runners:
+        for runner, sinks in self._links:
             cloud = runner.process(cloud)
             if cloud is None:
                 return
-        if self._sink is not None:
-            self._sink.take(cloud)
+            for sink in sinks:
+                if sink.is_wanted():
+                    sink.take(cloud)
 
 
 class Pipeline:
-    """Hosts the stages named by `~chain` and sonar_image, with the parameters and topics they have as nodes.
+    """Hosts the stages named by `~chain`, the detectors named by `~detectors` and sonar_image.
 
-    Stages that take polar scans run beside the others, and only while somebody subscribes to their results.
+    All have the parameters and topics they have as nodes. Stages that take polar scans run beside the others, and, as
+    detectors do, only while somebody subscribes to their results.
     """
 
     def __init__(self, cloud_sink: Optional[CloudSink] = None, echo_sink: Optional[CloudSink] = None) -> None:
         """`cloud_sink` receives what leaves the last stage of clouds, `echo_sink` the last of polar scans.
 
-        Raises ParameterError for a bad parameter of any stage.
+        Raises ParameterError for a bad parameter of any stage or detector.
         """
         runners = [StageRunner(name, rospy.resolve_name(name)) for name in _chain()]
-        clouds = StageChain([runner for runner in runners if not runner.takes_polar_scans], cloud_sink)
-        polar = StageChain([runner for runner in runners if runner.takes_polar_scans], echo_sink)
+        detectors = _detectors({runner.output_topic for runner in runners})
+        clouds, polar = (
+            _stage_chain([runner for runner in runners if runner.takes_polar_scans is is_polar], sink, detectors)
+            for is_polar, sink in ((False, cloud_sink), (True, echo_sink))
+        )
         self._source = SonarToCloud(
             rospy.resolve_name("sonar_to_cloud"),
             CloudSink(clouds.process, clouds.is_wanted),
             CloudSink(polar.process, polar.is_wanted),
         )
         self._image = SonarImage(rospy.resolve_name("sonar_image"))
-        self.healths: List[Health] = [
-            self._source.health, *[runner.health for runner in runners], self._image.health
-        ]  # fmt: skip
+        hosted = [self._source, *runners, *detectors, self._image]
+        self.healths: List[Health] = [one.health for one in hosted]
         """The health of everything that is hosted."""
 
 
 def _chain() -> List[str]:
-    chain = rospy.get_param("~chain", DEFAULT_CHAIN)
-    if not isinstance(chain, list) or not all(name in STAGES for name in chain):
-        raise ParameterError(f"chain = {chain!r}: must be a list of {', '.join(STAGES)}")
-    return chain
+    return _names("chain", DEFAULT_CHAIN, STAGES)
+
+
+def _detectors(made: Collection[str]) -> List["HostedDetector"]:
+    """Return the detectors; each needs a stage whose output, one of the topics `made`, is its input."""
+    names = _names("detectors", [], DETECTORS)
+    if not names:
+        return []
+    # Here, because it loads scipy.optimize.
+    from sonar_processing.ros.hosted_detectors import HostedDetector
+
+    detectors = [HostedDetector.named(name) for name in names]
+    for detector in detectors:
+        if detector.input_topic not in made:
+            raise ParameterError(f"detectors = {names!r}: no stage of chain makes {detector.input_topic}")
+    return detectors
+
+
+def _names(parameter: str, default: List[str], known: Collection[str]) -> List[str]:
+    names = rospy.get_param(f"~{parameter}", default)
+    if not isinstance(names, list) or not all(name in known for name in names):
+        raise ParameterError(f"{parameter} = {names!r}: must be a list of {', '.join(known)}")
+    return names
+
+
+def _stage_chain(
+    runners: List[StageRunner], last: Optional[CloudSink], detectors: Iterable["HostedDetector"]
+) -> StageChain:
+    """Return a chain that gives detectors what they take, and the sink `last` what leaves the last stage."""
+    sinks: Dict[str, List[CloudSink]] = defaultdict(list)
+    if runners and last is not None:
+        sinks[runners[-1].output_topic].append(last)
+    for detector in detectors:
+        sinks[detector.input_topic].append(CloudSink(detector.take, lambda one=detector: one.is_read))
+    return StageChain(runners, sinks)

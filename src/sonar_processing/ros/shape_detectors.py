@@ -29,22 +29,41 @@ class ShapeDetectorNode(ABC):
     """What both detectors share; `_detect` finds the shapes of a scan and says how they are shown."""
 
     name: str
+    input_topic: str
     topic: str
     what: str
     config_name: str
     parameters: type
     message: type
 
-    def __init__(self) -> None:
-        """Raises ParameterError for a bad parameter."""
+    def __init__(self, namespace: str = "~") -> None:
+        """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health(self.name)
         self.healths = [self.health]
-        self._live = ReconfigurableParameters(self.parameters, "~", self.config_name, self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(
+            self.parameters, namespace, self.config_name, self.health, self._use_parameters
+        )
         self._places = SonarPlaces(self._live.current.sonar_frame, self.health, self._live.current.stamp_tolerance)
         self._inliers = PointsPublisher(self.topic)
         self._coefficients = rospy.Publisher(f"{self.topic}/coefficients", self.message, queue_size=QUEUE_SIZE)
         self._markers = rospy.Publisher(f"{self.topic}/markers", MarkerArray, queue_size=QUEUE_SIZE)
-        subscribe_to_clouds(topics.CLEANED, guarded(self.health, self._take))
+
+    @classmethod
+    def as_node(cls) -> "ShapeDetectorNode":
+        """Return the detector as a node of its own, which takes clouds from its input topic."""
+        detector = cls()
+
+        def take(message: StampedIntensityCloudArrays) -> None:
+            detector.process(cloud_from_message(message))
+
+        subscribe_to_clouds(cls.input_topic, guarded(detector.health, take))
+        return detector
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody listens to any of the detector's topics."""
+        publishers = (self._coefficients, self._markers)
+        return self._inliers.is_read or any(publisher.get_num_connections() for publisher in publishers)
 
     @abstractmethod
     def _use_parameters(self, parameters: RansacParameters) -> None:
@@ -54,8 +73,8 @@ class ShapeDetectorNode(ABC):
     def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Any, MarkerArray]:
         """Return the shapes of a scan, the message that holds them, and how rviz shows them."""
 
-    def _take(self, message: StampedIntensityCloudArrays) -> None:
-        cloud = cloud_from_message(message)
+    def process(self, cloud: IntensityCloud) -> None:
+        """Detect the shapes of a scan and publish them. Raises RefusedInput for a scan that cannot be used."""
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
         if cloud.broken:
@@ -74,7 +93,8 @@ class ShapeDetectorNode(ABC):
 class LineDetectorNode(ShapeDetectorNode):
     """line_detector."""
 
-    name, topic, what, config_name = "line_detector", topics.LINES, "walls", "LineDetector"
+    name, input_topic, topic = "line_detector", topics.CLEANED, topics.LINES
+    what, config_name = "walls", "LineDetector"
     parameters, message = LineDetectorParameters, Walls
 
     def _use_parameters(self, parameters: LineDetectorParameters) -> None:
@@ -96,7 +116,8 @@ class LineDetectorNode(ShapeDetectorNode):
 class CircleDetectorNode(ShapeDetectorNode):
     """circle_detector."""
 
-    name, topic, what, config_name = "circle_detector", topics.CIRCLES, "circles", "CircleDetector"
+    name, input_topic, topic = "circle_detector", topics.THRESHOLDED, topics.CIRCLES
+    what, config_name = "circles", "CircleDetector"
     parameters, message = CircleDetectorParameters, Circles
 
     def _use_parameters(self, parameters: CircleDetectorParameters) -> None:

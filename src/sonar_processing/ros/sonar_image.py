@@ -35,6 +35,9 @@ class SonarImage(rospy.SubscribeListener):
         )
         self._infos = rospy.Publisher(topics.CAMERA_INFO, CameraInfo, queue_size=QUEUE_SIZE)
         self._images = rospy.Publisher(topics.IMAGE, Image, queue_size=QUEUE_SIZE, subscriber_listener=self)
+        # rospy takes connections before it knows the listener, and tells it of none that came so early.
+        if self._images.get_num_connections():
+            self.peer_subscribe()
 
     def _use_parameters(self, parameters: SonarImageParameters) -> None:
         self._picture = PolarImage(parameters)

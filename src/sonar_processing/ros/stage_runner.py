@@ -40,6 +40,11 @@ class StageRunner:
         return self._type.takes_polar_scans
 
     @property
+    def output_topic(self) -> str:
+        """The topic of what the stage makes."""
+        return self._type.output_topic
+
+    @property
     def is_read(self) -> bool:
         """Whether anybody listens to any of the stage's topics."""
         return self._publisher.is_read or any(figure.is_read for figure in self._figures)

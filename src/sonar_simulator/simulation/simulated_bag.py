@@ -1,8 +1,9 @@
 """Writes the bag of a whole simulation."""
 
 import math
+from itertools import cycle
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any, Callable, Dict, Iterator
 
 import numpy as np
 import yaml
@@ -18,8 +19,27 @@ from sonar_simulator.vehicle.servo import tilted
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head
+_OF_A_KIND = 4  # Messages of one type that a moment has at most, and some to spare
 _RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
 _SETTINGS_TOPIC = "/sonar_simulator/settings"
+
+
+class ReusedMessages:
+    """Gives messages of a moment again, filled in as they were, for a later one: making them takes longer than writing.
+
+    Whoever fills them in must set the same fields each time, and write them before the next moment.
+    """
+
+    def __init__(self, make: Callable[[str], Any]) -> None:
+        """`make` returns an empty message of a type, package/Name."""
+        self._make = make
+        self._made: Dict[str, Iterator[Any]] = {}
+
+    def __call__(self, kind: str) -> Any:
+        """Return a message of a type."""
+        if kind not in self._made:
+            self._made[kind] = cycle([self._make(kind) for _ in range(_OF_A_KIND)])
+        return next(self._made[kind])
 
 
 class SimulatedBag:
@@ -30,6 +50,7 @@ class SimulatedBag:
         self._setup = setup
         self._settings = settings
         self._messages = MomentMessages(bag.make, np.asarray)
+        self._of_moment = MomentMessages(ReusedMessages(bag.make), np.asarray)
         self._tilt = math.nan
         self._mount: Any = None
 
@@ -49,7 +70,7 @@ class SimulatedBag:
         """Write everything that belongs to a moment; its transforms are one message."""
         stamp_ns, stamp = self._stamp(moment.time)
         instruments = self._settings.simulator.instruments
-        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments)
+        messages = self._of_moment.at(moment, stamp, self._setup.sonar.max_range, instruments)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
         messages[0][1].transforms.append(self._mount_at(moment.tilt, stamp))

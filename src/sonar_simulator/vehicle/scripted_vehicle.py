@@ -134,31 +134,30 @@ class VehicleScript:
 
     def state(self, time: float) -> VehicleState:
         """Return the vehicle's state at `time` s, in any order of times."""
-        return VehicleState(self.pose(time), self.twist(time), self.is_still(time))
+        index = self._index(time)
+        position, velocity = self._motion(time, index)
+        return VehicleState(_pose(position), _twist(position, velocity), self._is_still(time, index))
 
     def pose(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_world_base at `time` [s]; x forward, y left, z up."""
-        x, y, z, yaw = self._state(time)[0]
-        return pose_matrix((x, y, z), (0.0, 0.0, yaw))
+        return _pose(self._motion(time, self._index(time))[0])
 
     def twist(self, time: float) -> np.ndarray:
         """Return the (6,) velocity at `time` s in the body frame: linear x y z, m/s, angular x y z, rad/s."""
-        position, velocity = self._state(time)
-        cos_yaw, sin_yaw = math.cos(position[3]), math.sin(position[3])
-        forward = cos_yaw * velocity[0] + sin_yaw * velocity[1]
-        left = cos_yaw * velocity[1] - sin_yaw * velocity[0]
-        return np.array([forward, left, velocity[2], 0.0, 0.0, velocity[3]])
+        return _twist(*self._motion(time, self._index(time)))
 
     def is_still(self, time: float) -> bool:
         """Return whether the vehicle is at rest between moves at `time` s; the slow ends of a move do not count."""
-        index = self._index(time)
-        return time < 0.0 or index == len(self._ends) or not self._displacements[index].any()
+        return self._is_still(time, self._index(time))
 
     def _index(self, time: float) -> int:
         return int(np.searchsorted(self._ends, time, side="right"))
 
-    def _state(self, time: float) -> Tuple[np.ndarray, np.ndarray]:
-        index = self._index(time)
+    def _is_still(self, time: float, index: int) -> bool:
+        return time < 0.0 or index == len(self._ends) or not self._displacements[index].any()
+
+    def _motion(self, time: float, index: int) -> Tuple[np.ndarray, np.ndarray]:
+        """Return position and velocity (4,) along the axes of the world; `index` is that of the entry at `time`."""
         if time < 0.0 or index == len(self._ends):
             return self._origins[0 if time < 0.0 else -1], np.zeros(4)
         duration, displacement = self._durations[index], self._displacements[index]
@@ -166,6 +165,18 @@ class VehicleScript:
         travelled = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
         slope = 30.0 * u**2 * (1.0 - u) ** 2 / duration
         return self._origins[index] + travelled * displacement, slope * displacement
+
+
+def _pose(position: np.ndarray) -> np.ndarray:
+    x, y, z, yaw = position
+    return pose_matrix((x, y, z), (0.0, 0.0, yaw))
+
+
+def _twist(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
+    cos_yaw, sin_yaw = math.cos(position[3]), math.sin(position[3])
+    forward = cos_yaw * velocity[0] + sin_yaw * velocity[1]
+    left = cos_yaw * velocity[1] - sin_yaw * velocity[0]
+    return np.array([forward, left, velocity[2], 0.0, 0.0, velocity[3]])
 
 
 def _kind_of(values: Any) -> type:

@@ -14,12 +14,13 @@ from sonar_driver.line.scanner import Scanner
 FAST = {
     "baud_rate": 1152000,
     "speed_of_sound": 15000.0,
-    "reply_margin": 0.1,
-    "late_window": 0.15,
-    "byte_gap": 0.06,
+    # On a machine that may be busy.
+    "reply_margin": 1.0,
+    "late_window": 0.3,
+    "byte_gap": 0.3,
     "back_off_first": 0.02,
 }
-PATIENCE = 5.0
+PATIENCE = 60.0
 
 
 @contextmanager

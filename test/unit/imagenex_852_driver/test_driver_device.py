@@ -1,9 +1,6 @@
-import threading
-import time
-
 import pytest
 from driver_line import served
-from virtual_line import VirtualLine, VirtualStop, VirtualTime
+from virtual_line import VirtualLine, VirtualStop, VirtualStopAt, VirtualTime
 
 from imagenex_852_driver.emulator import Emulated852, FaultRates852
 from imagenex_852_driver.line.connection import ConnectionParameters
@@ -13,6 +10,9 @@ from sonar_driver.emulator import Fault, FaultInjector, Transmission
 from sonar_driver.line.port import PortUnavailableError
 
 COMMAND = SwitchCommand(max_range=50)
+FAST = ConnectionParameters(
+    baud_rate=1152000, speed_of_sound=15000.0, reply_margin=0.1, late_window=0.15, byte_gap=0.06
+)  # fmt: skip
 
 
 class FixedStatusHead(Emulated852):
@@ -26,15 +26,24 @@ class FixedStatusHead(Emulated852):
         return self._reply
 
 
+def virtual_device(head, connection, stop=None):
+    """Return an open device on a head, in a time that begins at 1000 s."""
+    time = stop.time if stop else VirtualTime()
+    line = VirtualLine(head, connection.baud_rate, time)
+    device = SonarDevice(connection, stop or VirtualStop(time), lambda: 1000.0 + time.now, time.elapsed, line.open)
+    device.open()
+    return device
+
+
 @pytest.fixture
-def line(tmp_path):
-    faults = FaultInjector(FaultRates852(lateness=0.2, silence_duration=0.3))
-    timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
-    with served(tmp_path, Emulated852(faults=faults, timing=timing)) as (_, connection):
-        device = SonarDevice(connection, clock=lambda: 1000.0)
-        device.open()
-        yield device, faults
-        device.close()
+def faults():
+    return FaultInjector(FaultRates852(lateness=0.2, silence_duration=0.3))
+
+
+@pytest.fixture
+def line(faults):
+    """Return a device in virtual time, and the faults of its head."""
+    return virtual_device(Emulated852(faults=faults, timing=FAST.timing()), FAST), faults
 
 
 def test_a_ping_brings_the_reply_to_its_command(line):
@@ -108,25 +117,12 @@ def test_an_overrun_is_counted_and_its_reply_delivered(line):
         (SwitchCommand(max_range=50, head_id=0x12), "head identification 16 instead of 18"),
     ],
 )
-def test_an_answer_to_another_question_is_a_bad_frame(tmp_path, asked, complaint):
-    with served(tmp_path) as (_, connection):
-        reply = _any_reply(connection)
-    head = FixedStatusHead(reply)
+def test_an_answer_to_another_question_is_a_bad_frame(line, asked, complaint):
+    head = FixedStatusHead(line[0].ping(COMMAND).reply)
     head._head_id = asked.head_id
-    with served(tmp_path, head) as (_, connection):
-        device = SonarDevice(connection)
-        device.open()
-        assert device.ping(asked) is None
-        device.close()
+    device = virtual_device(head, ConnectionParameters())
+    assert device.ping(asked) is None
     assert complaint in device.stats.last_error
-
-
-def _any_reply(connection):
-    device = SonarDevice(connection)
-    device.open()
-    reply = device.ping(COMMAND).reply
-    device.close()
-    return reply
 
 
 def test_every_ping_ends_in_exactly_one_count(line):
@@ -139,13 +135,12 @@ def test_every_ping_ends_in_exactly_one_count(line):
     assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.interrupted == 4
 
 
-def test_a_stop_interrupts_a_ping_at_once(line):
-    device, faults = line
+def test_a_stop_interrupts_a_ping_at_once(faults):
+    stop = VirtualStopAt(VirtualTime(), 0.05)
+    device = virtual_device(Emulated852(faults=faults, timing=FAST.timing()), FAST, stop)
     faults.order(Fault.SILENCE)
-    threading.Timer(0.05, device.stop.set).start()
-    begin = time.monotonic()
     assert device.ping(SwitchCommand(max_range=50, switch_delay_ms=510)) is None
-    assert time.monotonic() - begin < 0.3
+    assert stop.time.now < 0.05 + 0.1
     assert device.stats.interrupted == 1
 
 
@@ -174,12 +169,8 @@ def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
 
 
 def test_replies_before_sound_can_have_returned_are_dropped_and_counted_on_their_own():
-    time = VirtualTime()
-    connection = ConnectionParameters(speed_of_sound=1400.0)
     head = Emulated852(timing=ConnectionParameters(speed_of_sound=2000.0).timing())
-    line = VirtualLine(head, connection.baud_rate, time)
-    device = SonarDevice(connection, VirtualStop(time), time.elapsed, time.elapsed, line.open)
-    device.open()
+    device = virtual_device(head, ConnectionParameters(speed_of_sound=1400.0))
     assert [device.ping(SwitchCommand(max_range=50)) for _ in range(5)] == [None] * 5
     stats = device.stats
     assert (stats.early_replies, stats.unexpected_replies, stats.timeouts) == (5, 0, 5)
@@ -192,12 +183,8 @@ class EchoingLine(Emulated852):
         return [Transmission(time, data), *super().receive(data, time)]
 
 
-def test_an_adapter_that_echoes_the_command_does_no_harm(tmp_path):
-    timing = ConnectionParameters(baud_rate=1152000, speed_of_sound=15000.0).timing()
-    with served(tmp_path, EchoingLine(timing=timing)) as (_, connection):
-        device = SonarDevice(connection)
-        device.open()
-        replies = [device.ping(COMMAND).reply.head_position for _ in range(3)]
-        device.close()
+def test_an_adapter_that_echoes_the_command_does_no_harm():
+    device = virtual_device(EchoingLine(timing=FAST.timing()), FAST)
+    replies = [device.ping(COMMAND).reply.head_position for _ in range(3)]
     assert replies == [1400, 1420, 1440]
     assert (device.stats.replies, device.stats.bad_frames, device.stats.unexpected_replies) == (3, 0, 0)

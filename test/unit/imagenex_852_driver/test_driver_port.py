@@ -57,7 +57,9 @@ def test_a_kind_of_url_that_does_not_exist_is_refused():
 def test_a_head_behind_a_socket_answers():
     with socket.create_server(("127.0.0.1", 0)) as server:
         threading.Thread(target=_serve_one, args=(server,), daemon=True).start()
-        device = SonarDevice(ConnectionParameters(port=f"socket://127.0.0.1:{server.getsockname()[1]}"))
+        device = SonarDevice(
+            ConnectionParameters(port=f"socket://127.0.0.1:{server.getsockname()[1]}", reply_margin=1.0)
+        )
         device.open()
         assert device.ping(SwitchCommand(max_range=5)).reply.max_range == 5
         device.close()

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, tour
+from made_harbour import SONAR_IN_BASE, TURN, tour
 
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.localiser import MapInput
@@ -79,6 +79,17 @@ def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed, whole):
     np.testing.assert_allclose(np.sort(halves.blocks.mean, axis=0), np.sort(whole.blocks.mean, axis=0), atol=1e-4)
 
 
+def test_what_was_stored_stays_as_it_is_while_scans_are_taken(killed):
+    """A file is written from it while the node goes on."""
+    _, saved = killed
+    localiser = resumed(saved)
+    for scan in HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]:
+        stored = localiser.stored("map", {}, 0.0, "run")
+        before = map_bytes(stored)
+        localiser.take_scan(scan)
+        assert map_bytes(stored) == before
+
+
 def test_the_newest_scans_of_a_resumed_run_may_still_move(killed):
     _, stored = killed
     localiser = resumed(stored)
@@ -121,6 +132,16 @@ def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(
     assert update.accepted == goes_on
     true_place = HARBOUR.truth.at(np.array([HARBOUR.scans[KILLED_AFTER].reference_time]))[0]
     assert not goes_on or np.hypot(*(update.belief.theta[:2] - true_place[:2])) < 0.5
+
+
+def test_a_run_goes_on_with_a_scan_whose_first_half_lacks_odometry(killed, whole):
+    (_, stored), (_, wanted) = killed, whole
+    localiser, scan = resumed(stored), HARBOUR.scans[KILLED_AFTER]
+    known = scan.track.times > scan.reference_time - TURN / 2.0
+    track = localiser.bridged(Track(scan.track.times[known], scan.track.poses[known]))
+    (update,) = taken(localiser, [replace(scan, track=track).with_odometry()])
+    assert len(update.scan) == len(scan)
+    np.testing.assert_allclose(update.belief.theta[:2], wanted[KILLED_AFTER].belief.theta[:2], atol=0.1)
 
 
 def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(killed):

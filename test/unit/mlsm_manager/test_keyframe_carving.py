@@ -80,9 +80,19 @@ def test_free_space_moves_with_the_keyframe_that_saw_it():
 
 def test_many_keyframes_that_move_at_once_are_followed_a_few_with_each_scan():
     shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)), place=MovedBy(0.0))
+    assert {y for _, y in cells(shown.free.blocks)} <= {-1, 0, 1}
     shown.draw(MovedBy(5.0), NEVER)
     assert {y for _, y in cells(shown.free.blocks)} >= {0, 10}
     for _ in range(2):
+        shown.draw(MovedBy(5.0), NEVER)
+        assert len(shown.map)
+    assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
+
+
+def test_what_nobody_looked_at_in_between_is_followed_with_the_next_look():
+    shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)), place=MovedBy(0.0))
+    assert {y for _, y in cells(shown.free.blocks)} <= {-1, 0, 1}
+    for _ in range(3):
         shown.draw(MovedBy(5.0), NEVER)
     assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
 

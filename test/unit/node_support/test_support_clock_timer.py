@@ -9,7 +9,7 @@ import rospy
 from node_support.health import Health
 from node_support.ros.clock_timer import every_clock_period
 
-PATIENCE = 5.0
+PATIENCE = 60.0
 PERIOD = 0.5
 
 

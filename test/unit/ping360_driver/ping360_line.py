@@ -17,13 +17,13 @@ from sonar_driver.line.scanner import Scanner
 BAUD_RATE = 1152000
 # The shortest beams: 1.3 ms of listening, 2 ms of sending.
 SETTINGS = HeadSettings(max_range=1.0, data_points=200)
-PATIENCE = 10.0
+PATIENCE = 60.0
 _POLL = 0.01
 
 
 def connection_to(port, **changes):
     """Return the parameters of a fast line, on a machine that may be busy."""
-    fast = {"baud_rate": BAUD_RATE, "reply_margin": 0.5, "late_window": 0.3, "byte_gap": 0.05, "back_off_first": 0.02}
+    fast = {"baud_rate": BAUD_RATE, "reply_margin": 2.0, "late_window": 0.3, "byte_gap": 0.05, "back_off_first": 0.02}
     return ConnectionParameters(port=port, **{**fast, **changes})
 
 

@@ -1,5 +1,7 @@
+import numpy as np
 import pytest
 from ping360_line import SETTINGS
+from virtual_line import VirtualStopAt, VirtualTime
 from virtual_scan import VirtualScan
 
 from ping360_driver.emulator import Ping360FaultRates
@@ -94,6 +96,29 @@ def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(port, inje
     scan.until(lambda: scan.stats.unexpected_replies == 1)
     scan.beams(2)
     assert all(ping.beam.angle == number for ping, number in zip(scan.pings, scan.numbers))
+
+
+@MODES
+@pytest.mark.parametrize("fault", [Fault.SILENCE, Fault.DISAPPEARANCE])
+@pytest.mark.parametrize("absence", [1.0, 7.3, 100.0])
+def test_the_scan_goes_on_within_two_seconds_after_the_head_was_away(port, settings, fault, absence):
+    injector = FaultInjector(Ping360FaultRates(silence_duration=absence, absence_duration=absence))
+    scan = VirtualScan(port, settings, injector, stop=VirtualStopAt(VirtualTime(), absence + 5.0))
+    injector.order(Fault.NONE)
+    injector.order(fault)
+    scan.scan()
+    gaps = np.diff([ping.stamp for ping in scan.pings])
+    assert absence < max(gaps) < absence + 2.0
+
+
+@MODES
+@pytest.mark.parametrize("fault", [Fault.NONE, Fault.SILENCE, Fault.DISAPPEARANCE])
+def test_a_stop_ends_the_scan_at_once(port, settings, fault):
+    injector = FaultInjector(Ping360FaultRates(silence_duration=60.0, absence_duration=60.0))
+    scan = VirtualScan(port, settings, injector, stop=VirtualStopAt(VirtualTime(), 20.0))
+    injector.order(fault)
+    scan.scan()
+    assert scan.device.stop.time.now < 20.0 + 0.2
 
 
 @MODES

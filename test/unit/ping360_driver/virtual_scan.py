@@ -7,6 +7,7 @@ from virtual_line import VirtualLine, VirtualStop, VirtualTime
 from ping360_driver.emulator import EmulatedPing360
 from ping360_driver.line.device import Ping360Device
 from sonar_driver.line.port import is_datagram_port
+from sonar_driver.line.scanner import Scanner
 
 _MOST_PINGS = 1000
 
@@ -26,18 +27,22 @@ class TimedEchoes(NumberedEchoes):
 class VirtualScan:
     """Pings on request of a test; `pings` are those that brought a beam."""
 
-    def __init__(self, port="virtual", settings=SETTINGS, faults=None, baud_rate=BAUD_RATE):
+    def __init__(self, port="virtual", settings=SETTINGS, faults=None, baud_rate=BAUD_RATE, stop=None):
         self.settings = settings
         self.pings = []
         self.echoes = TimedEchoes()
-        self._time = VirtualTime()
+        stop = stop or VirtualStop(VirtualTime())
         head_rate = float("inf") if is_datagram_port(port) else baud_rate
-        head = EmulatedPing360(self.echoes, faults, head_rate)
-        line = VirtualLine(head, head_rate, self._time)
+        self.head = EmulatedPing360(self.echoes, faults, head_rate)
+        line = VirtualLine(self.head, head_rate, stop.time)
         connection = connection_to(port, baud_rate=baud_rate, reply_margin=0.15)
-        stop, clock = VirtualStop(self._time), self._time.elapsed
+        clock = stop.time.elapsed
         self.device = Ping360Device(connection, stop, clock, clock, line.open)
         self.device.open()
+
+    def scan(self):
+        """Ping as a scanner does, until the stop event is set."""
+        Scanner(self.device, self.settings.command(), self.pings.append).run()
 
     @property
     def stats(self):

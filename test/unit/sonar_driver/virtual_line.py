@@ -25,12 +25,28 @@ class VirtualStop(threading.Event):
 
     def __init__(self, time: VirtualTime) -> None:
         super().__init__()
-        self._time = time
+        self.time = time
 
     def wait(self, timeout: Optional[float] = None) -> bool:
         """Let `timeout` seconds pass at once."""
-        self._time.now += timeout or 0.0
+        self.time.now += timeout or 0.0
         return self.is_set()
+
+
+class VirtualStopAt(VirtualStop):
+    """A stop event that somebody sets at a moment of the virtual time."""
+
+    def __init__(self, time: VirtualTime, moment: float) -> None:
+        super().__init__(time)
+        self._moment = moment
+
+    def is_set(self) -> bool:
+        """Return whether the moment has come."""
+        return self.time.now >= self._moment
+
+    def wait(self, timeout: Optional[float] = None) -> bool:
+        """Let `timeout` seconds pass at once, but end at the moment."""
+        return super().wait(max(min(timeout or 0.0, self._moment - self.time.now), 0.0))
 
 
 class VirtualLine:

@@ -7,6 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sonar_processing.filters.otsu import otsu_threshold
+from sonar_processing.filters.strengths import counts_of
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
 
 STRENGTHS = st.lists(st.integers(0, 255), max_size=40)
@@ -17,7 +18,7 @@ def _kept(strengths, **values):
 
 
 def _threshold(strengths, **values):
-    return Thresholder(ThresholderParameters(**values)).threshold(np.array(strengths, dtype=np.float32))
+    return Thresholder(ThresholderParameters(**values)).threshold(counts_of(np.array(strengths, dtype=np.float32)))
 
 
 def test_fixed_keeps_what_is_above_the_value():
@@ -59,7 +60,8 @@ def test_the_floor_does_not_lower_a_threshold(mode):
 def test_what_is_kept_lies_above_the_threshold_and_what_goes_does_not(strengths, mode, floor, nonzero):
     thresholder = Thresholder(ThresholderParameters(mode=mode, min_threshold=floor, otsu_nonzero=nonzero))
     cloud = cloud_of(strengths)
-    above = cloud.points[:, 3] > thresholder.threshold(cloud.points[:, 3]) if strengths else np.empty(0, dtype=bool)
+    threshold = thresholder.threshold(counts_of(cloud.points[:, 3])) if strengths else 0.0
+    above = cloud.points[:, 3] > threshold
     np.testing.assert_array_equal(thresholder(cloud).points, cloud.points[above])
 
 

@@ -50,6 +50,15 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, sc
     assert first != third
 
 
+@pytest.mark.parametrize("instruments", ["DVL", "COMPASS"])
+def test_messages_that_are_used_again_hold_nothing_of_an_earlier_moment(tmp_path, script, monkeypatch, instruments):
+    asked = ("--set", f"instruments={instruments}")
+    _, again = _write(tmp_path, script, "again.bag", *asked)
+    monkeypatch.setattr("sonar_simulator.simulation.simulated_bag.ReusedMessages", lambda make: make)
+    _, new = _write(tmp_path, script, "new.bag", *asked)
+    assert again.read_bytes() == new.read_bytes()
+
+
 def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):
     _, out = _write(tmp_path, script)
     placed = {

@@ -1,6 +1,7 @@
 """The one folder in which maps lie, each under its name; what is replaced is kept under a numbered name."""
 
 import os
+from contextlib import suppress
 from itertools import count
 from pathlib import Path
 from typing import Optional
@@ -46,9 +47,13 @@ class MapFolder:
         return path
 
     def put_aside(self, name: str) -> None:
-        """Give the map of that name the name NAME.previous; one that had it is gone. Raises OSError."""
+        """Give the map of that name the name NAME.previous; one that had it is gone. Raises OSError.
+
+        Where there is no map of that name, as when another node has put it aside already, nothing is done.
+        """
         path = self.path(name)
-        os.replace(str(path), str(path.with_name(f"{path.name[: -len(ENDING)]}.previous{ENDING}")))
+        with suppress(FileNotFoundError):
+            os.replace(str(path), str(path.with_name(f"{path.name[: -len(ENDING)]}.previous{ENDING}")))
 
     def load(self, name: str) -> StoredMap:
         """Return the map of that name. Raises MapFileError, of one line, where there is none or it is damaged."""

@@ -1,0 +1,29 @@
+"""Compiles the optional loops of numba, so that no node has to: what is compiled stays in a cache on disk."""
+
+import sys
+
+import numpy as np
+
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.surface_map.insertion import InsertionKernel
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.kernels import Kernel
+from sonar_processing.filters.outliers import outlier_rules
+from sonar_processing.filters.strengths import strength_loops
+
+
+def main() -> None:
+    """Compile what is not in the cache yet; without numba say so."""
+    if SolverKernel.AUTO.resolved is not SolverKernel.NUMBA:
+        print("compile_loops: numba is not installed, or has no folder to write to; numpy is used", file=sys.stderr)
+        return
+    # These are compiled by being imported.
+    outlier_rules(Kernel.NUMBA)
+    strength_loops(Kernel.NUMBA)
+    surface_map = MultiLevelSurfaceMap(1.0, kernel=InsertionKernel.NUMBA)
+    for height in (0.0, 0.5):
+        surface_map.insert(np.full((2, 4), height))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,29 @@
+"""How comparisons are found and summed: by numpy, or by compiled loops."""
+
+from typing import Callable, NamedTuple
+
+from mlsm_manager.multi_view.association import Neighbours
+from mlsm_manager.multi_view.comparisons import Summation, summed
+from mlsm_manager.multi_view.neighbours import NeighbourLists
+from mlsm_manager.multi_view.normal_equations import Scattering, scattered
+from mlsm_manager.multi_view.placement import PlacedPoints
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
+
+
+class Comparing(NamedTuple):
+    """neighbours: takes targets, ascending by scan, and how many scans are searched together. summed: see Summation.
+    scattered: see Scattering.
+    """
+
+    neighbours: Callable[[PlacedPoints, int], Neighbours]
+    summed: Summation
+    scattered: Scattering
+
+    @classmethod
+    def by(cls, kernel: SolverKernel) -> "Comparing":
+        """Return what compares. Raises ImportError, which says what to install, for NUMBA without numba."""
+        if kernel.resolved is SolverKernel.NUMPY:
+            return cls(NeighbourLists, summed, scattered)
+        from mlsm_manager.multi_view import compiled_comparisons as compiled
+
+        return cls(compiled.CompiledNeighbours, compiled.summed_compiled, compiled.scattered_compiled)

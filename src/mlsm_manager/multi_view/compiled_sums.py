@@ -1,0 +1,103 @@
+"""The compiled loops that sum comparisons for each pair of scans, and these for all unknowns.
+
+They are compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Points are
+rows as `compiled_comparisons` packs them. Raises ImportError without numba.
+"""
+
+import numpy as np
+from numba import njit
+
+X, Y, ARM_X, ARM_Y, NORMAL_X, NORMAL_Y, SLANT, SHARE, BY_SCALE_X, BY_DELAY_X, BY_SCALE_Y, BY_DELAY_Y = range(12)
+"""Columns of a packed point."""
+POINT_COLUMNS = 12
+PAIR_COLUMNS = 14
+"""Of the poses of a source's two nodes, of those of the target's two, and of the run's unknowns."""
+
+
+@njit(cache=True)
+def _grouped(group_of, groups):
+    """Return the order (n,) in which those of one group follow each other; group_of: (n,) from 0 to before `groups`."""
+    starts, order = np.zeros(groups + 1, np.int64), np.empty(len(group_of), np.int64)
+    for entry in range(len(group_of)):
+        starts[group_of[entry] + 1] += 1
+    for group in range(groups):
+        starts[group + 1] += starts[group]
+    for entry in range(len(group_of)):
+        order[starts[group_of[entry]]] = entry
+        starts[group_of[entry]] += 1
+    return order
+
+
+@njit(cache=True)
+def _write_slopes(source, target, slopes):
+    """Write the derivatives (c,) of a comparison's residual; return that."""
+    x, y = target[NORMAL_X], target[NORMAL_Y]
+    residual = (source[X] - target[X]) * x + (source[Y] - target[Y]) * y
+    by_yaw, by_other_yaw = source[ARM_X] * y - source[ARM_Y] * x, target[ARM_X] * y - target[ARM_Y] * x
+    late, later = source[SHARE], target[SHARE]
+    slopes[0], slopes[1], slopes[2] = (1.0 - late) * x, (1.0 - late) * y, (1.0 - late) * by_yaw
+    slopes[3], slopes[4], slopes[5] = late * x, late * y, late * by_yaw
+    slopes[6], slopes[7], slopes[8] = (later - 1.0) * x, (later - 1.0) * y, (later - 1.0) * by_other_yaw
+    slopes[9], slopes[10], slopes[11] = -later * x, -later * y, -later * by_other_yaw
+    by_scale_x, by_scale_y = source[BY_SCALE_X] - target[BY_SCALE_X], source[BY_SCALE_Y] - target[BY_SCALE_Y]
+    by_delay_x, by_delay_y = source[BY_DELAY_X] - target[BY_DELAY_X], source[BY_DELAY_Y] - target[BY_DELAY_Y]
+    slopes[12] = by_scale_x * x + by_scale_y * y - residual
+    slopes[13] = by_delay_x * x + by_delay_y * y
+    return residual
+
+
+@njit(
+    "Tuple((i8[::1], i8[::1], f8[:,:,::1], f8[:,::1]))"
+    "(i8[::1], i8[::1], f8[::1], f8[:,::1], i8[::1], f8[:,::1], i8[::1], f8, f8, f8, f8)",
+    cache=True,
+)
+def summed_comparisons(
+    rows, neighbours, importance, sources, source_scans, targets, target_scans,
+    least_variance, by_slant, least_weight, widening,
+):  # fmt: skip
+    """Return both scans (g,), information (g, c, c) and gradient (g, c) of each pair of scans; c is PAIR_COLUMNS.
+
+    rows, neighbours, importance: (m,) as in Pairs; those of one source scan follow each other. The variance of a
+    comparison is `least_variance` + `by_slant` * (sum of both squared slants).
+    """
+    lowest = target_scans.min() if len(target_scans) else 0
+    of_scan = np.full((target_scans.max() if len(target_scans) else 0) - lowest + 1, -1, np.int64)
+    group_of = np.empty(len(rows), np.int64)
+    scans, other_scans = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64)
+    groups, first = 0, 0
+    for pair in range(len(rows)):
+        scan, other = source_scans[rows[pair]], target_scans[neighbours[pair]]
+        if groups > 0 and scan != scans[groups - 1]:
+            first = groups
+        group = of_scan[other - lowest]
+        if group < first:
+            group = groups
+            of_scan[other - lowest] = group
+            scans[group], other_scans[group] = scan, other
+            groups += 1
+        group_of[pair] = group
+    information = np.zeros((groups, PAIR_COLUMNS, PAIR_COLUMNS))
+    gradient = np.zeros((groups, PAIR_COLUMNS))
+    slopes = np.empty(PAIR_COLUMNS)
+    for pair in _grouped(group_of, groups):
+        source, target = sources[rows[pair]], targets[neighbours[pair]]
+        residual = _write_slopes(source, target, slopes)
+        variance = least_variance + by_slant * (source[SLANT] * source[SLANT] + target[SLANT] * target[SLANT])
+        kernel = 1.0 + residual * residual / variance / (widening * widening)
+        weight = least_weight / variance / (kernel * kernel) * importance[pair]
+        block, summed = information[group_of[pair]], gradient[group_of[pair]]
+        for column in range(PAIR_COLUMNS):
+            weighted = weight * slopes[column]
+            summed[column] += weighted * residual
+            for other in range(PAIR_COLUMNS):
+                block[column, other] += weighted * slopes[other]
+    return scans[:groups].copy(), other_scans[:groups].copy(), information, gradient
+
+
+@njit("void(f8[:,::1], i8[:,::1], f8[:,:,::1])", cache=True)
+def scattered_blocks(matrix, columns, blocks):
+    """Add blocks (m, c, c) to a matrix (n, n) in their columns (m, c)."""
+    for number in range(len(columns)):
+        for row in range(columns.shape[1]):
+            for column in range(columns.shape[1]):
+                matrix[columns[number, row], columns[number, column]] += blocks[number, row, column]

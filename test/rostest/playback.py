@@ -1,0 +1,54 @@
+"""Plays a bag to nodes that may be slow: it waits for what they make of it, so that none falls behind."""
+
+import threading
+from argparse import Namespace
+from collections import deque
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Callable, Sequence
+
+import genpy
+import rospy
+from graph import nodes_of, wait_for_links
+from rosgraph_msgs.msg import Clock
+
+from node_support import topics
+from node_support.pace import Pace
+from recordings.ros.bag_player import read_messages
+
+# Of a burst after a stop of this process no message may be lost.
+QUEUE_SIZE = 100000
+
+
+@dataclass(frozen=True)
+class Step:
+    """What is waited for before messages that were recorded after `time` [s] are played."""
+
+    time: float
+    wait: Callable[[], object]
+
+
+def play(bag: Path, rate: float, steps: Sequence[Step] = ()) -> None:
+    """Publish the messages of a bag and the clock to all who listen, `rate` times as fast as they were recorded.
+
+    It begins when every listener is connected to every topic, and stops at each of the steps, which are in the order
+    of time.
+    """
+    messages, left = read_messages(Namespace(bag=bag, topics=None, ned=False)), deque(steps)
+    kinds = {topics.CLOCK: Clock, **{played.topic: type(played.message) for played in messages}}
+    publishers = {topic: _publisher(topic, kind) for topic, kind in kinds.items()}
+    for topic in publishers:
+        wait_for_links(topic, len(nodes_of(topic)[1]))
+    start, pace = messages[0].time, Pace(rate, threading.Event().wait)
+    for played in messages:
+        while left and played.time > left[0].time:
+            left.popleft().wait()
+        pace.wait_for(played.time - start)
+        publishers[topics.CLOCK].publish(Clock(genpy.Time.from_sec(played.time)))
+        publishers[played.topic].publish(played.message)
+    for step in left:
+        step.wait()
+
+
+def _publisher(topic: str, kind: type) -> rospy.Publisher:
+    return rospy.Publisher(topic, kind, queue_size=QUEUE_SIZE, latch=topic == topics.STATIC_TRANSFORMS)

@@ -1,0 +1,101 @@
+#!/usr/bin/env python3
+"""A node that matches with the joint solver keeps its map and its place over kills with -9 at random moments."""
+
+import os
+import shutil
+import sys
+import tempfile
+import unittest
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from itertools import chain
+from pathlib import Path
+from typing import List
+
+import numpy as np
+import rospy
+import rostest
+from graph import PACKAGE_ROOT
+from marina import replayed
+from resumed_vehicle import Fate, Kill, Mission, ResumedVehicle
+
+from mlsm_manager.matching.problem.scan import Track
+
+sys.path.append(os.path.join(str(PACKAGE_ROOT), "test", "unit", "mlsm_manager"))
+
+from made_harbour import SONAR_IN_BASE, tour
+
+KILLS_PER_MISSION = 5
+SCANS = 24
+VEHICLES = 4
+"""Vehicles at the same time."""
+KNOWN = 0.5
+"""m, to which a path is known that is the truth."""
+KNOWN_OF_RUN = 2.0
+"""m, to which a path is known that was found without kills, by which no scan is lost."""
+
+
+KEPT = 0.9
+"""Share of the saved cells; scans that may still move are drawn anew, and floats of 32 bits fall into other cells."""
+
+
+class ResumeKills(unittest.TestCase):
+    """Vehicles are killed `~kills` times altogether, in harbours that are made or in the recording `~bag`."""
+
+    def test_no_kill_loses_the_map_or_puts_the_vehicle_elsewhere(self) -> None:
+        """Of all kills; what became of them is printed."""
+        folder = Path(tempfile.mkdtemp())
+        self.addCleanup(shutil.rmtree, str(folder))
+        numbers = range(rospy.get_param("~kills") // KILLS_PER_MISSION)
+        with ThreadPoolExecutor(VEHICLES) as pool:
+            kills = list(chain.from_iterable(pool.map(lambda number: self._kills(folder, number), numbers)))
+        tell(kills)
+        self.assertEqual([kill for kill in kills if kill.map_kept < KEPT or kill.fate is Fate.WRONG], [])
+        self.assertGreater(sum(kill.fate is Fate.GOES_ON for kill in kills), len(kills) // 2)
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        """Map the recording without kills."""
+        bag = rospy.get_param("~bag")
+        cls.recorded = recorded_mission(Path(bag)) if bag else None
+
+    def _kills(self, folder: Path, number: int) -> List[Kill]:
+        mission = self.recorded or made_mission(number)
+        return ResumedVehicle(f"/vehicle_{number}", folder, mission).die_often(KILLS_PER_MISSION)
+
+
+def tell(kills: List[Kill]) -> None:
+    """Print what became of the kills."""
+    fates = ", ".join(f"{fate.value} {count}" for fate, count in Counter(kill.fate for kill in kills).items())
+    lost = [kill.seconds_lost for kill in kills]
+    print(f"{len(kills)} kills: {fates}")
+    print(f"share of the saved map that is there after a kill: least {min(kill.map_kept for kill in kills):.3f}")
+    print(f"from the first fix that was not saved to the kill, s: median {np.median(lost):.2f}, most {max(lost):.2f}")
+    farthest = [round(kill.distance, 2) for kill in kills], [round(kill.deviation, 2) for kill in kills]
+    print(f"farthest fix after each, m: {farthest[0]}\nwhat it says of itself, m: {farthest[1]}", flush=True)
+
+
+def made_mission(seed: int) -> Mission:
+    """Return a tour of a harbour with the truth, in the frame that a map which begins in odom has."""
+    made = tour(SCANS, direction=0.05, seed=seed)
+    parameters = {
+        "estimator": "JOINT", "map_input": "MATCHED", "start_matching": True, "scale_deviation": 0.01,
+        "speed_deviation": 0.025, "rate_time": 12.0, "heading_deviation": 0.0175, "direction_deviation": 0.1,
+        "free_scans": 8,
+    }  # fmt: skip
+    return Mission(made.scans, made.odometry, made.truth, KNOWN, parameters, SONAR_IN_BASE)
+
+
+def recorded_mission(bag: Path) -> Mission:
+    """Return a recording of the marina, with the path that is found without kills."""
+    run = replayed(bag)
+    found = [(one.scan.reference_time, one.result.pose) for one in run.updates if one.result is not None]
+    wanted = Track(np.array([time for time, _ in found]), np.array([pose for _, pose in found]))
+    parameters = rospy.get_param("/marina_live/mlsm_core")
+    odometry = Track(run.times, run.odometry)
+    return Mission(run.scans, odometry, wanted, KNOWN_OF_RUN, parameters, run.solver.log.sonar_in_base)
+
+
+if __name__ == "__main__":
+    rospy.init_node("resume_kills")
+    rostest.rosrun("underwater_map_construction", "resume_kills", ResumeKills, sys.argv)

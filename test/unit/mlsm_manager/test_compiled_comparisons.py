@@ -1,0 +1,87 @@
+"""Comparisons by compiled loops are those by numpy, but for rounding."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_harbour import SONAR_IN_BASE, tour
+
+from mlsm_manager.multi_view.association import Pairs
+from mlsm_manager.multi_view.batch_solver import solved
+from mlsm_manager.multi_view.comparing import Comparing
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
+from mlsm_manager.multi_view.placement import PlacedPoints
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
+
+pytest.importorskip("numba")
+SAME = 1e-9
+
+
+def some_points(rng, count, scans):
+    return PlacedPoints(
+        scans=np.sort(rng.choice(scans, count)), places=rng.normal(0.0, 3.0, (count, 2)),
+        arms=rng.normal(0.0, 9.0, (count, 2)), normals=rng.normal(0.0, 1.0, (count, 2)),
+        slants=rng.uniform(0.0, 5.0, count), qualities=np.ones(count), shares=rng.uniform(0.0, 1.0, count),
+        by_run=rng.normal(0.0, 5.0, (count, 2, 2)),
+    )  # fmt: skip
+
+
+def sums_by_scans(kernel, *arguments):
+    """Return both scans, information and gradient of all pairs of scans, in the order of the scans."""
+    sums = Comparing.by(kernel).summed(*arguments)
+    order = np.lexsort((sums[1], sums[0]))
+    return [part[order] for part in sums]
+
+
+@given(st.integers(0, 10**6), st.integers(1, 200), st.sampled_from([[-2], [0], [3, 4, 9], list(range(40))]))
+@settings(max_examples=50)
+def test_sums_of_any_comparisons_are_the_same(seed, count, scans):
+    rng, matching = np.random.RandomState(seed), SurfaceMatching()
+    sources, targets = some_points(rng, 30, list(range(50, 60))), some_points(rng, 40, scans)
+    pairs = Pairs(np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count), rng.uniform(0.1, 1.0, count))
+    for cut in (matching.cut, matching.wide_cut):
+        one, other = (
+            sums_by_scans(kernel, pairs, sources, targets, matching, cut)
+            for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA)
+        )
+        for expected, found in zip(one, other):
+            np.testing.assert_allclose(found, expected, rtol=SAME, atol=SAME * np.abs(expected).max())
+
+
+@given(st.integers(0, 10**6), st.integers(0, 20))
+@settings(max_examples=30)
+def test_blocks_are_added_to_the_same_places_of_a_matrix(seed, count):
+    rng = np.random.RandomState(seed)
+    columns, blocks = rng.randint(0, 7, (count, 3)), rng.normal(0.0, 1.0, (count, 3, 3))
+    expected, found = np.ones((7, 7)), np.ones((7, 7))
+    Comparing.by(SolverKernel.NUMPY).scattered(expected, columns, blocks)
+    Comparing.by(SolverKernel.NUMBA).scattered(found, columns, blocks)
+    np.testing.assert_allclose(found, expected, atol=SAME)
+
+
+def test_a_run_is_solved_alike_live_and_afterwards():
+    runs = []
+    for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA):
+        live = LiveSolver(replace(MultiViewParameters(), kernel=kernel), SONAR_IN_BASE)
+        for scan in tour(8, direction=0.1, delay=0.3).scans:
+            live.add(scan)
+        runs.append((live, solved(live)))
+    (live, batch), (compiled_live, compiled_batch) = runs
+    np.testing.assert_allclose(compiled_live.state.nodes, live.state.nodes, atol=SAME)
+    np.testing.assert_allclose(compiled_live.estimates[-1].covariance, live.estimates[-1].covariance, atol=SAME)
+    np.testing.assert_allclose(compiled_batch.state.nodes, batch.state.nodes, atol=SAME)
+    assert compiled_batch.steps == batch.steps
+
+
+def test_points_without_a_finite_place_are_refused():
+    points = some_points(np.random.RandomState(0), 20, [0, 1])
+    lost = replace(points, places=points.places * np.where(np.arange(20) == 7, np.nan, 1.0)[:, np.newaxis])
+    with pytest.raises(ValueError, match="without a finite place"):
+        Comparing.by(SolverKernel.NUMBA).neighbours(points, 5).within(lost, points, 2.0)
+
+
+def test_where_numba_is_installed_it_is_chosen():
+    assert SolverKernel.AUTO.resolved is SolverKernel.NUMBA
