@@ -57,7 +57,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("current_walk", 0.002, "m/s per root second: the current may change by 0.05 m/s in ten minutes"),
         _NEIGHBOURS,
         _NORMALS,
-            *_COMPASS,
+        *_COMPASS,
     ),
     OdometryKind.HEADING: (_JOINT, *_UNREPORTED, *_COMPASS),
     OdometryKind.NONE: (
