@@ -52,6 +52,10 @@ class JointParameters(OdometryChoice):
         0.0, "standard deviation of the surfaces' normals; above 0, straight walls tell nothing of the way along them",
         unit="rad", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
+    lone_quality: float = parameter(
+        0.0, "how certain a strong echo that stands alone is of something small that stays, as a post; above 0, such "
+        "echoes are compared with each other", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
     )
@@ -86,6 +90,7 @@ class JointParameters(OdometryChoice):
             matching=SurfaceMatching(
                 range_deviation=self.echo_deviation,
                 normal_deviation=self.normal_deviation,
+                lone_quality=self.lone_quality,
                 block_scans=self.block_scans,
             ),
             window=SolverWindow(

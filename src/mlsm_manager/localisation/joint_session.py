@@ -72,10 +72,11 @@ class JointSession:
         radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
         agreements = np.array([estimate.agreement for estimate in newest])
         surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
+        begin = self.start if newest else np.nan
         return [
             recent_agreement(times, agreements, _CHECKED_SCANS),
             told_deviation(times, np.array(radii)),
-            *surfaces_tell(times, surfaces, self.solver.parameters.odometry.distance_deviation),
+            *surfaces_tell(begin, times, surfaces, self.solver.parameters.odometry.distance_deviation),
         ]
 
     def copied(self) -> "JointSession":

@@ -10,6 +10,7 @@ from mlsm_manager.multi_view.comparing import Comparing
 from mlsm_manager.multi_view.comparisons import add_comparisons, support
 from mlsm_manager.multi_view.estimate import scale_covariance
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.loops import Loop, add_loops, loops_of
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
@@ -113,6 +114,8 @@ class _Batch:
         self._move = np.zeros(self._layout.size)
         self._comparing = Comparing.by(parameters.kernel)
         self._lists: Optional[Neighbours] = None
+        scans = np.arange(log.scan_count)
+        self._lone = LoneComparisons(log, odometry, parameters.matching, scans, np.ones(len(scans)))
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
@@ -120,6 +123,7 @@ class _Batch:
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self._met()
         add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut, self._comparing.summed)
+        self._lone.add(equations, self._layout, self.state, matching.cut)
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
         self.state.nodes += self._nodes_of(self._move)

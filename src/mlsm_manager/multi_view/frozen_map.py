@@ -20,12 +20,13 @@ class FrozenMap:
     """Points of frozen blocks, placed with the run's unknowns at `run` (2,).
 
     importance: (n,) factor of each point's weight, 0 at the border of what is near.
-    numbers: (b,) the blocks that are near, in the order of time.
+    numbers: (b,) the blocks that are near, in the order of time. block_importance: (b,) the factor of each.
     """
 
     points: PlacedPoints
     importance: np.ndarray
     numbers: np.ndarray
+    block_importance: np.ndarray
     run: np.ndarray
 
     def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
@@ -53,7 +54,7 @@ def nearest_blocks(
     )
     points = place(log, odometry, state, rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
-    return FrozenMap(points, per_point, numbers, state.run.copy())
+    return FrozenMap(points, per_point, numbers, importance[numbers], state.run.copy())
 
 
 def fading(distances: np.ndarray, most: int) -> np.ndarray:

@@ -11,6 +11,7 @@ from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
+from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.multi_view.odometry_model import OdometryModel, frozen_deviations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -62,6 +63,15 @@ class LiveWindow:
         self._comparing = Comparing.by(parameters.kernel)
         self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
         self._met = ()
+        self._lone = self._lone_comparisons()
+
+    def _lone_comparisons(self) -> LoneComparisons:
+        """Return those with the frozen blocks and with the scans since."""
+        blocks = self._frozen.numbers[:, np.newaxis] * self._scans_per_block + np.arange(self._scans_per_block)
+        recent = np.arange(self._recent, self._layout.last)
+        importance = np.repeat(self._frozen.block_importance, self._scans_per_block)
+        scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
+        return LoneComparisons(self._log, self._odometry, self._parameters.matching, scans, importance)
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
@@ -84,6 +94,7 @@ class LiveWindow:
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)
         self._comparisons = self._add_surfaces(equations, cut)
+        self._comparisons += self._lone.add(equations, self._layout, self._state, cut)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
 

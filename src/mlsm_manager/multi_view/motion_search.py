@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.placement import PlacedPoints, place
+from mlsm_manager.multi_view.placement import PlacedPoints, place, place_lone
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import State
 from mlsm_manager.multi_view.transition import Transition
@@ -14,8 +14,9 @@ _REACH = 3.0  # standard deviations of the step within which is searched
 _KNOWN = 2.0  # so many within the cut, and the solver's own steps do
 _MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
 _CELL = 1.0  # m: about twice the deviation of an echo, so that no place falls between two cells
-_COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
+COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
 _MOST_POINTS = 150  # of the newest scan; neighbours on a wall say the same
+_LONE_NATS = 1.0  # that a point which stands alone is worth where another one stood: there are few
 _NATS = 0.1  # that a point on a surface is worth: neighbours share errors
 
 
@@ -33,16 +34,37 @@ def searched_node(
     if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut:
         return newest
     last = log.scan_count
-    before, own = log.rows(max(0, last - 1 - _COMPARED_SCANS), last - 1), log.rows(last - 1, last)
+    before, own = log.rows(max(0, last - 1 - COMPARED_SCANS), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
     sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
     shifts = _cells(step[:2, :2])
-    moved = sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
-    found = fits(sources, place(log, odometry, state, before), moved, matching)
+    found = _NATS * fits(sources, place(log, odometry, state, before), _moved(sources, shifts), matching)
+    if matching.lone_quality:
+        found = found + matching.lone_quality * _LONE_NATS * _lone_fits(log, odometry, state, shifts, matching)
     costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
-    best = shifts[np.argmax(_NATS * found - costs)]
+    best = shifts[np.argmax(found - costs)]
     return newest + step[:, :2] @ np.linalg.solve(step[:2, :2], best)
+
+
+def _moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
+    """Return the places (k, n, 2) of n points of the newest scan where its node is moved by `shifts` (k, 2)."""
+    return sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
+
+
+def _lone_fits(
+    log: RunLog, odometry: OdometryModel, state: State, shifts: np.ndarray, matching: SurfaceMatching
+) -> np.ndarray:
+    """Return how many of the newest scan's lone points (k,) lie on earlier ones at `shifts` (k, 2)."""
+    last = log.scan_count
+    sources = place_lone(log, odometry, state, log.lone.rows(last - 1, last))
+    targets = place_lone(log, odometry, state, log.lone.rows(max(0, last - 1 - COMPARED_SCANS), last - 1))
+    if not len(sources) or not len(targets):
+        return np.zeros(len(shifts))
+    moved = _moved(sources, shifts)
+    distance, _ = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=matching.cut)
+    near = np.exp(-0.5 * (distance / _CELL) ** 2).reshape(moved.shape[:2])
+    return (near * sources.qualities).sum(axis=1)
 
 
 def _cells(covariance: np.ndarray) -> np.ndarray:

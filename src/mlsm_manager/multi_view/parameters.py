@@ -60,6 +60,10 @@ class SurfaceMatching(ParameterSet):
         0.0, "standard deviation of surface normals: what a scan may seem to say of the way along a straight wall",
         unit="rad", low=0.0, high=1.0,
     )  # fmt: skip
+    lone_quality: float = parameter(
+        0.0, "how certain a strong echo that stands alone is of something small, as a post; 0: none is compared",
+        low=0.0, high=1.0,
+    )  # fmt: skip
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50
     )

@@ -8,6 +8,7 @@ from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.path import NodePath
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE, YAW, State
+from mlsm_manager.multi_view.surface_points import SurfacePoints
 from node_support.geometry.planar import rotated
 
 _HALF_SECOND = 0.5  # s: the velocity of a point is averaged over one second, longer than the odometry's period
@@ -46,8 +47,18 @@ class PlacedPoints:
 
 
 def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the points in `rows` of the log; NodePath says where the vehicle was between two nodes."""
-    points, scans = log.points(rows), log.scans(rows)
+    """Return the surface points in `rows` of the log; NodePath says where the vehicle was between two nodes."""
+    return _placed(log, odometry, state, log.points(rows), log.scans(rows))
+
+
+def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
+    """Return the lone points in `rows` of the log's table of these."""
+    return _placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
+
+
+def _placed(
+    log: RunLog, odometry: OdometryModel, state: State, points: SurfacePoints, scans: np.ndarray
+) -> PlacedPoints:
     times = points.times + state.run[DELAY]
     nodes = np.unique(np.concatenate([scans, scans + 1]))
     legs = np.searchsorted(nodes, scans)

@@ -1,14 +1,15 @@
 """What was measured during a run: surface points of every scan, the nodes' times and the odometry."""
 
-from dataclasses import fields
 from typing import List
 
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.lone_points import lone_points
 from mlsm_manager.multi_view.odometry_motion import Motion
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.point_table import PointTable
 from mlsm_manager.multi_view.surface_points import SurfacePoints
 from node_support.errors import RefusedInput
 
@@ -18,23 +19,20 @@ _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning b
 class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
-    sonar_in_base: (2,) m.
+    sonar_in_base: (2,) m. lone: points of what is small.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
         self.sonar_in_base = np.asarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryTimeline()
         self._node_times = GrowingArray()
-        self._starts: List[int] = [0]
+        self._surfaces, self.lone = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []
-        self._scans = GrowingArray()
-        self._points = {field.name: GrowingArray() for field in fields(SurfacePoints)}
-        self._points["normals"] = GrowingArray(2)
 
     @property
     def scan_count(self) -> int:
         """Number of scans so far."""
-        return len(self._starts) - 1
+        return self._surfaces.scan_count
 
     @property
     def node_times(self) -> np.ndarray:
@@ -47,6 +45,7 @@ class RunLog:
         Raises RefusedInput for a scan that does not end later than the one before.
         """
         points = SurfacePoints.of(scan, self.sonar_in_base)
+        lone = lone_points(scan, self.sonar_in_base, points)
         if not len(self._node_times):
             self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
         newest = self.node_times[-1]
@@ -56,31 +55,28 @@ class RunLog:
         self._odometry_lengths.append(len(self.odometry))
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
-        for name, array in self._points.items():
-            array.extend(getattr(points, name))
-        self._scans.extend(np.full(len(points), self.scan_count))
-        self._starts.append(self._starts[-1] + len(points))
+        self._surfaces.append(points)
+        self.lone.append(lone)
 
     def remove_newest(self) -> None:
         """Take back the last `append`, as if that scan had not been."""
-        self._starts.pop()
-        for array in (*self._points.values(), self._scans):
-            array.shorten(self._starts[-1])
+        self._surfaces.remove_newest()
+        self.lone.remove_newest()
         self.odometry.shorten(self._odometry_lengths.pop())
         # Without scans no node is known: the next scan begins the run.
-        self._node_times.shorten(len(self._starts) if self.scan_count else 0)
+        self._node_times.shorten(self.scan_count + 1 if self.scan_count else 0)
 
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
-        return np.arange(self._starts[first], self._starts[last])
+        return self._surfaces.rows(first, last)
 
     def points(self, rows: np.ndarray) -> SurfacePoints:
         """Return the points in `rows`."""
-        return SurfacePoints(**{name: array.values[rows] for name, array in self._points.items()})
+        return self._surfaces.points(rows)
 
     def scans(self, rows: np.ndarray) -> np.ndarray:
         """Return the scan (n,) int of each point in `rows`."""
-        return self._scans.values[rows].astype(np.int64)
+        return self._surfaces.scans(rows)
 
     def node_motion(self, nodes: np.ndarray) -> Motion:
         """Return what the odometry reported up to `nodes` (n,)."""

@@ -51,12 +51,11 @@ class SurfacePoints:
     @classmethod
     def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "SurfacePoints":
         """Return the points of a scan that lie on surfaces; sonar_in_base: (2,) m, where the sonar is in base_link."""
-        poses = scan.track.at(scan.times)
-        sight = transformed(inverse(poses), scan.points[:, :2]) - sonar_in_base
+        sight = sights(scan, sonar_in_base)
         ranges = np.hypot(sight[:, 0], sight[:, 1])
         bearings = np.arctan2(sight[:, 1], sight[:, 0])
         normals, qualities = surface_normals(scan.points[:, :2], reaches(scan.times, bearings, ranges))
-        normals = rotated(normals, -poses[:, 2])
+        normals = rotated(normals, -scan.track.at(scan.times)[:, 2])
         outward = np.einsum("na,na->n", normals, sight)
         normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
         slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
@@ -64,6 +63,11 @@ class SurfacePoints:
         qualities = qualities / np.sqrt(points_per_echo(scan.times, ranges))
         known = qualities > 0.0
         return cls(*(array[known] for array in (scan.times, ranges, bearings, normals, slants, qualities)))
+
+
+def sights(scan: Scan, sonar_in_base: np.ndarray) -> np.ndarray:
+    """Return the points (n, 2) [m] of a scan from the sonar, in base_link at their own times."""
+    return transformed(inverse(scan.track.at(scan.times)), scan.points[:, :2]) - sonar_in_base
 
 
 def reaches(times: np.ndarray, bearings: np.ndarray, ranges: np.ndarray) -> np.ndarray:

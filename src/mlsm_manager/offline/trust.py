@@ -6,13 +6,16 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.multi_view.continuity import shares_heard_before
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.state import State
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.self_check.calibration_agreement import as_expected, halves_agree
+from mlsm_manager.self_check.continuity import scans_go_on
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.odometry_agreement import against_odometry
@@ -84,10 +87,14 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
     deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
     verdicts = [
         *_against_odometry(replayed, path, solver.odometry),
+        *_going_on(solver, solver.state if refined is None else refined.batch.state, ends),
         recent_agreement(ends, np.array([estimate.agreement for estimate in estimates])),
         told_deviation(deviations.times, deviations.radii),
         *surfaces_tell(
-            ends, np.array([estimate.surfaces for estimate in estimates]), solver.odometry.distance_deviation
+            float(solver.log.node_times[0]),
+            ends,
+            np.array([estimate.surfaces for estimate in estimates]),
+            solver.odometry.distance_deviation,
         ),
     ]
     found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
@@ -106,6 +113,14 @@ def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryMo
         replayed.times, replayed.odometry, path,
         scale_deviation=odometry.distance_deviation, position_walk=odometry.position_walk,
     )  # fmt: skip
+
+
+def _going_on(solver: LiveSolver, state: State, ends: np.ndarray) -> Tuple[Verdict, ...]:
+    """Ask whether scans lie on those before them, where the motion between them is unknown."""
+    if not np.isinf(solver.odometry.distance_deviation):
+        return ()
+    shares = shares_heard_before(solver.log, solver.odometry, state, solver.parameters.matching, 0)
+    return (scans_go_on(ends, shares),)
 
 
 def _live_deviations(solver: LiveSolver) -> Deviations:

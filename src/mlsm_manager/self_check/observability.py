@@ -4,6 +4,7 @@ The walls of a canal, or a single wall, do not tell the way along them. A vehicl
 then goes on as before, and nothing shows how far.
 """
 
+from datetime import datetime, timezone
 from typing import Tuple
 
 import numpy as np
@@ -11,16 +12,18 @@ import numpy as np
 from mlsm_manager.self_check.verdict import Verdict, merged
 
 _GOOD_ODOMETRY = 0.1  # relative deviation of reported distances up to which these tell the way along a canal
+_RECORDED, _LATEST = 1e9, 2.0**31  # s since 1970 of clocks that tell the time: simulated ones begin near 0
 _SCANS = 10  # about 2 minutes, in which a small vehicle passes what it hears
 
 
 def surfaces_tell(
-    times: np.ndarray, surfaces: np.ndarray, distance_deviation: float, limit: float = 0.05
+    begin: float, times: np.ndarray, surfaces: np.ndarray, distance_deviation: float, limit: float = 0.05
 ) -> Tuple[Verdict, ...]:
     """Return a verdict on what some following scans together tell of the direction that they tell least of.
 
-    times: (n,) s of the scans' ends. surfaces: (n, 2, 2) sums of the outer products of the normals that each scan met.
-    distance_deviation: relative one of the odometry's distances; there is no verdict where the odometry tells the way.
+    begin: s, of the run. times: (n,) s of the scans' ends. surfaces: (n, 2, 2) sums of the outer products of the
+    normals that each scan met. distance_deviation: relative one of the odometry's distances; there is no verdict where
+    the odometry tells the way.
     limit: least share of what they tell of the direction that they tell most of; normals err by 0.2 rad, which makes
     0.04 of a straight wall.
     """
@@ -36,11 +39,18 @@ def surfaces_tell(
     weak, worst = shares < limit, int(np.argmin(shares))
     starts = np.asarray(times)[: len(shares)]
     if weak.any():
-        text = (
-            f"from {starts[weak][0]:.0f} s on, next to nothing tells the way along {_degrees(vectors[worst, :, 0])} deg"
-        )
+        way = f"next to nothing tells the way along {_degrees(vectors[worst, :, 0])} deg"
+        text = f"from {_moment(starts[weak][0], begin)} on, {way}"
     doubtful = merged(starts[weak], float(np.median(np.diff(times))) * (_SCANS - 1))
     return (Verdict(name, float(shares[worst]), limit, text, True, doubtful, question),)
+
+
+def _moment(time: float, begin: float) -> str:
+    """Return when `time` [s] was, for people: seconds into the run, and the clock's time unless it is simulated."""
+    into = f"{time - begin:.0f} s into the run"
+    if not _RECORDED < time < _LATEST:
+        return into
+    return f"{into} ({datetime.fromtimestamp(time, timezone.utc):%H:%M:%S} UTC)"
 
 
 def _degrees(direction: np.ndarray) -> int:

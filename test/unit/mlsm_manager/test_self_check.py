@@ -119,24 +119,31 @@ def canal_after(scans):
 
 
 def test_a_canal_that_does_not_tell_the_way_along_it_is_told():
-    (verdict,) = surfaces_tell(*heard(canal_after(30)), distance_deviation=np.inf)
+    (verdict,) = surfaces_tell(0.0, *heard(canal_after(30)), distance_deviation=np.inf)
     assert verdict.fires
-    assert "from 420 s on, next to nothing tells the way along" in verdict.line()
+    assert "from 420 s into the run on, next to nothing tells the way along" in verdict.line()
     assert 35 <= int(verdict.text.split()[-2]) <= 45
     np.testing.assert_allclose(verdict.doubtful, [[14.0 * 30, 14.0 * 59]])
 
 
+def test_the_moment_is_told_in_the_run_and_by_the_clock():
+    times, surfaces = heard(canal_after(30))
+    begin = 1.7e9
+    (verdict,) = surfaces_tell(begin, begin + times, surfaces, distance_deviation=np.inf)
+    assert "from 420 s into the run (22:20:20 UTC) on" in verdict.line()
+
+
 def test_corners_tell_the_way():
-    assert not surfaces_tell(*heard(canal_after(60)), distance_deviation=np.inf)[0].fires
+    assert not surfaces_tell(0.0, *heard(canal_after(60)), distance_deviation=np.inf)[0].fires
 
 
 def test_scans_that_meet_nothing_tell_nothing():
-    assert surfaces_tell(14.0 * np.arange(20), np.zeros((20, 2, 2)), distance_deviation=np.inf)[0].fires
+    assert surfaces_tell(0.0, 14.0 * np.arange(20), np.zeros((20, 2, 2)), distance_deviation=np.inf)[0].fires
 
 
 def test_a_dvl_tells_the_way_along_a_canal():
-    assert surfaces_tell(*heard(canal_after(0)), distance_deviation=0.01) == ()
+    assert surfaces_tell(0.0, *heard(canal_after(0)), distance_deviation=0.01) == ()
 
 
 def test_few_scans_say_too_little_of_the_surfaces():
-    assert "too little" in surfaces_tell(*heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
+    assert "too little" in surfaces_tell(0.0, *heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()

@@ -1,0 +1,71 @@
+"""Whether scans lie on what was heard before them."""
+
+import numpy as np
+import pytest
+from made_posts import heard, true_path
+
+from mlsm_manager.multi_view.continuity import shares_heard_before
+from mlsm_manager.multi_view.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
+from mlsm_manager.multi_view.parameters import SurfaceMatching
+from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.state import State
+from mlsm_manager.self_check.continuity import scans_go_on
+
+SECONDS = 14.0
+
+
+@pytest.fixture(scope="module")
+def log():
+    result = RunLog(np.zeros(2))
+    for scan in heard(4):
+        result.append(scan, 1.0)
+    return result
+
+
+def shares_at(log, aside):
+    """Return the shares where each scan is displaced across the canal by `aside` [m] against the one before."""
+    odometry = HeadingFactors(HeadingOdometry())
+    nodes = np.zeros((log.scan_count + 1, odometry.width))
+    nodes[:, :2] = true_path(log.node_times)
+    nodes[:, 1] = aside * np.arange(len(nodes))
+    return shares_heard_before(log, odometry, State(nodes, np.zeros(2)), SurfaceMatching(), 0)
+
+
+def test_scans_at_their_places_lie_on_what_was_heard_before(log):
+    assert shares_at(log, 0.0)[1:].min() > 0.8
+
+
+def test_displaced_scans_do_not(log):
+    assert shares_at(log, 5.0)[1:].max() < 0.2
+
+
+def test_the_first_scan_has_none_before_it(log):
+    assert np.isnan(shares_at(log, 0.0)[0])
+
+
+def run_of(lying):
+    """Return the verdict on 30 scans of which `lying` (n,) do not lie on those before."""
+    shares = np.full(30, 0.9)
+    shares[lying] = 0.2
+    return scans_go_on(SECONDS * np.arange(30), shares)
+
+
+def test_one_scan_beside_the_others_is_no_reason_to_doubt():
+    assert not run_of([12]).fires
+
+
+def test_a_third_of_the_scans_beside_the_others_is():
+    verdict = run_of(np.arange(10, 19))
+    assert verdict.fires
+    assert verdict.doubtful[0, 0] <= 10 * SECONDS
+    assert verdict.doubtful[-1, 1] >= 18 * SECONDS
+
+
+def test_few_scans_say_too_little():
+    assert "too little" in scans_go_on(SECONDS * np.arange(10), np.full(10, 0.1)).line()
+
+
+def test_scans_without_points_are_left_out():
+    shares = np.where(np.arange(50) % 2, np.nan, 0.9)
+    assert not scans_go_on(SECONDS * np.arange(50), shares).fires

@@ -1,0 +1,127 @@
+"""Echoes that stand alone tell the way along straight walls."""
+
+import numpy as np
+import pytest
+from made_posts import SPEED, heard, true_path
+
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.batch_solver import solved
+from mlsm_manager.multi_view.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.lone_points import crowds, lone_points
+from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
+from mlsm_manager.multi_view.surface_points import SurfacePoints
+
+STRONG, WEAK = 100.0, 30.0
+WALL = np.column_stack([np.linspace(-10.0, 10.0, 41), np.full(41, 8.0)])
+AT_BASE = np.zeros(2)
+TURNS = 24
+
+
+def scan_of(places, strengths):
+    count = len(places)
+    points = np.column_stack([places, np.zeros(count), strengths])
+    times = np.linspace(0.0, 10.0, count)
+    track = Track(np.array([-1.0, 12.0]), np.zeros((2, 3)))
+    return Scan(points, times, np.zeros(count, dtype=bool), track, 10.0)
+
+
+def found_in(scan, sonar_in_base=AT_BASE):
+    return lone_points(scan, sonar_in_base, SurfacePoints.of(scan, sonar_in_base))
+
+
+def wall_and(place, strength):
+    """Return a scan of a wall with strong and weak echoes, and of one echo beside it."""
+    strengths = np.where(np.arange(len(WALL)) % 2, STRONG, WEAK)
+    return scan_of(np.vstack([WALL, [place]]), np.append(strengths, strength))
+
+
+def test_a_strong_echo_far_from_all_others_stands_alone():
+    found = found_in(wall_and([6.0, -7.0], STRONG))
+    np.testing.assert_allclose(found.ranges, [np.hypot(6.0, 7.0)])
+    np.testing.assert_allclose(found.bearings, [np.arctan2(-7.0, 6.0)])
+
+
+def test_the_echoes_of_a_wall_do_not_stand_alone():
+    assert len(found_in(scan_of(WALL, np.full(len(WALL), STRONG)))) == 0
+
+
+def test_weak_echoes_may_be_speckle_and_are_left_out():
+    assert len(found_in(wall_and([6.0, -7.0], WEAK))) == 0
+
+
+def test_a_scan_without_echoes_has_none():
+    assert len(found_in(scan_of(np.empty((0, 2)), np.empty(0)))) == 0
+
+
+def test_the_ray_to_the_echo_stands_for_its_normal():
+    found = found_in(wall_and([6.0, -7.0], STRONG), np.array([1.0, 0.0]))
+    np.testing.assert_allclose(found.normals, [[5.0, -7.0] / np.hypot(5.0, 7.0)])
+
+
+def test_points_are_counted_within_reach_themselves_included():
+    places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [50.0, 0.0]])
+    np.testing.assert_allclose(crowds(places, np.full(4, 3.0)), [3.0, 3.0, 3.0, 1.0])
+
+
+def test_two_posts_side_by_side_are_found():
+    scan = scan_of(np.vstack([WALL, [[6.0, -7.0], [6.0, -9.0]]]), np.full(len(WALL) + 2, STRONG))
+    assert len(found_in(scan)) == 2
+
+
+def test_the_last_echo_of_a_wall_does_not_stand_alone():
+    """Where the range ends it travels with the vehicle, and would say that nothing moves."""
+    scan = heard(1, posts=np.array([[100.0, 0.0]]))[0]
+    assert not len(found_in(scan))
+
+
+@pytest.fixture(scope="module")
+def scans():
+    return heard(TURNS)
+
+
+def solver_of(scans, lone_quality):
+    odometry = HeadingFactors(HeadingOdometry())
+    matching = SurfaceMatching(normal_deviation=0.2, block_scans=1, range_deviation=0.2, lone_quality=lone_quality)
+    sonar = SonarCalibration(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
+    solver = LiveSolver(MultiViewParameters(odometry, sonar, matching), AT_BASE)
+    for scan in scans:
+        solver.add(scan)
+    return solver
+
+
+def gone(solver, nodes):
+    """Return the way along the canal, and the true one [m]."""
+    ends = true_path(solver.log.node_times)
+    return nodes[-1, 0] - nodes[0, 0], ends[-1, 0] - ends[0, 0]
+
+
+def test_posts_tell_the_way_along_a_canal(scans):
+    solver = solver_of(scans, lone_quality=1.0)
+    for nodes in (solver.state.nodes, solved(solver).state.nodes):
+        found, true = gone(solver, nodes)
+        assert found == pytest.approx(true, abs=1.5)
+
+
+def test_the_told_deviation_is_smaller_where_posts_tell_the_way(scans):
+    with_posts, without = (solver_of(scans, quality).estimates[-1].pose_covariance[0, 0] for quality in (1.0, 0.0))
+    assert with_posts < 0.1 * without
+
+
+def test_speed_is_found_from_posts(scans):
+    assert solver_of(scans, lone_quality=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
+
+
+def test_a_point_that_no_other_scan_heard_says_nothing():
+    bare = heard(6, posts=np.array([[-500.0, 0.0]]))
+    bare[3] = with_echo(bare[3], [3.0, 25.0])
+    with_lone, without = (solver_of(bare, quality).estimates[-1].pose_covariance for quality in (1.0, 0.0))
+    np.testing.assert_allclose(with_lone, without)
+
+
+def with_echo(scan, place):
+    """Return a scan with one more strong echo at `place` (2,) [m] from the vehicle."""
+    points = np.vstack([scan.points, [[*place, 0.0, STRONG]]])
+    times = np.append(scan.times, scan.reference_time)
+    return Scan(points, times, np.ones(len(times), dtype=bool), scan.track, scan.reference_time)
