@@ -5,7 +5,6 @@ import sys
 import numpy as np
 
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
 from sonar_processing.filters.outliers import outlier_rules
@@ -20,7 +19,7 @@ def main() -> None:
     # These are compiled by being imported.
     outlier_rules(Kernel.NUMBA)
     strength_loops(Kernel.NUMBA)
-    surface_map = MultiLevelSurfaceMap(1.0, kernel=InsertionKernel.NUMBA)
+    surface_map = MultiLevelSurfaceMap(1.0, kernel=Kernel.NUMBA)
     for height in (0.0, 0.5):
         surface_map.insert(np.full((2, 4), height))
 

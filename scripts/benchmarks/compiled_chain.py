@@ -18,7 +18,6 @@ from benchmarks.in_turn import kernels, ratio_figure
 from benchmarks.map_figures import RESOLUTION
 from benchmarks.table import Row
 from mlsm_manager.ros.markers import BlockMarkers
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
 from node_support.ros.conversions import matrix_from_message
@@ -70,7 +69,7 @@ def run(scans: List[List[PlacedBeam]], kernel: Kernel, whole: bool) -> Tuple[np.
     assembler, markers = ScanAssembler(SonarToCloudParameters()), BlockMarkers()
     thresholder = Thresholder(ThresholderParameters(kernel=kernel))
     remover = OutlierRemover(OutlierRemoverParameters(kernel=kernel))
-    surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=InsertionKernel(kernel.value))
+    surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=kernel)
     seconds, points = np.zeros(len(STAGES)), 0
     for scan in scans:
         times = [time.process_time()]

@@ -11,8 +11,8 @@ from std_msgs.msg import Header
 
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.kernels import Kernel
 
 RESOLUTION = 0.5
 SCAN_RADIUS = 50.0
@@ -29,7 +29,7 @@ def scan(rng: np.random.Generator, center: np.ndarray, points: int) -> np.ndarra
 
 
 def grown_map(
-    blocks: int, extent: float, rng: np.random.Generator, kernel: InsertionKernel = InsertionKernel.NUMPY
+    blocks: int, extent: float, rng: np.random.Generator, kernel: Kernel = Kernel.NUMPY
 ) -> MultiLevelSurfaceMap:
     """Return a map of at least `blocks` blocks."""
     surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=kernel)
@@ -68,9 +68,9 @@ def compiled_rows() -> List[Row]:
         ("nearly every point its own block", SCAN_RADIUS),
         ("20 points to a block", SCAN_RADIUS / 8.0),
     ):
-        seconds: Dict[InsertionKernel, List[float]] = {kernel: [] for kernel in InsertionKernel}
+        seconds: Dict[Kernel, List[float]] = {kernel: [] for kernel in Kernel}
         rng = np.random.default_rng(3)
-        maps = {kernel: grown_map(SMALL, 0.0, np.random.default_rng(1), kernel) for kernel in InsertionKernel}
+        maps = {kernel: grown_map(SMALL, 0.0, np.random.default_rng(1), kernel) for kernel in Kernel}
         points = 60_000
         for _ in range(11):
             new = scan(rng, np.zeros(2), points)

@@ -11,8 +11,8 @@ import numpy as np
 from benchmarks.in_turn import OURS, comparison_rows, kernels
 from benchmarks.map_figures import RESOLUTION
 from benchmarks.table import Row
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.kernels import Kernel
 from sonar_processing.filters.outliers import outlier_rules
 
 NEIGHBORS, DEVIATIONS = 20, 1.0
@@ -94,7 +94,7 @@ def insertion_rows() -> List[Row]:
         "a plain dict of cells": lambda: CellDictionary(RESOLUTION).insert,
     }
     if find_spec("numba") is not None:
-        makers["our compiled loops"] = lambda: MultiLevelSurfaceMap(RESOLUTION, kernel=InsertionKernel.NUMBA).insert
+        makers["our compiled loops"] = lambda: MultiLevelSurfaceMap(RESOLUTION, kernel=Kernel.NUMBA).insert
     absent: List[Row] = []
     if find_spec("pyoctomap") is None:
         absent = [("insertion into OctoMap", "not measured: no pyoctomap", "")]

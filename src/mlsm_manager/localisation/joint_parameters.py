@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from importlib.util import find_spec
 
 import numpy as np
 
@@ -10,7 +9,8 @@ from mlsm_manager.localisation.odometry_choice import OdometryChoice
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from node_support.parameters import ParameterError, parameter
+from node_support.kernels import Kernel, check_kernel
+from node_support.parameters import parameter
 
 # Deviations by which beams may be later than their stamps, and s of odometry that are worth waiting for.
 _LATE = 3.0
@@ -67,8 +67,8 @@ class JointParameters(OdometryChoice):
 
     def check(self) -> None:
         """Refuse what is not installed."""
-        if self.solver_kernel is SolverKernel.NUMBA and find_spec("numba") is None:
-            raise ParameterError("solver_kernel = NUMBA: needs numba; install it with: apt install python3-numba")
+        if self.solver_kernel is SolverKernel.NUMBA:
+            check_kernel("solver_kernel", Kernel.NUMBA)
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.

@@ -10,9 +10,9 @@ from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCa
 from mlsm_manager.localisation.placement import Placement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
+from node_support.kernels import Kernel
 
 
 @dataclass(frozen=True)
@@ -35,7 +35,7 @@ class KeyframeMap:
         resolution: float,
         limit: float,
         expected_blocks: int = 0,
-        kernel: InsertionKernel = InsertionKernel.NUMPY,
+        kernel: Kernel = Kernel.NUMPY,
         carver: Optional[Carver] = None,
         most_followed: int = MOST_FOLLOWED,
     ) -> None:

@@ -9,9 +9,9 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.carving import Carver
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.running_copy import RunningCopy
+from node_support.kernels import Kernel
 
 
 @dataclass(frozen=True)
@@ -29,7 +29,7 @@ class MapSettings:
     expected_blocks: int
     fewest_blocks: int
     carver: Optional[Carver] = None
-    kernel: InsertionKernel = InsertionKernel.NUMPY
+    kernel: Kernel = Kernel.NUMPY
 
 
 class HasBlocks(Protocol):

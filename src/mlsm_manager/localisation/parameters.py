@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from importlib.util import find_spec
 from typing import Any, Dict, Optional, Sequence
 
 import numpy as np
@@ -21,8 +20,8 @@ from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from node_support.headers import StampParameters
+from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 # A block takes 112 bytes with its part of the index: 1.8 GB, more than a vehicle's computer can spare.
@@ -90,10 +89,10 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
         return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
 
     @property
-    def chosen_kernel(self) -> InsertionKernel:
+    def chosen_kernel(self) -> Kernel:
         """What inserts points into the map that is shown."""
         compiled = self.solver_kernel.resolved is SolverKernel.NUMBA
-        return InsertionKernel.NUMBA if compiled else InsertionKernel.NUMPY
+        return Kernel.NUMBA if compiled else Kernel.NUMPY
 
     @property
     def matches_from_start(self) -> bool:
@@ -148,8 +147,8 @@ class MlsmNodeParameters(ParameterSet):
         1.0, "shortest time between two messages of the map, in wall time; the next change after it is sent at once",
         unit="s", low=0.05, high=3600.0, tunable=False,
     )  # fmt: skip
-    insertion: InsertionKernel = parameter(
-        InsertionKernel.NUMPY, "what inserts points: NUMBA is two to four times faster and needs python3-numba",
+    insertion: Kernel = parameter(
+        Kernel.NUMPY, "what inserts points: NUMBA is two to four times faster and needs python3-numba",
         tunable=False,
     )  # fmt: skip
     color_by: ColorBy = parameter(ColorBy.TYPE, "what the colour of a block's marker tells", tunable=False)
@@ -185,8 +184,7 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
                 f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
             )
-        if self.insertion is InsertionKernel.NUMBA and find_spec("numba") is None:
-            raise ParameterError("insertion = NUMBA: needs numba; install it with: apt install python3-numba")
+        check_kernel("insertion", self.insertion)
         if self.map_frame == self.odom_frame:
             raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
 
@@ -196,7 +194,7 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
         return self.start_matching
 
     @property
-    def chosen_kernel(self) -> InsertionKernel:
+    def chosen_kernel(self) -> Kernel:
         """What inserts points into the map that is shown."""
         return self.insertion
 

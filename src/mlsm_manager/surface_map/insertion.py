@@ -1,27 +1,20 @@
 """How points become blocks of a store, by numpy or by compiled loops that give the same blocks to the last bit."""
 
-from enum import Enum
 from typing import Callable
 
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore
 from mlsm_manager.surface_map.linkage import Extents, Intervals, concatenated, group_points, joined, link, merge
+from node_support.kernels import Kernel
 
 PointInserter = Callable[[BlockStore, np.ndarray, np.ndarray, float], np.ndarray]
 """Takes store, points (n, 4), n > 0, the keys of their cells (n,) and the resolution; returns these keys, sorted."""
 
 
-class InsertionKernel(Enum):
-    """What inserts points."""
-
-    NUMPY = "NUMPY"
-    NUMBA = "NUMBA"
-
-
-def point_inserter(kernel: InsertionKernel) -> PointInserter:
+def point_inserter(kernel: Kernel) -> PointInserter:
     """Return what inserts points. Raises ImportError, which says what to install, for NUMBA without numba."""
-    if kernel is InsertionKernel.NUMPY:
+    if kernel is Kernel.NUMPY:
         return insert_points
     from mlsm_manager.surface_map.compiled_insertion import compile_loops, insert_points_compiled
 

@@ -10,9 +10,10 @@ from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
 from mlsm_manager.surface_map.cell_order import cell_order
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
-from mlsm_manager.surface_map.insertion import InsertionKernel, insert_groups, point_inserter
+from mlsm_manager.surface_map.insertion import insert_groups, point_inserter
 from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
 from mlsm_manager.surface_map.running_copy import RunningCopy
+from node_support.kernels import Kernel
 
 
 @dataclass(frozen=True)
@@ -42,7 +43,7 @@ class MultiLevelSurfaceMap:
         resolution: float,
         limit: float = 10000.0,
         expected_blocks: int = 0,
-        kernel: InsertionKernel = InsertionKernel.NUMPY,
+        kernel: Kernel = Kernel.NUMPY,
     ) -> None:
         """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted.
 

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlsm_manager.surface_map.insertion import InsertionKernel
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.kernels import Kernel
 
 compiled_loops = pytest.importorskip("mlsm_manager.surface_map.compiled_loops", reason="numba is not installed")
 # One byte each for x, y, height and strength: hypothesis draws and shrinks them ten times as fast as floats.
@@ -14,7 +14,7 @@ BATCHES = st.lists(st.binary(min_size=4, max_size=240), min_size=1, max_size=4)
 
 
 def _maps(resolution):
-    return [MultiLevelSurfaceMap(resolution, kernel=kernel) for kernel in InsertionKernel]
+    return [MultiLevelSurfaceMap(resolution, kernel=kernel) for kernel in Kernel]
 
 
 def _assert_same(maps):
