@@ -1,28 +1,25 @@
 """Prints how honest the joint solver is in straight canals, whose walls do not tell the way along them.
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.canals [--posts N ...] [--seeds N] [--odometry heading]
+PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.canals [--posts N ...] [--seeds N]
 
 A vehicle with a compass alone goes from one basin through a canal, 200 m long and 20 m wide, into another basin.
 """
 
 import argparse
-from typing import List, NamedTuple, Tuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
+from benchmarks.solver_input import solver_input
 from benchmarks.twins.odometry import lasting, reported
 from benchmarks.twins.parameters import TwinParameters
 from benchmarks.twins.sonar import heard
 from benchmarks.twins.water import RESOLUTION, Water, water_of
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.offline.echo_shape import EchoShape, suited
-from mlsm_manager.offline.odometry_kind import with_odometry
-from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.echo_shape import EchoShape
+from mlsm_manager.offline.recording import Recording
 from node_support.geometry.planar import matrices
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
@@ -98,14 +95,6 @@ def recording(posts: int, seed: int, binary: bool) -> Tuple[Recording, Track]:
         for time, bearing, row, place in zip(stamps, bearings, strengths, places)
     ]
     return Recording(beams, 0, compass, None), truth
-
-
-def solver_input(made: Recording, kind: OdometryKind, shape: EchoShape) -> Tuple[List[Scan], MultiViewParameters]:
-    """Return scans and parameters as map_bag has them."""
-    parameters = suited(with_odometry(ReplayParameters(), kind, ()), shape, ())
-    errors = parameters.part(OdometryErrors)
-    scans = [scan for scan, _ in scans_of(made, parameters.echoes())]
-    return scans, parameters.solver_parameters(errors, parameters.range_scale_deviation)
 
 
 def figures(solver: LiveSolver, truth: Track) -> Figures:
