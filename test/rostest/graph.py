@@ -66,9 +66,10 @@ class Inbox:
             self._condition.notify_all()
 
     def wait_for_link(self, timeout: float = PATIENCE) -> None:
-        """Wait until a publisher is connected, so that no message is missed from then on."""
-        told = f"{self._topic}: nobody publishes it"
-        wait_until(lambda: self._subscriber.get_num_connections() > 0, timeout, told=told)
+        """Wait until a publisher is connected and knows it, so that no message is missed from then on."""
+        topic, listener = self._subscriber.resolved_name, rospy.get_name()
+        told = f"{topic}: nobody publishes it"
+        wait_until(lambda: any(_reaches(node, topic, listener) for node in nodes_of(topic)[0]), timeout, told=told)
 
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = PATIENCE) -> Any:
         """Return the first message that fits, of the newest and of all that come after it.
@@ -154,9 +155,22 @@ def nodes_of(topic: str) -> Tuple[List[str], List[str]]:
 
 def _links(node: str, topic: str, direction: str = "o") -> int:
     """Return the number of established connections over which a node publishes a topic, or takes it ("i")."""
+    return len(_others(node, topic, direction))
+
+
+def _reaches(node: str, topic: str, listener: str) -> bool:
+    """Tell whether what a node publishes on a topic goes to a listener; one that is gone reaches nobody."""
+    try:
+        return listener in _others(node, topic, "o")
+    except (OSError, rosgraph.MasterException):
+        return False
+
+
+def _others(node: str, topic: str, direction: str) -> List[str]:
+    """Return the other end of each established connection over which a node publishes a topic, or takes it ("i")."""
     slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
     _, _, connections = slave.getBusInfo("/graph_test")
-    return sum(1 for link in connections if link[2] == direction and link[4] == topic and link[5])
+    return [link[1] for link in connections if link[2] == direction and link[4] == topic and link[5]]
 
 
 def wait_until(
