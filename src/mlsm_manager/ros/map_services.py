@@ -13,6 +13,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.ros.map_messages import map_cloud
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.files.map_file import StoredMap
+from node_support.geometry.planar import wrapped
 from underwater_map_construction.srv import (
     GetRegion,
     GetRegionRequest,
@@ -85,7 +86,7 @@ class MapServices:
             return TriggerResponse(False, f"{update.result.status.value}: {update.result.reason}")
         self._on_fix(update)
         x, y, yaw = update.result.pose
-        return TriggerResponse(True, f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(yaw):.1f} deg in map")
+        return TriggerResponse(True, f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(wrapped(yaw)):.1f} deg in map")
 
 
 def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, run: str = "") -> StoredMap:
