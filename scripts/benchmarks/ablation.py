@@ -65,6 +65,7 @@ VARIANTS: Dict[str, Change] = {
     "lone echoes are compared": _with("matching", lone_quality=1.0),
     "straight walls tell nothing of the way along them": _with("matching", normal_deviation=0.2),
     "20 newest scans are free": _with("window", free_nodes=20),
+    "10 newest scans are free": _with("window", free_nodes=10),
     "5 newest scans are free": _with("window", free_nodes=5),
     "two steps per scan": _with("window", live_iterations=2),
     "one step per scan": _with("window", live_iterations=1),
@@ -106,12 +107,15 @@ def line(run: Run, change: Change) -> str:
     batch = solved(solver)
     seconds = time.process_time() - start
     figures = figures_of(solver, batch, run.truth)
-    parts = (f"{name} {one.mean:.2f} / {one.most:.2f}" for name, one in zip(("live", "refined"), figures))
-    return f"{', '.join(parts)} m, NEES {figures[1].nees:.2f}, {seconds:.1f} s"
+    parts = (
+        f"{name} {one.mean:.2f} / {one.most:.2f} m, NEES {one.nees:.2f}"
+        for name, one in zip(("live", "refined"), figures)
+    )
+    return f"{', '.join(parts)}, {seconds:.1f} s"
 
 
 def main() -> None:
-    """Print one line per run and variant: mean and greatest distance from the truth, and computing time."""
+    """Print one line per run and variant: mean / greatest distance from the truth, NEES per state, computing time."""
     parser = argparse.ArgumentParser(prog="benchmarks.ablation", description=__doc__)
     parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
     parser.add_argument(
