@@ -10,17 +10,15 @@ from pathlib import Path
 from typing import Dict, List, Tuple
 
 import numpy as np
-import rosbag
 from std_msgs.msg import Header
 
-from benchmarks.graph import ROOT
+from benchmarks.basin_messages import basin_messages
 from benchmarks.in_turn import kernels, ratio_figure
 from benchmarks.map_figures import RESOLUTION
 from benchmarks.table import Row
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
-from node_support.ros.conversions import matrix_from_message
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
@@ -38,13 +36,7 @@ _BEAM = struct.Struct("<19di")
 
 def recorded_beams() -> List[PlacedBeam]:
     """Return the beams of the recorded tour of the basin in the frame odom."""
-    messages, poses = [], {}
-    with rosbag.Bag(str(ROOT / "test/data/basin.bag")) as bag:
-        for topic, message, stamp in bag.read_messages(["/sonar/raw", "/tf"]):
-            if topic == "/tf":
-                poses[stamp.to_nsec()] = matrix_from_message(message.transforms[0].transform)
-            else:
-                messages.append(message)
+    messages, poses = basin_messages()
     reader = BeamReader(BeamMessageParameters())
     beams = [beam for message in messages for beam in reader.read(OWN, message).beams]
     return [PlacedBeam(beam, poses[beam.stamp_ns], is_moving=False) for beam in beams]

@@ -4,14 +4,12 @@ from io import BytesIO
 from typing import List
 
 import numpy as np
-import rosbag
 
 from benchmarks import processing_graph
-from benchmarks.graph import ROOT
+from benchmarks.basin_messages import basin_messages
 from benchmarks.map_figures import RESOLUTION, scan
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.ros.conversions import matrix_from_message
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.cloud import IntensityCloud
@@ -59,13 +57,7 @@ def _beam(message: SonarScanLine) -> Beam:
 
 def chain_rows() -> List[Row]:
     """Measure beams to inserted blocks on the recorded tour of the basin."""
-    beams, poses = [], {}
-    with rosbag.Bag(str(ROOT / "test/data/basin.bag")) as bag:
-        for topic, message, stamp in bag.read_messages(["/sonar/raw", "/tf"]):
-            if topic == "/tf":
-                poses[stamp.to_nsec()] = matrix_from_message(message.transforms[0].transform)
-            else:
-                beams.append(message)
+    beams, poses = basin_messages()
     recorded = beams[-1].header.stamp.to_sec() - beams[0].header.stamp.to_sec()
 
     def run() -> None:
