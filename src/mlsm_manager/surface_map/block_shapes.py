@@ -14,6 +14,7 @@ from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
 from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 
 # Power of two: a sixteenth of a cell is the thinnest box that still shows.
 THINNEST = -4
@@ -47,6 +48,7 @@ def box_maker(kernel: Kernel) -> BoxMaker:
     """Return what makes boxes. Raises ImportError, which says what to install, for NUMBA without numba."""
     if kernel is Kernel.NUMPY:
         return box_lists
+    prepare_cache()
     from mlsm_manager.surface_map.compiled_shapes import compile_loops, compiled_box_lists
 
     compile_loops()

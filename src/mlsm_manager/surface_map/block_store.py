@@ -11,6 +11,7 @@ from mlsm_manager.surface_map.large_array import LargeArray
 from mlsm_manager.surface_map.linkage import Extents, Intervals
 from mlsm_manager.surface_map.running_copy import RunningCopy
 from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 
 _MIN_ROWS = 1024
 """Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
@@ -20,6 +21,7 @@ def cell_index(expected_cells: int, kernel: Kernel) -> CellIndex:
     """Return an empty index. Raises ImportError, which says what to install, for NUMBA without numba."""
     if kernel is Kernel.NUMPY:
         return CellIndex(expected_cells)
+    prepare_cache()
     from mlsm_manager.surface_map.compiled_index import CompiledCellIndex
 
     return CompiledCellIndex(expected_cells)

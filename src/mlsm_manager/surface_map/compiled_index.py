@@ -1,6 +1,7 @@
 """The index of cells with its search in compiled loops; it finds and makes the same places. Needs numba."""
 
 import numpy as np
+from numba import njit
 
 from mlsm_manager.surface_map.cell_index import (
     EMPTY,
@@ -14,11 +15,6 @@ from mlsm_manager.surface_map.cell_index import (
     SEGMENT_BITS,
     CellIndex,
 )
-
-try:
-    from numba import njit
-except ImportError:
-    raise ImportError("insertion = NUMBA needs numba; install it with: apt install python3-numba") from None
 
 _PLACES = 1 << SEGMENT_BITS
 _HALF = np.uint64(32)

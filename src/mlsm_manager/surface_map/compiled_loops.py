@@ -1,17 +1,13 @@
 """The compiled loops themselves: choosing points, sorting by cell, grouping by height, merging with what is stored.
 
-An interval is a row as `blocks` describes it. Raises ImportError, which says what to install, without numba.
+An interval is a row as `blocks` describes it. Needs numba.
 """
 
 import numpy as np
+from numba import njit
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP
 from mlsm_manager.surface_map.cell_index import NO_BLOCK
-
-try:
-    from numba import njit
-except ImportError:
-    raise ImportError("insertion = NUMBA needs numba; install it with: apt install python3-numba") from None
 
 _VALUES = 4
 """Mean of x y z and strength, then as many sums of squares: the first columns of a row."""

@@ -4,15 +4,11 @@ import math
 from functools import lru_cache
 
 import numpy as np
+from numba import njit
 
 from mlsm_manager.surface_map.block_shapes import THINNEST, BoxLists
 from mlsm_manager.surface_map.blocks import BOTTOM, ROW_WIDTH, TOP, Blocks
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
-
-try:
-    from numba import njit
-except ImportError:
-    raise ImportError("insertion = NUMBA needs numba; install it with: apt install python3-numba") from None
 
 _POWERS = 64
 """Of depth, from THINNEST on: up to 2 ** 59 cells."""

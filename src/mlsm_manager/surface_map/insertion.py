@@ -10,6 +10,7 @@ from mlsm_manager.surface_map.blocks import cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
 from mlsm_manager.surface_map.linkage import Extents, Intervals, concatenated, group_points, joined, link, merge
 from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 
 
 class Insertion(NamedTuple):
@@ -27,6 +28,7 @@ def point_inserter(kernel: Kernel) -> PointInserter:
     """Return what inserts points. Raises ImportError, which says what to install, for NUMBA without numba."""
     if kernel is Kernel.NUMPY:
         return insert_points
+    prepare_cache()
     from mlsm_manager.surface_map.compiled_insertion import compile_loops, insert_points_compiled
 
     compile_loops()
