@@ -19,6 +19,7 @@ from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
+from mlsm_manager.multi_view.weak_directions import WeakDirections
 from node_support.geometry.planar import composed, inverse
 
 _FORGOTTEN_DELAY = 2.0
@@ -131,8 +132,10 @@ class LiveWindow:
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
         matching = self._parameters.matching
         recent = place(self._log, self._odometry, self._state, self._log.rows(self._recent, self._layout.last))
-        sources = recent.selected(recent.scans >= self._layout.first)
         frozen = self._frozen.moved_by_run(self._state.run)
+        weak = WeakDirections.of((frozen, recent), matching)
+        frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
+        sources = recent.selected(recent.scans >= self._layout.first)
         if self._lists is None:
             self._lists = tuple(
                 self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
@@ -144,6 +147,7 @@ class LiveWindow:
         summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, matching)
+            known = weak.without(known, sources.scans[to_known.rows])
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])
         self._met = tuple(met)
