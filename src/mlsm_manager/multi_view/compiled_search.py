@@ -24,9 +24,9 @@ _FIRST_CAPACITY = 1024
 _Targets = namedtuple("_Targets", "x y scan block row")
 """Points in the order of their cells; row: (k,) where each stood before."""
 _Around = namedtuple("_Around", "place square nearest scan other bound")
-"""What lies around the middle of a cell. place, square: (k,) points and their squared distances. Of each block (b,): the
-squared distance of the nearest one, its scan, the squared distance of the nearest one of another scan, and that up to
-which points may be neighbours of a source in the cell."""
+"""What lies around the middle of a cell. place, square: (k,) points and their squared distances. Of each block (b,):
+the squared distance of the nearest one, its scan, the squared distance of the nearest one of another scan, and that up
+to which points may be neighbours of a source in the cell."""
 _Near = namedtuple("_Near", "x y scan row square starts")
 """Points that may be neighbours, block by block. starts: (b + 2,) where each block begins. square: (k,) their squared
 distances from one source."""
@@ -117,7 +117,7 @@ def _write_bounds(scans, reach, radius, tie, around):
 
 @njit(cache=True)
 def _take_near(count, around, targets, near):
-    """Write down, block by block, those of the `count` points around a cell that are within the bounds; return how many."""
+    """Write down, block by block, those of `count` points around a cell that are within the bounds; return how many."""
     near.starts[:] = 0
     for entry in range(count):
         block = targets.block[around.place[entry]]
@@ -146,7 +146,7 @@ def _measure(x, y, scan, count, near):
 
 @njit(cache=True)
 def _write_nearest(cut, tie, near, candidates, found, made):
-    """Write the nearest points of each block from one source after the `made` ones; return how many are written then."""
+    """Write the points of each block nearest to one source after the `made` ones; return how many are written then."""
     for block in range(len(near.starts) - 2):
         start, end = near.starts[block], near.starts[block + 1]
         least = _NEVER

@@ -16,7 +16,7 @@ PAIR_COLUMNS = 14
 
 @njit(cache=True)
 def _groups_of(rows, neighbours, source_scans, target_scans):
-    """Return the group of each comparison (m,), and of each group the scan of the source (g,) and of the target (g,)."""
+    """Return the group of each comparison (m,), and the scans of the source and of the target of each group, (g,)."""
     lowest = target_scans.min() if len(target_scans) else 0
     of_scan = np.full((target_scans.max() if len(target_scans) else 0) - lowest + 1, -1, np.int64)
     group_of = np.empty(len(rows), np.int64)

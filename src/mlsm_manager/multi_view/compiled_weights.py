@@ -1,6 +1,7 @@
-"""How much comparisons count, in a compiled loop: as in `association` but for rounding. Raises ImportError without numba.
+"""How much comparisons count, in a compiled loop: as in `association` but for rounding.
 
-It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits.
+It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Raises
+ImportError without numba.
 """
 
 import numpy as np
