@@ -152,7 +152,7 @@ class _Batch:
         points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
         if self._lists is None:
             self._lists = self._comparing.neighbours(points, matching.block_scans)
-        return points, pairs_of(self._lists, points, points, matching.cut, matching)
+        return points, pairs_of(self._lists, points, points, matching.cut, matching, self._comparing.weighed)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
