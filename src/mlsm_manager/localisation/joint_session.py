@@ -5,6 +5,7 @@ from typing import List, Mapping, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.localisation.pauses import scans_of_pause
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
@@ -26,7 +27,7 @@ _CHECKED_SCANS = 20
 class JointSession:
     """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
-    scans: all that it took, as they came.
+    scans: all that it took, as they came; without echoes where these could not be placed, and for pauses.
     """
 
     solver: LiveSolver
@@ -34,9 +35,14 @@ class JointSession:
     scans: List[Scan] = field(default_factory=list)
 
     def add(self, scan: Scan) -> LiveEstimate:
-        """Take the next scan; see LiveSolver.add."""
+        """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
+        for silent in scans_of_pause(scan, self.solver.log.node_times):
+            self._add(silent)
+        return self._add(scan)
+
+    def _add(self, scan: Scan) -> LiveEstimate:
         estimate = self.solver.add(_moved(scan, self.T_map_odom))
-        self.scans.append(scan)
+        self.scans.append(scan.without_points(scan.reference_time) if self.solver.is_lost else scan)
         return estimate
 
     @classmethod

@@ -12,6 +12,7 @@ from mlsm_manager.multi_view.live_window import LiveWindow
 from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.place_search import Whereabouts, silent_scans, whereabouts
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.stacking import stacked, unstacked
@@ -26,6 +27,7 @@ class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
     sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan. state: of all nodes so far.
+    search: what came of the search for the newest scan after scans that heard nothing; None where none was needed.
     """
 
     def __init__(
@@ -48,6 +50,7 @@ class LiveSolver:
         self._node_covariances = GrowingArray(3, 3)
         self._run = run_mean(parameters.sonar)
         self._start, self._known = start, known
+        self.search: Optional[Whereabouts] = None
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
@@ -100,6 +103,7 @@ class LiveSolver:
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
 
+        Of a scan whose place is uncertain after scans that heard nothing (see `search`) the echoes are left out.
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
@@ -108,7 +112,7 @@ class LiveSolver:
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self.log.append(scan, self.parameters.window.lookahead)
-                self.estimates.append(self._solved())
+                self.estimates.append(self._solved(scan))
         except RefusedInput:
             raise
         except (np.linalg.LinAlgError, ValueError) as error:
@@ -124,11 +128,14 @@ class LiveSolver:
     def _first_free(self, scans: int) -> int:
         return max(0, scans - self.parameters.window.free_nodes)
 
-    def _solved(self) -> LiveEstimate:
+    def _solved(self, scan: Scan) -> LiveEstimate:
         """Return what is known when the log has one scan more than there are estimates."""
         motion = self.log.node_motion(np.array([-2, -1]))
         self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
         self._search()
+        if self.is_lost:
+            self.log.remove_newest()
+            self.log.append(scan.without_points(scan.reference_time), self.parameters.window.lookahead)
         window = LiveWindow(
             self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
             self._start, self._known,
@@ -141,13 +148,26 @@ class LiveSolver:
         self._node_covariances.replace_from(window.oldest, covariances)
         return estimate
 
+    @property
+    def is_lost(self) -> bool:
+        """Whether the newest scan fits at no place, or at several, after scans that heard nothing."""
+        return self.search is not None and not self.search.is_certain
+
     def _search(self) -> None:
         """Put the newest node where its scan fits, if the motion is hardly known."""
-        if not self.estimates:
+        self.search = None
+        silent = silent_scans(self.log)
+        if len(self.estimates) <= silent:
             return
-        covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+        covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         matching = self.parameters.matching
-        self._nodes.values[-1] = searched_node(self.log, self.odometry, self.state, covariance, matching)
+        if not silent:
+            self._nodes.values[-1] = searched_node(self.log, self.odometry, self.state, covariance, matching)
+            return
+        self.search = whereabouts(self.log, self.odometry, self.state, covariance, silent, matching)
+        if self.search is not None and self.search.is_certain:
+            moved = self.search.nodes[-self.parameters.window.free_nodes :]
+            self._nodes.values[-len(moved) :] = moved
 
 
 def _name_of(odometry: OdometryModel) -> np.ndarray:

@@ -38,7 +38,7 @@ def searched_node(
     if not len(before) or not len(own):
         return newest
     sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
-    shifts = _cells(step[:2, :2])
+    shifts = cells(step[:2, :2], _MOST_CELLS)
     found = _NATS * fits(sources, place(log, odometry, state, before), _moved(sources, shifts), matching)
     if matching.lone_quality:
         found = found + matching.lone_quality * _LONE_NATS * _lone_fits(log, odometry, state, shifts, matching)
@@ -67,10 +67,13 @@ def _lone_fits(
     return (near * sources.qualities).sum(axis=1)
 
 
-def _cells(covariance: np.ndarray) -> np.ndarray:
-    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none."""
+def cells(covariance: np.ndarray, most: int) -> np.ndarray:
+    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none.
+
+    They are a cell apart; farther where there would be more than `most` on each side.
+    """
     reach = _REACH * np.sqrt(np.diag(covariance))
-    cell = max(_CELL, float(reach.max()) / _MOST_CELLS)
+    cell = max(_CELL, float(reach.max()) / most)
     x, y = (cell * np.arange(-np.floor(one / cell), np.floor(one / cell) + 1.0) for one in reach)
     shifts = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(covariance))
