@@ -35,6 +35,7 @@ from recordings.reading.reader import Request
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour")
 SHARES = (0.4, 0.55, 0.7)  # of the run's length, where the silence begins
 _SURE = 3.0  # told deviations
+_FIXED = 6.0  # m told, from which on a place is known
 _WRONG = 3.0  # m: as far off no wall of the map is met, and a second one is drawn
 
 
@@ -50,8 +51,9 @@ class Figures(NamedTuple):
     """Of the fixes after a silence.
 
     before: error of the last fix before it [m]. way: by which the vehicle was carried on meanwhile [m]. turns: scans
-    until the first fix. first, told: error of that and its deviation [m]. end: of the last one. most: of all of them.
-    lies: share of all that are wrong and farther off than three told deviations.
+    until the first fix that is told to be good. first, told: error of that and its deviation [m]. end: of the last one.
+    most: of all from then on. lies: share of all since the silence that are wrong and farther off than three told
+    deviations.
     """
 
     before: float
@@ -103,16 +105,14 @@ def figures(found: Replayed, truth: Track, start: float, seconds: float) -> Figu
     error = np.hypot(*(np.array([one.result.pose[:2] for one in fixes]) - truth.at(times)[:, :2]).T)
     told = np.array([np.sqrt(np.trace(one.result.covariance[:2, :2])) for one in fixes])
     before, after = times < start, times > start + seconds
-    way = np.diff(truth.at(np.array([start, start + seconds]))[:, :2], axis=0)[0]
-    if not after.any():
-        nothing = (np.nan,) * 4
-        return Figures(error[before][-1], np.hypot(*way), sum(after), *nothing, 0.0)
-    turns = sum(start + seconds < one.scan.reference_time <= times[after][0] for one in found.updates)
-    lies = (error > np.maximum(_SURE * told, _WRONG))[after].mean()
-    first = int(np.argmax(after))
-    return Figures(
-        error[before][-1], np.hypot(*way), turns, error[first], told[first], error[-1], error[after].max(), lies
-    )
+    way = float(np.hypot(*np.diff(truth.at(np.array([start, start + seconds]))[:, :2], axis=0)[0]))
+    lies = float((error > np.maximum(_SURE * told, _WRONG))[after].mean()) if after.any() else np.nan
+    known = np.flatnonzero(after & (told < _FIXED))
+    if not len(known):
+        return Figures(error[before][-1], way, int(after.sum()), np.nan, np.nan, error[-1], np.nan, lies)
+    first = int(known[0])
+    turns = int(after[: first + 1].sum())
+    return Figures(error[before][-1], way, turns, error[first], told[first], error[-1], error[known].max(), lies)
 
 
 def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[str, Recording, Track]]:

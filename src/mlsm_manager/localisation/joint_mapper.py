@@ -214,14 +214,14 @@ class JointMapper(ShowsMaps):
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
-        self._maps.matched.add(TimedPoints.of_scan(session.scans[-1]))
+        self._maps.matched.add(TimedPoints.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
-        estimate, seconds = session.solver.estimates[-1], perf_counter() - start
-        if not estimate.comparisons and not session.solver.is_lost:
+        estimate = session.solver.estimates[-1]
+        if not estimate.comparisons:
             return ScanUpdate(scan, None, True, self.belief)
-        result = match_of(scan, estimate, self.belief, session, seconds)
-        return ScanUpdate(scan, result, result.accepted, self.belief)
+        result = match_of(scan, estimate, self.belief, session, perf_counter() - start)
+        return ScanUpdate(scan, result, True, self.belief)
 
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]

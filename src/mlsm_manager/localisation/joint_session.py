@@ -27,7 +27,7 @@ _CHECKED_SCANS = 20
 class JointSession:
     """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
-    scans: all that it took, as they came; without echoes where these could not be placed, and for pauses.
+    scans: all that it took, as they came, and scans without echoes for pauses.
     """
 
     solver: LiveSolver
@@ -42,7 +42,7 @@ class JointSession:
 
     def _add(self, scan: Scan) -> LiveEstimate:
         estimate = self.solver.add(_moved(scan, self.T_map_odom))
-        self.scans.append(scan.without_points(scan.reference_time) if self.solver.is_lost else scan)
+        self.scans.append(scan)
         return estimate
 
     @classmethod

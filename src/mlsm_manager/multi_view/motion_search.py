@@ -21,11 +21,16 @@ _NATS = 0.1  # that a point on a surface is worth: neighbours share errors
 
 
 def searched_node(
-    log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, matching: SurfaceMatching
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    covariance: np.ndarray,
+    matching: SurfaceMatching,
+    first: int = 0,
 ) -> np.ndarray:
     """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
 
-    covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
+    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
     far from the expected one must fit better by what the motion's covariance asks (correlative search, Olson 2009).
     """
     newest = state.nodes[-1]
@@ -34,7 +39,7 @@ def searched_node(
     if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut:
         return newest
     last = log.scan_count
-    before, own = log.rows(max(0, last - 1 - COMPARED_SCANS), last - 1), log.rows(last - 1, last)
+    before, own = log.rows(min(max(first, last - 1 - COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
     sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
