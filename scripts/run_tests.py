@@ -28,8 +28,8 @@ SPARE_PRIORITY = 19
 ALONE = ("imagenex_852_load", "ping360_load", "simulator_commands")
 # Rostests that take longest: those that begin last should be short.
 LONG = ("parameter_refusals", "compass_demo", "matching_many_processes", "matching_one_process", "imagenex_852_logs")
-# Of pytest: a file's tests share what its fixtures made.
-IN_PARALLEL = ("-n", "auto", "--dist", "loadfile")
+# Of pytest: a file's tests share what its fixtures made. One process more than processors: drivers' tests mostly wait.
+IN_PARALLEL = ("-n", str((os.cpu_count() or 1) + 1), "--dist", "loadfile")
 _PRINTING = threading.Lock()
 
 
@@ -76,10 +76,11 @@ def steps() -> List[Step]:
         Step("ruff check", ["ruff", "check", "--quiet", "."]),
         Step("ruff format", ["ruff", "format", "--quiet", "--check", "."]),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
-        _pytest("unit tests", "test/unit", *IN_PARALLEL),
-        _pytest("stopping", "test/stopping/test_stop.py"),
+        _pytest("unit tests", "test/unit", "-m", "not long", *IN_PARALLEL),
+        _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
         *oldest_versions(),
         _pytest("recordings", "test/recordings", load=Load.SPARE),
+        _pytest("long tests", "test/unit", "-m", "long", load=Load.SPARE),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
         _pytest("documentation", "test/documentation", load=Load.SPARE),
         _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),

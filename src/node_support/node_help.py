@@ -8,7 +8,9 @@ from enum import Enum
 from typing import List, Mapping, Type
 
 from node_support.command_line import write_help
-from node_support.node_table import DIAGNOSTICS, HOSTS, NODES, Interface, Role
+from node_support.host_table import HOSTS
+from node_support.node_description import Interface, Role
+from node_support.node_table import DIAGNOSTICS, NODES
 from node_support.parameters import ParameterSet, describe
 
 PACKAGE = "underwater_map_construction"

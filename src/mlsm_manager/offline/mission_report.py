@@ -1,42 +1,33 @@
 """What report.html tells of a run of map_bag."""
 
-from typing import Any, Dict, List, Mapping, Optional
+from typing import Dict, List
 
 import numpy as np
 
 from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.drawing import drawn
+from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.evaluation import aligned_truth
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.recording import Recording
-from mlsm_manager.offline.refinement import Refined
-from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.run_files import COLORS, LABELS, ODOMETRY, TRUTH_COLOR, Run
 from mlsm_manager.report.mission import Mission, Path, ScanRecord, Uncertainty
 from node_support.geometry.planar import composed, inverse, transformed
 
 
-def mission_of(
-    title: str,
-    recording: Recording,
-    replayed: Replayed,
-    refined: Optional[Refined],
-    run: Run,
-    found: Optional[Found],
-    errors: Dict[str, Dict[str, float]],
-    parameters: Mapping[str, Any],
-) -> Mission:
-    """Return what a report tells; the first recording's path and scans, the map of all."""
+def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Mission:
+    """Return what a report tells; the first recording's path and scans, the map of all. errors: of each trajectory."""
+    run, found = mapped.run, mapped.found
     return Mission(
-        title=title,
-        paths=_paths(recording, run),
-        scans=_scan_records(recording, replayed, refined, run),
+        title=mapped.title,
+        paths=_paths(mapped.recording, run),
+        scans=_scan_records(mapped),
         blocks=run.blocks,
         verdicts=[] if found is None else found.trust.verdicts,
         calibration={} if found is None else found.calibration.by_name,
-        facts=_facts(recording, run),
-        parameters=parameters,
+        facts=_facts(mapped.recording, run),
+        parameters=mapped.parameters.to_mapping(),
         uncertainty=None if found is None else _uncertainty(found),
         errors=errors,
         further=run.further,
@@ -71,13 +62,13 @@ def _facts(recording: Recording, run: Run) -> Dict[str, str]:
     }
 
 
-def _scan_records(recording: Recording, replayed: Replayed, refined: Optional[Refined], run: Run) -> List[ScanRecord]:
-    stamps = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
+def _scan_records(mapped: MappedBag) -> List[ScanRecord]:
+    stamps = np.array([placed.beam.stamp_ns for placed in mapped.recording.beams]) * 1e-9
     pace = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
     records, before = [], 0
-    for update in replayed.updates:
+    for update in mapped.replayed.updates:
         after = int(np.searchsorted(stamps, update.scan.reference_time, side="right"))
-        points = _in_map(update.scan, replayed, refined, run)
+        points = _in_map(update.scan, mapped)
         missing = _missing(stamps[before:after], pace)
         records.append(ScanRecord(update.scan.reference_time, points, after - before, missing, _rejection(update)))
         before = after
@@ -97,11 +88,11 @@ def _rejection(update: ScanUpdate) -> str:
     return update.result.reason or update.result.status.value if update.result is not None else "no match was made"
 
 
-def _in_map(scan: Scan, replayed: Replayed, refined: Optional[Refined], run: Run) -> np.ndarray:
+def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:
     """Return the points (n, 2) of a scan where the best path says that they are."""
-    solver = replayed.solver
+    solver, run = mapped.replayed.solver, mapped.run
     if solver is not None:
-        state = solver.state if refined is None else refined.batch.state
+        state = solver.state if mapped.refined is None else mapped.refined.batch.state
         return drawn(solver.log, solver.odometry, state, scan.points, scan.times)[:, :2]
     best = list(run.poses.values())[-1]
     poses = np.column_stack([np.interp(scan.times, run.times, best[:, 0]), np.interp(scan.times, run.times, best[:, 1]),

@@ -13,6 +13,8 @@ from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
 from node_support.geometry.planar import composed, transformed
 
+pytestmark = pytest.mark.long
+
 HARBOUR = tour(14, direction=0.05)
 KILLED_AFTER = 9
 FREE_SCANS = 4

@@ -13,6 +13,8 @@ from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
 from mlsm_manager.multi_view.surface_points import SurfacePoints
 
+pytestmark = pytest.mark.long
+
 STRONG, WEAK = 100.0, 30.0
 WALL = np.column_stack([np.linspace(-10.0, 10.0, 41), np.full(41, 8.0)])
 AT_BASE = np.zeros(2)

@@ -13,6 +13,8 @@ from mlsm_manager.multi_view.loops import Loop, agreed, loops_of
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from node_support.geometry.planar import inverse, transformed
 
+pytestmark = pytest.mark.long
+
 DEAF = range(15, 25)  # scans that hear nothing, while the odometry goes astray
 RETURNED = slice(26, None)  # nodes of the scans after these
 

@@ -1,19 +1,16 @@
 """map_bag as it is run: bags in, files, figures and one-line errors out."""
 
-import os
-import pty
-import signal
-import subprocess
-import time
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
 import yaml
 from heading_only import reduce_bag
-from map_bag_runs import BASIN, COMMAND, run, summary_of
+from map_bag_runs import BASIN, run, summary_of
 
 from mlsm_manager.surface_map.files.map_file import Layer, read_map
+
+pytestmark = pytest.mark.long
 
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
@@ -122,30 +119,3 @@ def test_parameters_of_a_file_are_taken_and_held(tmp_path):
     assert done.returncode == 0, done.stderr
     cloud = yaml.safe_load((tmp_path / "out" / "live.yaml").read_text())["sonar_to_cloud"]
     assert (cloud["sonar_delay"], cloud["range_scale"]) == pytest.approx((0.25, 0.99), abs=1e-6)
-
-
-@pytest.mark.newest_only("it measures time, and the run with the oldest versions gets what others leave of it")
-def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):
-    """Another program may take the processor during one attempt."""
-    assert any(seconds_to_end(tmp_path) < 2.0 for _ in range(3))
-    assert list(tmp_path.iterdir()) == []
-
-
-def seconds_to_end(out):
-    """Return how long map_bag takes to end after Ctrl-C while it matches scans, s."""
-    terminal, end = pty.openpty()
-    # Tests that a shell runs in the background would hand on that Ctrl-C is ignored.
-    process = subprocess.Popen(
-        [*COMMAND, str(BASIN), "--out", str(out), "--refine"],
-        stderr=end, preexec_fn=lambda: signal.signal(signal.SIGINT, signal.default_int_handler),
-    )  # fmt: skip
-    shown = b""
-    while b"match" not in shown:
-        shown += os.read(terminal, 4096)
-    process.send_signal(signal.SIGINT)
-    start = time.monotonic()
-    assert process.wait(timeout=60) == 1
-    seconds = time.monotonic() - start
-    os.close(terminal)
-    os.close(end)
-    return seconds

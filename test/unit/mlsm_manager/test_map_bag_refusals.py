@@ -6,6 +6,8 @@ from map_bag_runs import BASIN, refused, run
 
 from mlsm_manager.offline import sessions
 
+pytestmark = pytest.mark.long
+
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 

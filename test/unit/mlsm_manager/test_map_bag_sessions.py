@@ -12,6 +12,8 @@ from mlsm_manager.offline.sessions import executor_for, prepared, prepared_in_pa
 from mlsm_manager.surface_map.files.map_file import read_map
 from recordings.reading.reader import Request
 
+pytestmark = pytest.mark.long
+
 # map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")

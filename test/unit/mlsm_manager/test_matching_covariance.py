@@ -9,6 +9,8 @@ from mlsm_manager.matching.fit.residual_covariance import PointEvidence, residua
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 
+pytestmark = pytest.mark.long
+
 SCANS = 40
 DEVIATIONS = np.array([0.5, 0.5, 0.05, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])
 NOISES = [0.05, 0.3]

@@ -21,6 +21,8 @@ from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.state import Layout
 from node_support.geometry.planar import composed, inverse, transformed
 
+pytestmark = pytest.mark.long
+
 STEP = 1e-6
 TIMES = np.array([0.0, 14.0, 28.0])
 POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])

@@ -5,6 +5,8 @@ from benchmarks.open_water import bubbles, outcome
 
 from mlsm_manager.localisation.joint_parameters import Estimator
 
+pytestmark = pytest.mark.long
+
 SCANS = 50
 
 

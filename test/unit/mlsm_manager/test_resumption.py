@@ -10,6 +10,8 @@ from mlsm_manager.matching.problem.result import MatchStatus
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 
+pytestmark = pytest.mark.long
+
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
 TURN = 16.0
 

@@ -1,0 +1,174 @@
+"""A recording mapped: read, corrected, matched, refined, checked, and further recordings added to its map."""
+
+import sys
+from argparse import Namespace
+from dataclasses import dataclass, replace
+from functools import partial
+from itertools import cycle
+from typing import Dict, List, Optional
+
+import numpy as np
+from tqdm import tqdm
+
+from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.echo_length import echo_sigma
+from mlsm_manager.offline.echo_shape import echo_shape_of, suited
+from mlsm_manager.offline.findings import Found
+from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.refinement import Refined, refine
+from mlsm_manager.offline.refitting import refitted_verdicts
+from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.run_files import CORRECTED, FURTHER_COLORS, ODOMETRY, REFINED, Run
+from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
+from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
+from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.files.map_file import StoredMap
+from recordings.errors import RecordingError
+from sonar_processing.beams.beam_correction import BeamCorrection
+
+# The frame that live.yaml's nodes call their map by default.
+_MAP_FRAME = "map"
+
+
+@dataclass(frozen=True)
+class MappedBag:
+    """What was made of a recording and of those added to its map.
+
+    odometry: how the vehicle knows its motion. parameters: those of the run, with the calibration that was found.
+    refined and found are None where nothing was refined, or no solver ran.
+    """
+
+    title: str
+    recording: Recording
+    odometry: OdometryFound
+    parameters: ReplayParameters
+    replayed: Replayed
+    refined: Optional[Refined]
+    found: Optional[Found]
+    sessions: List[Session]
+    run: Run
+
+
+def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
+    """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
+    odometry = _odometry(recording, options)
+    parameters = _suited_parameters(recording, odometry, options)
+    recording = recording.corrected(parameters.part(BeamCorrection))
+    scans = _scans(recording, parameters, options)
+    signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
+    _warn_of_z_down(signs, options)
+    replayed = _replayed(recording, scans, parameters)
+    _tell_of_refused(replayed, options)
+    refined = _refined(recording, replayed, parameters) if options.refine else None
+    refitted = _refitted(replayed, refined) if options.check else []
+    found = None if replayed.solver is None else Found.of(replayed, refined, [signs.turns(), *refitted])
+    known = parameters if found is None else found.calibration.applied(parameters)
+    sessions = _further_sessions(replayed, known, options)
+    run = _run(replayed, refined, sessions, known)
+    run = run if found is None else replace(run, trust=found.trust)
+    title = " ".join(bag.name for bag in options.bags)
+    return MappedBag(title, recording, odometry, known, replayed, refined, found, sessions, run)
+
+
+def poses_of(replayed: Replayed) -> Dict[str, np.ndarray]:
+    """Return the trajectories (m, 3) of a replay by the names that files and plots give them."""
+    return {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
+
+
+def _suited_parameters(recording: Recording, odometry: OdometryFound, options: Namespace) -> ReplayParameters:
+    parameters = with_odometry(options.parameters, odometry.kind, options.fixed)
+    beams = [placed.beam for placed in recording.beams]
+    return suited(parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
+
+
+def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
+    """Return which odometry the recording is mapped with: the one that was said, or else the one that it looks like."""
+    if options.odometry is not None:
+        return OdometryFound(options.odometry, "it was said so")
+    return odometry_of(recording.track)
+
+
+def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:
+    advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
+    advice += "; if the head turns the other way, set head_turns"
+    for sign in signs.lines():
+        print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
+
+
+def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
+    with _bar(len(recording.beams), "beam", "echoes") as bar:
+        scans = []
+        for scan, beams in scans_of(recording, parameters.echoes()):
+            scans.append(scan)
+            bar.update(beams)
+    if not scans:
+        raise RecordingError(f"{options.bags[0]}: {len(recording.beams)} beams make no whole turn of the head")
+    return scans
+
+
+def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParameters) -> Replayed:
+    with _bar(len(scans), "scan", "match") as bar:
+        return replay(recording, scans, parameters, bar.update)
+
+
+def _tell_of_refused(replayed: Replayed, options: Namespace) -> None:
+    """Say which scans were left out. Raises RecordingError where no scan is left."""
+    for reason, count in replayed.refused.items():
+        print(f"map_bag: {options.bags[0]}: left out {count} {reason}", file=sys.stderr)
+    if not replayed.updates:
+        raise RecordingError(f"{options.bags[0]}: not one of {sum(replayed.refused.values())} scans could be used")
+
+
+def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
+    return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
+
+
+def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
+    with _bar(None, "", "refine"):
+        return refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
+
+
+def _refitted(replayed: Replayed, refined: Refined) -> List[Verdict]:
+    with _bar(None, "", "check"):
+        return refitted_verdicts(replayed.solver, refined.batch)
+
+
+def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Namespace) -> List[Session]:
+    """Replay all bags but the first, each in the map of those before, with the first one's calibration."""
+    bags, sessions = options.bags[1:], []
+    if not bags:
+        return []
+    known = _stored(first, parameters)
+    with executor_for(len(bags), options.scheduler) as executor:
+        read = partial(read_recording, request=replace(options.request, truth=None))
+        for bag, ready in zip(bags, prepared_in_parallel(bags, read, parameters, executor)):
+            with _bar(len(ready[1]), "scan", bag.name[:9]) as bar:
+                sessions.append(add_session(bag, ready, parameters, known, bar.update))
+            known = _stored(sessions[-1].replayed, parameters)
+    return sessions
+
+
+def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
+    """Return the map as made when the recording ended: equal runs write equal files."""
+    calibration = parameters.part(BeamCorrection).to_mapping()
+    return StoredMap(_MAP_FRAME, dict(replayed.mapper.layers), calibration, replayed.times[-1])
+
+
+def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
+    poses = poses_of(replayed)
+    stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
+    counts = {
+        "scans": len(replayed.scans),
+        "matched": replayed.matched,
+        "rejected": replayed.rejected,
+        "left_out": dict(replayed.refused),
+    }
+    if refined is not None:
+        poses[REFINED] = refined.poses
+        stored = replace(stored, layers=refined.layers)
+    ways = [session.way(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
+    further = [way for way in ways if len(way.times)]
+    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, further=further)
