@@ -68,9 +68,9 @@ class Figures(NamedTuple):
     def line(self) -> str:
         """Return them for people."""
         return (
-            f"{self.way:.0f} m on, error before {self.before:.2f} m; first fix after {self.turns} scans {self.first:.2f} m "
-            f"off with {self.told:.2f} m told; then at most {self.most:.2f} m, at the end {self.end:.2f} m; wrong but "
-            f"surely told {100.0 * self.lies:.0f} %"
+            f"{self.way:.0f} m on, error before {self.before:.2f} m; first fix after {self.turns} scans "
+            f"{self.first:.2f} m off with {self.told:.2f} m told; then at most {self.most:.2f} m, at the end "
+            f"{self.end:.2f} m; wrong but surely told {100.0 * self.lies:.0f} %"
         )
 
 
@@ -123,8 +123,10 @@ def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[st
             made = reported(tour.truth, TwinParameters(direction=0.0, scale=0.01), np.random.RandomState(seed)).poses
             odometry = made * [0.0, 0.0, 1.0] if kind is OdometryKind.HEADING else made
             origin = np.append(tour.truth.poses[0, :2] - odometry[0, :2], 0.0)
-            yield f"{name}, seed {seed}", recording_of(tour, Track(tour.truth.times, odometry)), Track(
-                tour.truth.times, tour.truth.poses - origin
+            yield (
+                f"{name}, seed {seed}",
+                recording_of(tour, Track(tour.truth.times, odometry)),
+                Track(tour.truth.times, tour.truth.poses - origin),
             )
 
 

@@ -1,6 +1,5 @@
 """Which scans are compared with each other: those after a silence wait apart until their place in the map is known."""
 
-from dataclasses import replace
 from typing import List
 
 import numpy as np
@@ -62,8 +61,8 @@ class Islands:
         """Return the comparisons of points of one island; what was in the map before the run is of the map."""
         if not any(self._numbers):
             return pairs
-        ours, theirs = self._of(sources.scans[pairs.rows]), self._of(targets.scans[pairs.neighbours])
-        return replace(pairs, importance=pairs.importance * (ours == theirs))
+        same = self._of(sources.scans[pairs.rows]) == self._of(targets.scans[pairs.neighbours])
+        return Pairs(pairs.rows[same], pairs.neighbours[same], pairs.importance[same])
 
     def _of(self, scans: np.ndarray) -> np.ndarray:
         return np.where(scans < 0, MAP, self.numbers[scans])

@@ -30,8 +30,9 @@ def searched_node(
 ) -> np.ndarray:
     """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
 
-    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
-    far from the expected one must fit better by what the motion's covariance asks (correlative search, Olson 2009).
+    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
+    is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
+    covariance asks (correlative search, Olson 2009).
     """
     newest = state.nodes[-1]
     transition = Transition.of(odometry, state.nodes[-2:], log.node_motion(np.array([-2, -1])))

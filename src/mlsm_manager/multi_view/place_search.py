@@ -30,7 +30,7 @@ _OTHER = 4.0  # m from a place from which on it is another
 _MOTIONS = np.linspace(-2.0, 2.0, 5)  # standard deviations of the motion within the scan that are tried, each way
 _SHIFTS = np.array([-0.7, 0.0, 0.7])  # m by which the scan is moved besides
 _FIT = 0.5  # share of the points that must lie on surfaces
-_ISLAND_SCANS = 20  # the newest ones of an island that are looked for: about what one place is seen from
+_ISLAND_SCANS = 6  # the newest ones of an island that are looked for: older ones may lie in water that the map has not
 _ISLAND_POINTS = 400  # of these
 _LEAD = 0.1  # by which that share must exceed the one at any other place
 _NATS = 0.1  # that a point on a surface is worth: neighbours share errors
@@ -171,9 +171,7 @@ def _grid(line: np.ndarray) -> np.ndarray:
 class _Motion:
     """What is known of the nodes since the last scan that told a place, seen from there; the newest two matter most."""
 
-    def __init__(
-        self, log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int
-    ) -> None:
+    def __init__(self, log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int) -> None:
         last, self._width = log.scan_count, odometry.width
         first = last - 1 - silent
         steps = [
@@ -183,10 +181,7 @@ class _Motion:
         joint = _joint_covariance(steps, covariance)
         self._count = len(steps)
         end = self._width * (self._count - 1) + np.arange(2)
-        if self._count == 1:
-            start = np.empty(0, dtype=int)
-        else:
-            start = end - self._width
+        start = end - self._width if self._count > 1 else np.empty(0, dtype=int)
         self._ends = np.append(start, end)
         self._of_ends = joint[np.ix_(self._ends, self._ends)]
         self._gain = joint[:, self._ends] @ np.linalg.inv(self._of_ends)
