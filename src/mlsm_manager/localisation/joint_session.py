@@ -17,6 +17,7 @@ from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
 _CHECKED_SCANS = 20
@@ -83,6 +84,7 @@ class JointSession:
             recent_agreement(times, agreements, _CHECKED_SCANS),
             told_deviation(times, np.array(radii)),
             *surfaces_tell(begin, times, surfaces, self.solver.parameters.odometry.distance_deviation),
+            *in_one_map(times, self.solver.islands.apart[-_CHECKED_SCANS:]),
         ]
 
     def copied(self) -> "JointSession":

@@ -35,6 +35,11 @@ class Islands:
         return self.newest != MAP
 
     @property
+    def apart(self) -> np.ndarray:
+        """(n,) bool, whether the place of a scan in the map is not known."""
+        return self.numbers != MAP
+
+    @property
     def start(self) -> int:
         """The first scan that the newest one is compared with."""
         return self._numbers.index(self.newest) if self.is_apart else 0

@@ -112,8 +112,7 @@ class LiveSolver:
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
-        scans, first = self.log.scan_count, self._first_free(self.log.scan_count + 1)
-        nodes, run = self._nodes.values[first:].copy(), self._run.copy()
+        scans, nodes, run = self.log.scan_count, self._nodes.values.copy(), self._run.copy()
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self.log.append(scan, self.parameters.window.lookahead)
@@ -123,7 +122,7 @@ class LiveSolver:
             raise
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
-            self._nodes.replace_from(first, nodes)
+            self._nodes.replace_from(0, nodes)
             self._run[:] = run
             if self.log.scan_count > scans:
                 self.log.remove_newest()
@@ -131,9 +130,6 @@ class LiveSolver:
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
         return self.estimates[-1]
-
-    def _first_free(self, scans: int) -> int:
-        return max(0, scans - self.parameters.window.free_nodes)
 
     def _solved(self) -> LiveEstimate:
         """Return what is known when the log has one scan more than there are estimates."""
@@ -160,25 +156,33 @@ class LiveSolver:
             cut = max(self.parameters.matching.cut, _CUT_FACTOR * cut)
         return window
 
+    @property
+    def found(self) -> str:
+        """How the vehicle was found again with the newest scan after a silence; empty where it was not."""
+        return self.search.line() if self.search is not None and self.search.is_certain else ""
+
     def _search(self) -> None:
-        """Put the newest node where its scan fits, if the motion is hardly known."""
+        """Put the newest node where its scan fits, if the motion is hardly known; or let it begin an island."""
         silent = silent_scans(self.log)
         if len(self.estimates) <= silent:
             return
         covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         matching = self.parameters.matching
-        if not silent:
-            self._nodes.values[-1] = searched_node(
-                self.log, self.odometry, self.state, covariance, matching, self.islands.start
-            )
-            return
-        self.search = whereabouts(self.log, self.odometry, self.state, self.islands, covariance, silent, matching)
-        if self.search is None:
-            return
-        if self.search.is_certain and not self.islands.is_apart:
+        if silent:
+            self.search = whereabouts(self.log, self.odometry, self.state, self.islands, covariance, silent, matching)
+        if self.search is not None and self.search.is_certain and not self.islands.is_apart:
             self._move(self.search.moves)
-        else:
+        elif self.search is not None and self.search.reach > matching.wide_cut:
             self.islands.begin()
+        else:
+            self._search_beside_scan_before(covariance)
+
+    def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
+        """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
+        first = self.islands.start
+        self._nodes.values[-1] = searched_node(
+            self.log, self.odometry, self.state, covariance, self.parameters.matching, first
+        )
 
     def _join(self, estimate: LiveEstimate) -> bool:
         """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""

@@ -11,12 +11,12 @@ import numpy as np
 
 from mlsm_manager.multi_view.islands import MAP, Islands
 from mlsm_manager.multi_view.motion_search import cells, fits
+from mlsm_manager.multi_view.motion_since import MotionSince, grid
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.run_log import RunLog
-from mlsm_manager.multi_view.state import POSE, State
-from mlsm_manager.multi_view.transition import Transition
+from mlsm_manager.multi_view.state import State
 
 FEWEST_POINTS = 25
 """On surfaces, that a scan must hear to tell a place: fewer fit anywhere."""
@@ -27,7 +27,6 @@ _MOST_POINTS = 60  # of the scan that are laid on each place; neighbours on a wa
 _FINE_POINTS = 150  # on each place that is looked at again
 _MOST_PLACES = 8  # that are looked at again, with other motions within the scan
 _OTHER = 4.0  # m from a place from which on it is another
-_MOTIONS = np.linspace(-2.0, 2.0, 5)  # standard deviations of the motion within the scan that are tried, each way
 _SHIFTS = np.array([-0.7, 0.0, 0.7])  # m by which the scan is moved besides
 _FIT = 0.5  # share of the points that must lie on surfaces
 _ISLAND_SCANS = 6  # the newest ones of an island that are looked for: older ones may lie in water that the map has not
@@ -86,7 +85,7 @@ def whereabouts(
     hears too little itself.
     """
     last = log.scan_count
-    motion = _Motion(log, odometry, state, covariance, silent)
+    motion = MotionSince(log, odometry, state, covariance, silent)
     own = log.rows(last - 1, last)
     if motion.reach * _KNOWN < matching.cut or len(own) < FEWEST_POINTS:
         return None
@@ -95,8 +94,8 @@ def whereabouts(
     if not len(targets):
         return Whereabouts(np.zeros((0, odometry.width)), 0.0, 0.0, 0.0, motion.reach)
     shifts = cells(motion.of_end, _MOST_CELLS)
-    best = _best_places(sources, targets, shifts, motion.ends(shifts), matching)
-    found = [_refined(motion, sources, targets, shift, matching) for shift in best]
+    likely = _best_places(sources, targets, shifts, motion.ends(shifts), matching)
+    found = [_refined(motion, sources, targets, shift, matching) for shift in likely]
     scores = [_NATS * share * sources.qualities.sum() - motion.cost(ends) for ends, share in found]
     best = int(np.argmax(scores))
     ends, fit = found[best]
@@ -121,11 +120,11 @@ def island_place(
     rows = log.rows(max(first, last - _ISLAND_SCANS), last)
     sources = place(log, odometry, state, rows[:: max(1, len(rows) // _ISLAND_POINTS)])
     targets = _map_around(log, odometry, state, islands, sources, _REACH * reach + matching.cut)
-    if not len(targets):
+    if not len(sources) or not len(targets):
         return Whereabouts(np.zeros((0, odometry.width)), 0.0, 0.0, 0.0, reach)
     shifts = cells(covariance, _MOST_CELLS)
     best = np.array(_best_places(sources, targets, shifts, np.tile(shifts, 2), matching))
-    around = best[:, np.newaxis] + _grid(_SHIFTS)
+    around = best[:, np.newaxis] + grid(_SHIFTS)
     moved = _moved(sources, np.tile(around.reshape(-1, 2), 2))
     shares = fits(sources, targets, moved, matching).reshape(around.shape[:2]) / sources.qualities.sum()
     finest = np.argmax(shares, axis=1)
@@ -156,80 +155,13 @@ def _map_around(
     log: RunLog, odometry: OdometryModel, state: State, islands: Islands, sources: PlacedPoints, reach: float
 ) -> PlacedPoints:
     """Return the points of the map that `sources` can meet if they are moved by up to `reach` [m]."""
+    if not len(sources):
+        return sources
     scans = np.flatnonzero(islands.numbers == MAP)
     rows = [log.rows(scan, scan + 1) for scan in scans if scan != sources.scans[-1]]
     targets = place(log, odometry, state, np.concatenate([np.empty(0, dtype=np.int64), *rows]))
     low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
     return targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
-
-
-def _grid(line: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) of a square grid."""
-    return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
-
-
-class _Motion:
-    """What is known of the nodes since the last scan that told a place, seen from there; the newest two matter most."""
-
-    def __init__(self, log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int) -> None:
-        last, self._width = log.scan_count, odometry.width
-        first = last - 1 - silent
-        steps = [
-            Transition.of(odometry, state.nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
-            for node in range(first, last)
-        ]
-        joint = _joint_covariance(steps, covariance)
-        self._count = len(steps)
-        end = self._width * (self._count - 1) + np.arange(2)
-        start = end - self._width if self._count > 1 else np.empty(0, dtype=int)
-        self._ends = np.append(start, end)
-        self._of_ends = joint[np.ix_(self._ends, self._ends)]
-        self._gain = joint[:, self._ends] @ np.linalg.inv(self._of_ends)
-        self.of_end = joint[np.ix_(end, end)]
-        self.reach = float(np.sqrt(np.linalg.eigvalsh(self.of_end)[-1]))
-        self._along = joint[np.ix_(start, end)] @ np.linalg.inv(self.of_end)
-        self._beside = joint[np.ix_(start, start)] - self._along @ joint[np.ix_(end, start)]
-
-    def __len__(self) -> int:
-        return self._count
-
-    def ends(self, shifts: np.ndarray) -> np.ndarray:
-        """Return the moves (k, 4) of beginning and end of the scan that are expected if its end moves by (k, 2)."""
-        start = shifts @ self._along.T if len(self._along) else np.zeros_like(shifts)
-        return np.column_stack([start, shifts])
-
-    def freedom(self) -> np.ndarray:
-        """Return moves (k, 2) of the scan's beginning beside the expected ones, that are to be tried."""
-        if not len(self._beside):
-            return np.zeros((1, 2))
-        factor = np.linalg.cholesky(self._beside + 1e-6 * np.eye(2))
-        grid = _grid(_MOTIONS)
-        return grid[np.hypot(*grid.T) <= _MOTIONS.max()] @ factor.T
-
-    def cost(self, ends: np.ndarray) -> float:
-        """Return how unlikely moves (4,) of the scan's beginning and end are, nats."""
-        known = ends[-len(self._ends) :]
-        return 0.5 * float(known @ np.linalg.solve(self._of_ends, known))
-
-    def moves(self, ends: np.ndarray) -> np.ndarray:
-        """Return the moves (n, width) of the nodes that go with moves (4,) of the scan's beginning and end."""
-        return (self._gain @ ends[-len(self._ends) :]).reshape(self._count, self._width)
-
-
-def _joint_covariance(steps: List[Transition], covariance: np.ndarray) -> np.ndarray:
-    """Return that of the nodes (n width, n width) after n `steps` from a node whose pose is taken as known."""
-    width = len(covariance)
-    joint = np.zeros((len(steps) * width,) * 2)
-    own = covariance.copy()
-    own[POSE] = own[:, POSE] = 0.0
-    for number, step in enumerate(steps):
-        before, here = slice(0, number * width), slice(number * width, (number + 1) * width)
-        if number:
-            joint[here, before] = step.matrix @ joint[(number - 1) * width : number * width, before]
-            joint[before, here] = joint[here, before].T
-        own = step.matrix @ own @ step.matrix.T + step.noise
-        joint[here, here] = own
-    return joint
 
 
 def _moved(sources: PlacedPoints, ends: np.ndarray) -> np.ndarray:
@@ -254,10 +186,10 @@ def _best_places(
 
 
 def _refined(
-    motion: _Motion, sources: PlacedPoints, targets: PlacedPoints, shift: np.ndarray, matching: SurfaceMatching
+    motion: MotionSince, sources: PlacedPoints, targets: PlacedPoints, shift: np.ndarray, matching: SurfaceMatching
 ) -> Tuple[np.ndarray, float]:
     """Return the best moves (4,) of beginning and end of the scan about a shift (2,) of both, and the share there."""
-    shifts, freedom = shift + _grid(_SHIFTS), motion.freedom()
+    shifts, freedom = shift + grid(_SHIFTS), motion.freedom()
     ends = np.repeat(motion.ends(shifts), len(freedom), axis=0)
     ends[:, :2] += np.tile(freedom, (len(shifts), 1))
     shares = fits(sources, targets, _moved(sources, ends), matching) / sources.qualities.sum()
