@@ -2,9 +2,8 @@
 
 import sys
 
-import numpy as np
-
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.surface_map.block_shapes import box_maker
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
 from sonar_processing.filters.outliers import outlier_rules
@@ -16,12 +15,11 @@ def main() -> None:
     if SolverKernel.AUTO.resolved is not SolverKernel.NUMBA:
         print("compile_loops: numba is not installed, or has no folder to write to; numpy is used", file=sys.stderr)
         return
-    # These are compiled by being imported.
+    # These are compiled by being asked for.
     outlier_rules(Kernel.NUMBA)
     strength_loops(Kernel.NUMBA)
-    surface_map = MultiLevelSurfaceMap(1.0, kernel=Kernel.NUMBA)
-    for height in (0.0, 0.5):
-        surface_map.insert(np.full((2, 4), height))
+    MultiLevelSurfaceMap(1.0, kernel=Kernel.NUMBA)
+    box_maker(Kernel.NUMBA)
 
 
 if __name__ == "__main__":

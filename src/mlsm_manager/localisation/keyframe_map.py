@@ -9,8 +9,9 @@ import numpy as np
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
 from mlsm_manager.localisation.placement import Placement
 from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
-from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
 from node_support.kernels import Kernel
 

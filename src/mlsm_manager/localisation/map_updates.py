@@ -6,8 +6,8 @@ from typing import Optional
 from mlsm_manager.matching.problem.prediction import Belief
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.free_space.carving import CarveReport
-from mlsm_manager.surface_map.mlsm import InsertReport
 
 MOST_WAITING = 8
 """Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""

@@ -148,7 +148,7 @@ class MlsmNodeParameters(ParameterSet):
         unit="s", low=0.05, high=3600.0, tunable=False,
     )  # fmt: skip
     insertion: Kernel = parameter(
-        Kernel.NUMPY, "what inserts points: NUMBA is two to four times faster and needs python3-numba",
+        Kernel.NUMPY, "what inserts points and makes markers: NUMBA is several times faster and needs python3-numba",
         tunable=False,
     )  # fmt: skip
     color_by: ColorBy = parameter(ColorBy.TYPE, "what the colour of a block's marker tells", tunable=False)

@@ -2,6 +2,8 @@
 
 from enum import Enum
 
+from node_support.numba_cache import has_cache, prepare_cache
+
 
 class SolverKernel(Enum):
     """AUTO: NUMBA where numba is installed and can keep on disk what it compiles, else NUMPY."""
@@ -19,9 +21,12 @@ class SolverKernel(Enum):
         if self is SolverKernel.NUMPY:
             return self
         try:
+            # Compiling anew in each run takes longer than most runs save.
+            if self is SolverKernel.AUTO and not has_cache():
+                return SolverKernel.NUMPY
+            prepare_cache()
             import mlsm_manager.multi_view.compiled_comparisons  # noqa: F401
-        except (ImportError, RuntimeError):
-            # numba raises a RuntimeError where it finds no folder that it may write to.
+        except ImportError:
             if self is SolverKernel.NUMBA:
                 raise
             return SolverKernel.NUMPY

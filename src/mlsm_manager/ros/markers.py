@@ -2,16 +2,17 @@
 
 import struct
 from io import BytesIO
-from typing import Dict, Iterable, List, Optional, Set, Tuple
+from typing import Dict, Iterable, Iterator, List, Tuple
 
 import numpy as np
 from geometry_msgs.msg import Quaternion, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from mlsm_manager.surface_map.block_shapes import THINNEST, BoxList, box_lists
+from mlsm_manager.surface_map.block_shapes import THINNEST, BoxLists, box_maker, box_size, box_type
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.export.colors import ColorBy, Limits, block_colors, color_limits
+from node_support.kernels import Kernel
 
 Tile = Tuple[int, int]
 COLORS: Dict[BlockType, ColorRGBA] = {
@@ -20,6 +21,9 @@ COLORS: Dict[BlockType, ColorRGBA] = {
 }
 # Four lengths of 4 bytes and the flag; behind the points follow the other three and the flag.
 _EMPTY_LISTS_BYTES = 17
+_NO_COLORS = struct.pack("<I", 0)
+_POINT_BYTES, _COLOR_BYTES = 24, 16
+"""Three float64 and four float32."""
 _AFTER_STAMP_BYTES = 16
 """Of a message: sequence, seconds, nanoseconds and the length of the frame's name."""
 _OUTGROWN = 0.25
@@ -45,10 +49,13 @@ class PackedMarkerArray(MarkerArray):
 class BlockMarkers:
     """Makes the markers of changed tiles and of the whole map; remembers what rviz may hold, to delete what is gone."""
 
-    def __init__(self, color_by: ColorBy = ColorBy.TYPE) -> None:
+    def __init__(self, color_by: ColorBy = ColorBy.TYPE, kernel: Kernel = Kernel.NUMPY) -> None:
+        """kernel: what makes the boxes. Raises ImportError for one that is not installed."""
         self._color_by = color_by
+        self._box_lists = box_maker(kernel)
         self._numbers: Dict[Tile, int] = {}
-        self._shown: Dict[Tile, Set[int]] = {}
+        self._shown: Dict[Tile, int] = {}
+        """The classes of boxes in each tile, one bit each, from THINNEST on."""
         self._limits: Limits = (0.0, 0.0)
 
     def is_outgrown(self, blocks: Blocks) -> bool:
@@ -61,8 +68,8 @@ class BlockMarkers:
         """Return the markers of `tiles`, which hold `blocks`, and the deletion of those that are gone from them."""
         packed, now = self._packed(blocks, header)
         for tile in tiles:
-            gone = self._shown.pop(tile, set()) - now.get(tile, set())
-            packed += [_serialized(_marker(power, self._id(tile, power), header, Marker.DELETE)) for power in gone]
+            gone = self._shown.pop(tile, 0) & ~now.get(tile, 0)
+            packed += [self._deletion(tile, kind, header) for kind in range(gone.bit_length()) if gone >> kind & 1]
         self._shown.update(now)
         return _array(packed)
 
@@ -74,49 +81,62 @@ class BlockMarkers:
     def again(self, blocks: Blocks, header: Header) -> PackedMarkerArray:
         """Return the markers of all blocks of the map, for one who knows nothing yet."""
         packed, now = self._packed(blocks, header)
-        for tile, powers in now.items():
-            self._shown[tile] = self._shown.get(tile, set()) | powers
+        for tile, kinds in now.items():
+            self._shown[tile] = self._shown.get(tile, 0) | kinds
         return _array(packed)
 
-    def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, Set[int]]]:
-        """Return the serialised markers of blocks, and which powers there are in each tile."""
-        colors = None if self._color_by is ColorBy.TYPE else _rgba(block_colors(blocks, self._color_by, self._limits))
-        frames: Dict[int, _Frame] = {}
-        packed, powers = [], {}
-        for boxes in box_lists(blocks):
-            if boxes.power not in frames:
-                frames[boxes.power] = _Frame(boxes, header)
-            own_colors = None if colors is None else colors[boxes.owners]
-            packed.append(frames[boxes.power].filled(self._id(boxes.tile, boxes.power), boxes.centers, own_colors))
-            powers.setdefault(boxes.tile, set()).add(boxes.power)
-        return packed, powers
+    def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, int]]:
+        """Return the serialised markers of blocks, and which classes of boxes there are in each tile."""
+        boxes = self._box_lists(blocks)
+        cubes, powers = self._cubes(boxes, blocks), boxes.powers.tolist()
+        frames = {power: _Frame(power, boxes.resolution, header) for power in set(powers)}
+        packed, kinds = [], {}
+        for (x, y), power, cube in zip(boxes.tiles.tolist(), powers, cubes):
+            kind = power - THINNEST
+            packed.append(frames[power].filled(self._id((x, y), kind), cube))
+            kinds[x, y] = kinds.get((x, y), 0) | 1 << kind
+        return packed, kinds
 
-    def _id(self, tile: Tile, power: int) -> int:
-        """Return a number of 31 bits that no other tile and power have."""
-        return self._numbers.setdefault(tile, len(self._numbers)) * _POWERS + power - THINNEST
+    def _cubes(self, boxes: BoxLists, blocks: Blocks) -> Iterator[bytes]:
+        """Return the serialised points and colours of each list."""
+        points, starts = boxes.centers.astype("<f8").tobytes(), boxes.starts.tolist()
+        ends = list(zip(starts[:-1], starts[1:]))
+        if self._color_by is ColorBy.TYPE:
+            return (_list(points, _POINT_BYTES, *end) + _NO_COLORS for end in ends)
+        colors = _rgba(block_colors(blocks, self._color_by, self._limits))[boxes.owners].tobytes()
+        return (_list(points, _POINT_BYTES, *end) + _list(colors, _COLOR_BYTES, *end) for end in ends)
+
+    def _deletion(self, tile: Tile, kind: int, header: Header) -> bytes:
+        return _serialized(_marker(kind + THINNEST, self._id(tile, kind), header, Marker.DELETE))
+
+    def _id(self, tile: Tile, kind: int) -> int:
+        """Return a number of 31 bits that no other tile and class of boxes have."""
+        return self._numbers.setdefault(tile, len(self._numbers)) * _POWERS + kind
 
 
 class _Frame:
     """The bytes of an empty CUBE_LIST of one size, into which number and cubes are put."""
 
-    def __init__(self, boxes: BoxList, header: Header) -> None:
-        marker = _marker(boxes.power, 0, header, Marker.ADD)
-        marker.scale = Vector3(*boxes.size)
+    def __init__(self, power: int, resolution: float, header: Header) -> None:
+        marker = _marker(power, 0, header, Marker.ADD)
+        marker.scale = Vector3(*box_size(resolution, power))
         data = _serialized(marker)
         number = _AFTER_STAMP_BYTES + len(header.frame_id.encode()) + 4 + len(marker.ns)
         # The message ends with five empty fields: points, colors, text, mesh and a flag.
         self._start, self._middle, self._end = data[:number], data[number + 4 : -_EMPTY_LISTS_BYTES], data[-9:]
 
-    def filled(self, number: int, centers: np.ndarray, colors: Optional[np.ndarray]) -> bytes:
-        """Return the marker `number` with cubes at `centers` (n, 3), each of its own colour where there are any."""
-        points = np.ascontiguousarray(centers, dtype="<f8").tobytes()
-        own = struct.pack("<I", 0) if colors is None else struct.pack("<I", len(colors)) + colors.tobytes()
-        parts = [self._start, struct.pack("<i", number), self._middle, struct.pack("<I", len(centers)), points, own]
-        return b"".join([*parts, self._end])
+    def filled(self, number: int, cubes: bytes) -> bytes:
+        """Return the marker `number` with `cubes`, serialised points and colours."""
+        return self._start + struct.pack("<i", number) + self._middle + cubes + self._end
 
 
 def _array(packed: List[bytes]) -> PackedMarkerArray:
     return PackedMarkerArray(struct.pack("<I", len(packed)) + b"".join(packed))
+
+
+def _list(elements: bytes, size: int, start: int, end: int) -> bytes:
+    """Return elements from `start` to `end`, of `size` bytes each, as a list of a message."""
+    return struct.pack("<I", end - start) + elements[size * start : size * end]
 
 
 def _rgba(colors: np.ndarray) -> np.ndarray:
@@ -124,7 +144,7 @@ def _rgba(colors: np.ndarray) -> np.ndarray:
 
 
 def _marker(power: int, number: int, header: Header, action: int) -> Marker:
-    kind = BlockType.VERTICAL if power >= 0 else BlockType.HORIZONTAL
+    kind = box_type(power)
     marker = Marker(header=header, ns=kind.name.lower(), id=number, type=Marker.CUBE_LIST, action=action)
     marker.pose.orientation = Quaternion(w=1.0)
     marker.color = COLORS[kind]

@@ -6,61 +6,88 @@ are.
 """
 
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import Callable, Tuple
 
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
+from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 
 # Power of two: a sixteenth of a cell is the thinnest box that still shows.
 THINNEST = -4
 
 
 @dataclass(frozen=True)
-class BoxList:
-    """Boxes of one size in one tile.
+class BoxLists:
+    """Lists of boxes of one size in one tile, by tile, then by power.
 
-    tile: its indices. power: the class of the boxes, their height is the resolution times two to this power.
-    size: (3,) m. centers: (n, 3) m. owners: (n,) indices of the blocks that they show.
+    tiles: (l, 2) int64 indices. powers: (l,) int64 class of the boxes, whose height is the resolution times two to this
+    power. starts: (l + 1,) where each list begins in centers (n, 3) m, and in owners (n,), the indices of the blocks
+    that the boxes show. resolution: side of a cell, m.
     """
 
-    tile: Tuple[int, int]
-    power: int
-    size: np.ndarray
+    tiles: np.ndarray
+    powers: np.ndarray
+    starts: np.ndarray
     centers: np.ndarray
     owners: np.ndarray
-
-    @property
-    def type(self) -> BlockType:
-        """What they show: a block is VERTICAL from a depth of one cell on."""
-        return BlockType.VERTICAL if self.power >= 0 else BlockType.HORIZONTAL
+    resolution: float
 
 
-def box_lists(blocks: Blocks) -> List[BoxList]:
-    """Return the boxes that cover every block from its bottom to its top across its cell, by tile, then by power.
+BoxMaker = Callable[[Blocks], BoxLists]
+"""Returns the boxes that cover every block from its bottom to its top across its cell.
 
-    Box heights are powers of two times the resolution. Blocks thinner than 2 ** THINNEST cells are drawn that thick.
-    """
+Blocks thinner than 2 ** THINNEST cells are drawn that thick.
+"""
+
+
+def box_maker(kernel: Kernel) -> BoxMaker:
+    """Return what makes boxes. Raises ImportError, which says what to install, for NUMBA without numba."""
+    if kernel is Kernel.NUMPY:
+        return box_lists
+    prepare_cache()
+    from mlsm_manager.surface_map.compiled_shapes import compile_loops, compiled_box_lists
+
+    compile_loops()
+    return compiled_box_lists
+
+
+def box_size(resolution: float, power: int) -> Tuple[float, float, float]:
+    """Return width, length and height of the boxes of a class, m."""
+    return resolution, resolution, resolution * 2.0**power
+
+
+def box_type(power: int) -> BlockType:
+    """Return what boxes of a class show: a block is VERTICAL from a depth of one cell on."""
+    return BlockType.VERTICAL if power >= 0 else BlockType.HORIZONTAL
+
+
+def box_lists(blocks: Blocks) -> BoxLists:
+    """Make boxes; see BoxMaker."""
     centers, power, owners = _boxes(blocks)
     tile = cell_keys(blocks.cells >> TILE_BITS)[owners]
     order = np.lexsort((power, tile))
-    centers, power, owners, tile = centers[order], power[order], owners[order], tile[order]
-    starts = np.flatnonzero((np.diff(tile, prepend=tile[:1] - 1) != 0) | (np.diff(power, prepend=power[:1]) != 0))
-    ends = np.append(starts[1:], len(tile))
-    side = blocks.resolution
-    return [
-        BoxList((x, y), level, np.array([side, side, side * 2.0**level]), centers[start:end], owners[start:end])
-        for (x, y), level, start, end in zip(cells_of_keys(tile[starts]).tolist(), power[starts].tolist(), starts, ends)
-    ]
+    power, tile = power[order], tile[order]
+    is_start = np.append(True, (tile[1:] != tile[:-1]) | (power[1:] != power[:-1]))[: len(tile)]
+    starts = np.flatnonzero(is_start)
+    return BoxLists(
+        cells_of_keys(tile[starts]),
+        power[starts],
+        np.append(starts, len(tile)),
+        centers[order],
+        owners[order],
+        blocks.resolution,
+    )
 
 
 def _boxes(blocks: Blocks) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return centers (m, 3) m, powers (m,) and blocks' indices (m,) of all boxes."""
     depth = np.maximum(blocks.depth, blocks.resolution * 2.0**THINNEST)
     # frexp finds the largest power of two that is not above the depth without a logarithm's rounding.
-    power = np.maximum(np.frexp(depth / blocks.resolution)[1] - 1, THINNEST)
+    power = np.maximum(np.frexp(depth / blocks.resolution)[1].astype(np.int64) - 1, THINNEST)
     offset = (depth - blocks.resolution * np.exp2(power)) / 2.0
     lower = np.column_stack([blocks.centers, (blocks.bottom + blocks.height) / 2.0 - offset])
     two = np.flatnonzero(offset > 0.0)

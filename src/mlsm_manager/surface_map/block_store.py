@@ -10,20 +10,33 @@ from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
 from mlsm_manager.surface_map.large_array import LargeArray
 from mlsm_manager.surface_map.linkage import Extents, Intervals
 from mlsm_manager.surface_map.running_copy import RunningCopy
+from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 
 _MIN_ROWS = 1024
 """Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
 
 
+def cell_index(expected_cells: int, kernel: Kernel) -> CellIndex:
+    """Return an empty index. Raises ImportError, which says what to install, for NUMBA without numba."""
+    if kernel is Kernel.NUMPY:
+        return CellIndex(expected_cells)
+    prepare_cache()
+    from mlsm_manager.surface_map.compiled_index import CompiledCellIndex
+
+    return CompiledCellIndex(expected_cells)
+
+
 class BlockStore:
     """Rows, the chain of each cell and the rows that are free. All access is by whole arrays."""
 
-    def __init__(self, expected_blocks: int) -> None:
+    def __init__(self, expected_blocks: int, kernel: Kernel = Kernel.NUMPY) -> None:
+        """`expected_blocks`: room is reserved for so many. kernel: of the search for cells."""
         reserved = max(expected_blocks, _MIN_ROWS)
         self._row_array = LargeArray(reserved, (ROW_WIDTH,), np.float64)
         self._next_array = LargeArray(reserved, (), np.int32)
         self._crossed_array = LargeArray(reserved, (), np.uint16)
-        self._index = CellIndex(expected_blocks)
+        self._index = cell_index(expected_blocks, kernel)
         self._used = 0
         self._free = np.empty(0, dtype=np.int64)
         self._copies: WeakSet[RunningCopy] = WeakSet()
@@ -63,6 +76,19 @@ class BlockStore:
         copy = RunningCopy(self._row_array, self._crossed_array, self._used, resolution)
         self._copies.add(copy)
         return copy
+
+    @property
+    def arrays(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Views to write to: rows, the row that follows each in its cell, crossings, and the first rows of all cells.
+
+        Who changes a row tells `announce` before.
+        """
+        return self._rows, self._next, self._crossed, self._index.heads
+
+    def announce(self, rows: np.ndarray, changed: np.ndarray) -> None:
+        """Learn that those of `rows` (n,) that are `changed` (n,) will be written to."""
+        if self._copies:
+            self._before_change(rows[changed])
 
     def _before_change(self, rows: np.ndarray) -> None:
         for copy in self._copies:

@@ -5,22 +5,22 @@ import numpy as np
 from mlsm_manager.surface_map.large_array import LargeArray
 
 NO_BLOCK = -1
-_EMPTY = np.iinfo(np.int64).min
-_SEGMENT_BITS = 12
+EMPTY = np.iinfo(np.int64).min
+SEGMENT_BITS = 12
 """A segment has 4096 places (48 kB): splitting one takes well below a millisecond."""
-_PLACES = 1 << _SEGMENT_BITS
-_LEAST_LOAD, _LOAD_SPREAD = 0.58, 0.2
+_PLACES = 1 << SEGMENT_BITS
+LEAST_LOAD, LOAD_SPREAD = 0.58, 0.2
 """Share of a segment in use from which on it is split. The shares differ from segment to segment, because all fill at
 the same rate and would otherwise be split at the same time."""
 _MEAN_LOAD = 0.52
 """With so many expected cells in the mean no segment reaches the least share: that is 5 deviations away."""
-_GOLDEN_RATIO = 0.6180339887498949
+GOLDEN_RATIO = 0.6180339887498949
 # The golden ratio times 2^64, a prime of xxHash and one of splitmix64: they spread neighbouring cells over the table.
-_MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
-_MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
-_FINISHER = np.uint64(0xBF58476D1CE4E5B9)
+MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
+MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
+FINISHER = np.uint64(0xBF58476D1CE4E5B9)
 _HALF = np.uint64(32)
-_LOCAL_SHIFT = np.uint64(64 - 32 - _SEGMENT_BITS)
+LOCAL_SHIFT = np.uint64(64 - 32 - SEGMENT_BITS)
 
 
 def cell_keys(cells: np.ndarray) -> np.ndarray:
@@ -87,7 +87,7 @@ class CellIndex:
             held = held_keys[place]
             found = held == keys[pending]
             places[pending[found]] = place[found]
-            further = ~found & (held != _EMPTY)
+            further = ~found & (held != EMPTY)
             pending, place = pending[further], _following(place[further])
         return places
 
@@ -97,25 +97,25 @@ class CellIndex:
         pending = np.arange(keys.size)
         while pending.size:
             place, wanted = places[pending], keys[pending]
-            free = held_keys[place] == _EMPTY
+            free = held_keys[place] == EMPTY
             held_keys[place[free]] = wanted[free]
             # Of several keys that claimed one free place the last has got it; the others look further.
             taken = place[free & (held_keys[place] == wanted)]
-            self._used += np.bincount(taken >> _SEGMENT_BITS, minlength=len(self._used))
+            self._used += np.bincount(taken >> SEGMENT_BITS, minlength=len(self._used))
             pending = pending[held_keys[place] != wanted]
             places[pending] = _following(places[pending])
         return places
 
     def _make_room(self, keys: np.ndarray) -> None:
         """Split segments until all `keys` (n,) have room."""
-        segments = self._first_places(keys) >> _SEGMENT_BITS
+        segments = self._first_places(keys) >> SEGMENT_BITS
         full = self._full_with(segments)
         if not full.any():
             return
         new = keys[full[segments]]
         new = new[self._found(new) < 0]
         while True:
-            full = self._full_with(self._first_places(new) >> _SEGMENT_BITS)
+            full = self._full_with(self._first_places(new) >> SEGMENT_BITS)
             if not full.any():
                 return
             self._split(np.flatnonzero(full))
@@ -123,14 +123,14 @@ class CellIndex:
     def _full_with(self, segments: np.ndarray) -> np.ndarray:
         """Return which segments (s,) are full with one more key in each of `segments` (n,)."""
         number = np.arange(len(self._used))
-        load = _LEAST_LOAD + _LOAD_SPREAD * (number * _GOLDEN_RATIO % 1.0)
+        load = LEAST_LOAD + LOAD_SPREAD * (number * GOLDEN_RATIO % 1.0)
         return self._used + np.bincount(segments, minlength=len(number)) > load * _PLACES
 
     def _split(self, segments: np.ndarray) -> None:
         """Give half of the range of hashes of each of `segments` (n,) to a new one, and the keys with it."""
         places = _places_of(segments)
         keys, heads = self._keys.values[places], self.heads[places]
-        taken = keys != _EMPTY
+        taken = keys != EMPTY
         new = len(self._used) + np.arange(len(segments))
         depth = self._depth[segments] + 1
         self._depth[segments] = depth
@@ -153,17 +153,17 @@ class CellIndex:
 
     def _clear(self, segments: np.ndarray) -> None:
         places = _places_of(segments)
-        self._keys.values[places], self.heads[places] = _EMPTY, NO_BLOCK
+        self._keys.values[places], self.heads[places] = EMPTY, NO_BLOCK
         self._used[segments] = 0
 
     def _first_places(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) the places at which the search for `keys` (n,) begins."""
-        mixed = (keys >> 32).astype(np.uint64) * _MULTIPLIER_X + (keys & 0xFFFFFFFF).astype(np.uint64) * _MULTIPLIER_Y
-        mixed = (mixed ^ (mixed >> _HALF)) * _FINISHER
+        mixed = (keys >> 32).astype(np.uint64) * MULTIPLIER_X + (keys & 0xFFFFFFFF).astype(np.uint64) * MULTIPLIER_Y
+        mixed = (mixed ^ (mixed >> _HALF)) * FINISHER
         # Two shifts: numpy does not define one by all 64 bits.
         entry = (mixed >> _HALF) >> np.uint64(32 - self._bits)
-        local = (mixed >> _LOCAL_SHIFT) & np.uint64(_PLACES - 1)
-        return (self._directory[entry.astype(np.int64)] << _SEGMENT_BITS) + local.astype(np.int64)
+        local = (mixed >> LOCAL_SHIFT) & np.uint64(_PLACES - 1)
+        return (self._directory[entry.astype(np.int64)] << SEGMENT_BITS) + local.astype(np.int64)
 
 
 def _following(places: np.ndarray) -> np.ndarray:
@@ -173,4 +173,4 @@ def _following(places: np.ndarray) -> np.ndarray:
 
 def _places_of(segments: np.ndarray) -> np.ndarray:
     """Return all places of segments (n,), (n * _PLACES,)."""
-    return ((segments[:, np.newaxis] << _SEGMENT_BITS) + np.arange(_PLACES)).ravel()
+    return ((segments[:, np.newaxis] << SEGMENT_BITS) + np.arange(_PLACES)).ravel()

@@ -8,30 +8,34 @@ from functools import lru_cache
 
 import numpy as np
 
+from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.block_store import BlockStore
-from mlsm_manager.surface_map.compiled_loops import grouped, merged, sorted_by_cell
+from mlsm_manager.surface_map.compiled_loops import groups_of, merged, write_blocks
+from mlsm_manager.surface_map.insertion import Insertion
+from node_support.kernels import Kernel
 
 
-def insert_points_compiled(store: BlockStore, points: np.ndarray, cell: np.ndarray, resolution: float) -> np.ndarray:
+def insert_points_compiled(store: BlockStore, points: np.ndarray, resolution: float, limit: float) -> Insertion:
     """Insert points; see PointInserter."""
-    points = np.ascontiguousarray(points)
-    cells, order, first_points = sorted_by_cell(cell, np.ascontiguousarray(points[:, 2]))
+    cells, groups, owner, inserted, not_finite = groups_of(np.ascontiguousarray(points), resolution, limit)
+    report = InsertReport(inserted, not_finite, len(points) - inserted - not_finite)
     slots = store.slots(cells)
-    groups, group_cell = grouped(points, order, first_points, resolution)
-    blocks, rows, owner, changed, fused = merged(groups, group_cell, *store.chains(slots), resolution)
+    blocks, rows, owner, changed, fused = merged(groups, owner, *store.chains(slots), resolution)
     if len(fused):
         store.release(fused)
     new = rows < 0
     rows[new] = store.take(int(np.count_nonzero(new)))
-    # Points fell into all that changed: no beam crossed it since.
-    store.write_rows(rows[changed], blocks[changed], np.uint16(0))
-    store.chain(rows, owner, slots)
-    return cells
+    store.announce(rows, changed)
+    write_blocks(blocks, rows, owner, changed, slots, *store.arrays)
+    return Insertion(cells, report)
 
 
 @lru_cache(maxsize=None)
 def compile_loops() -> None:
     """Compile all loops, or read them from numba's cache, once in a process: not when the first scan comes."""
-    store = BlockStore(0)
+    store = BlockStore(0, Kernel.NUMBA)
     for dtype in (np.float64, np.float32):
-        insert_points_compiled(store, np.zeros((2, 4), dtype), np.zeros(2, dtype=np.int64), 1.0)
+        for writeable in (True, False):
+            points = np.zeros((2, 4), dtype)
+            points.flags.writeable = writeable
+            insert_points_compiled(store, points, 1.0, 1.0)

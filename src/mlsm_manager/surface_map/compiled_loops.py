@@ -1,27 +1,59 @@
-"""The compiled loops themselves: sorting by cell, grouping by height, merging with what is stored.
+"""The compiled loops themselves: choosing points, sorting by cell, grouping by height, merging with what is stored.
 
-An interval is a row as `blocks` describes it. Raises ImportError, which says what to install, without numba.
+An interval is a row as `blocks` describes it. Needs numba.
 """
 
 import numpy as np
+from numba import njit
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP
 from mlsm_manager.surface_map.cell_index import NO_BLOCK
-
-try:
-    from numba import njit
-except ImportError:
-    raise ImportError("insertion = NUMBA needs numba; install it with: apt install python3-numba") from None
 
 _VALUES = 4
 """Mean of x y z and strength, then as many sums of squares: the first columns of a row."""
 _FEW = 24
 """Up to so many points insertion sort is the fastest."""
 _FIBONACCI = np.uint64(0x9E3779B97F4A7C15)
+_FINITE = np.finfo(np.float64).max
 
 
 @njit(cache=True)
-def sorted_by_cell(cell, z):
+def groups_of(points, resolution, limit):
+    """Return what points (n, 4) make by themselves: the keys of their cells (c,), sorted; intervals (g, ROW_WIDTH), and
+    indices of their cells (g,); the number of points in them; and of those that are not finite.
+
+    Points beyond `limit` [m] are left out.
+    """
+    kept, cell, inserted, not_finite = _admitted(points, resolution, limit)
+    cells, order, starts = _sorted_by_cell(cell[:inserted], kept)
+    groups, owner = _grouped(kept, order, starts, resolution)
+    return cells, groups, owner, inserted, not_finite
+
+
+@njit(cache=True)
+def _admitted(points, resolution, limit):
+    """Return the points that are finite and within the limit (m, 4), the keys of their cells (m,), their number m, and
+    how many are not finite; the arrays are longer than m.
+    """
+    kept, cell = np.empty((len(points), 4)), np.empty(len(points), np.int64)
+    inserted, not_finite = 0, 0
+    for point in range(len(points)):
+        is_inside, is_finite = True, True
+        for column in range(4):
+            value = np.float64(points[point, column])
+            kept[inserted, column] = value
+            is_finite &= abs(value) <= _FINITE
+            is_inside &= abs(value) <= limit or column == 3
+        not_finite += not is_finite
+        if is_finite and is_inside:
+            x, y = np.floor(kept[inserted, 0] / resolution), np.floor(kept[inserted, 1] / resolution)
+            cell[inserted] = (np.int64(x) << 32) + np.int64(y)
+            inserted += 1
+    return kept, cell, inserted, not_finite
+
+
+@njit(cache=True)
+def _sorted_by_cell(cell, points):
     """Return the keys (c,) in `cell` (n,), sorted; the order (n,) of the points by cell, height and place in the array;
     and where each cell begins in that order (c + 1,).
     """
@@ -55,28 +87,28 @@ def sorted_by_cell(cell, z):
         order[fill[local[point]]] = point
         fill[local[point]] += 1
     for rank in range(found):
-        _sort_by_height(order, starts[rank], starts[rank + 1], z)
+        _sort_by_height(order, starts[rank], starts[rank + 1], points)
     return keys[:found][by_key], order, starts
 
 
 @njit(cache=True)
-def _sort_by_height(order, start, end, z):
-    """Sort order[start:end] by z; equal ones stay in their order."""
+def _sort_by_height(order, start, end, points):
+    """Sort order[start:end] by the height of points (n, 4); equal ones stay in their order."""
     if end - start > _FEW:
         part = order[start:end].copy()
-        order[start:end] = part[np.argsort(z[part], kind="mergesort")]
+        order[start:end] = part[np.argsort(points[:, 2][part], kind="mergesort")]
         return
     for place in range(start + 1, end):
         point = order[place]
         below = place - 1
-        while below >= start and z[order[below]] > z[point]:
+        while below >= start and points[order[below], 2] > points[point, 2]:
             order[below + 1] = order[below]
             below -= 1
         order[below + 1] = point
 
 
 @njit(cache=True)
-def grouped(points, order, starts, resolution):
+def _grouped(points, order, starts, resolution):
     """Return the intervals (g, ROW_WIDTH) that points (n, 4) make by themselves, and indices of their cells (g,)."""
     rows, owner = np.empty((len(order), ROW_WIDTH)), np.empty(len(order), np.int64)
     groups = 0
@@ -163,6 +195,22 @@ def merged(groups, group_cell, stored_rows, following, heads, resolution):
                 next_stored += 1
             length += 1
     return blocks[:made], numbers[:made], owner[:made], changed[:made], fused[:gone]
+
+
+@njit(cache=True)
+def write_blocks(blocks, numbers, owner, changed, slots, stored_rows, following, crossed, heads):
+    """Write what `merged` returned into the store, with numbers (m,) for all; `slots` (c,) are the cells' places.
+
+    Points fell into all that changed: no beam crossed it since.
+    """
+    for block in range(len(blocks)):
+        row, cell = numbers[block], owner[block]
+        if changed[block]:
+            stored_rows[row], crossed[row] = blocks[block], 0
+        if block == 0 or owner[block - 1] != cell:
+            heads[slots[cell]] = row
+        is_last = block + 1 == len(blocks) or owner[block + 1] != cell
+        following[row] = NO_BLOCK if is_last else numbers[block + 1]
 
 
 @njit(cache=True)

@@ -1,30 +1,47 @@
 """How points become blocks of a store, by numpy or by compiled loops that give the same blocks to the last bit."""
 
-from typing import Callable
+from typing import Callable, NamedTuple
 
 import numpy as np
 
+from mlsm_manager.surface_map.admission import InsertReport, admitted
 from mlsm_manager.surface_map.block_store import BlockStore
+from mlsm_manager.surface_map.blocks import cells_of
+from mlsm_manager.surface_map.cell_index import cell_keys
 from mlsm_manager.surface_map.linkage import Extents, Intervals, concatenated, group_points, joined, link, merge
 from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 
-PointInserter = Callable[[BlockStore, np.ndarray, np.ndarray, float], np.ndarray]
-"""Takes store, points (n, 4), n > 0, the keys of their cells (n,) and the resolution; returns these keys, sorted."""
+
+class Insertion(NamedTuple):
+    """cells: (c,) keys of the cells that points went into, sorted. report: what became of all points."""
+
+    cells: np.ndarray
+    report: InsertReport
+
+
+PointInserter = Callable[[BlockStore, np.ndarray, float, float], Insertion]
+"""Takes store, points (n, 4), the resolution and the limit of coordinates [m]."""
 
 
 def point_inserter(kernel: Kernel) -> PointInserter:
     """Return what inserts points. Raises ImportError, which says what to install, for NUMBA without numba."""
     if kernel is Kernel.NUMPY:
         return insert_points
+    prepare_cache()
     from mlsm_manager.surface_map.compiled_insertion import compile_loops, insert_points_compiled
 
     compile_loops()
     return insert_points_compiled
 
 
-def insert_points(store: BlockStore, points: np.ndarray, cell: np.ndarray, resolution: float) -> np.ndarray:
+def insert_points(store: BlockStore, points: np.ndarray, resolution: float, limit: float) -> Insertion:
     """Insert points; see PointInserter."""
-    return insert_groups(store, group_points(points, cell, resolution), resolution)
+    kept, report = admitted(points, limit)
+    if not len(kept):
+        return Insertion(np.empty(0, dtype=np.int64), report)
+    groups = group_points(kept, cell_keys(cells_of(kept, resolution)), resolution)
+    return Insertion(insert_groups(store, groups, resolution), report)
 
 
 def insert_groups(store: BlockStore, groups: Intervals, resolution: float) -> np.ndarray:

@@ -1,10 +1,10 @@
 """The Multi Level Surface Map: a grid of cells, each with blocks at several heights (thesis 6.2, 6.5.6)."""
 
-from dataclasses import dataclass
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 
+from mlsm_manager.surface_map.admission import Admitted, InsertReport, admitted
 from mlsm_manager.surface_map.block_store import BlockStore
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
@@ -14,22 +14,6 @@ from mlsm_manager.surface_map.insertion import insert_groups, point_inserter
 from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
 from mlsm_manager.surface_map.running_copy import RunningCopy
 from node_support.kernels import Kernel
-
-
-@dataclass(frozen=True)
-class InsertReport:
-    """What became of the points of one insertion."""
-
-    inserted: int
-    not_finite: int
-    outside: int
-
-
-class Admitted(NamedTuple):
-    """points: (m, 4) that an insertion takes. report: of what becomes of all."""
-
-    points: np.ndarray
-    report: InsertReport
 
 
 class MultiLevelSurfaceMap:
@@ -51,7 +35,7 @@ class MultiLevelSurfaceMap:
         """
         self.resolution = resolution
         self.limit = limit
-        self._store = BlockStore(expected_blocks)
+        self._store = BlockStore(expected_blocks, kernel)
         self._changed = ChangedTiles()
         self._insert_points = point_inserter(kernel)
 
@@ -144,22 +128,13 @@ class MultiLevelSurfaceMap:
 
         Points that are not finite or beyond the limit are left out and counted.
         """
-        kept, report = self.admitted(points)
-        if len(kept):
-            keys = cell_keys(cells_of(kept, self.resolution))
-            self._changed.note(self._insert_points(self._store, kept, keys, self.resolution))
+        cells, report = self._insert_points(self._store, points, self.resolution, self.limit)
+        self._changed.note(cells)
         return report
 
     def admitted(self, points: np.ndarray) -> Admitted:
         """Return those of points (n, 4) that `insert` would take, and what it would report."""
-        points = np.asarray(points, dtype=np.float64)
-        finite = np.isfinite(points).all(axis=1)
-        with np.errstate(invalid="ignore"):
-            inside = (np.abs(points[:, :3]) <= self.limit).all(axis=1)
-        keep = finite & inside
-        kept = points if keep.all() else points[keep]
-        not_finite = len(points) - int(np.count_nonzero(finite))
-        return Admitted(kept, InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite))
+        return admitted(points, self.limit)
 
     def insert_blocks(self, blocks: Blocks) -> InsertReport:
         """Insert blocks of the same resolution; each goes where its mean lies, as if its points came with it.

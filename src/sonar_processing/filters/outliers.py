@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from node_support.kernels import Kernel, check_kernel
+from node_support.numba_cache import prepare_cache
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.open3d_outliers import open3d_statistical_inliers
@@ -77,6 +78,7 @@ def outlier_rules(kernel: Kernel) -> OutlierRules:
     """Return the rules by a kernel. Raises ImportError for NUMBA without numba."""
     if kernel is Kernel.NUMPY:
         return OutlierRules(statistical_inliers, radius_inliers)
+    prepare_cache()
     from sonar_processing.filters.compiled_outliers import radius_inliers as radius
     from sonar_processing.filters.compiled_outliers import statistical_inliers as statistical
 

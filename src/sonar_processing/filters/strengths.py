@@ -6,6 +6,7 @@ from typing import Callable, NamedTuple
 import numpy as np
 
 from node_support.kernels import Kernel
+from node_support.numba_cache import prepare_cache
 from sonar_processing.cloud import IntensityCloud, are_finite
 from sonar_processing.filters.otsu import HIGHEST_LEVEL, level_histogram, threshold_of_levels
 
@@ -54,6 +55,7 @@ def strength_loops(kernel: Kernel) -> StrengthLoops:
     """Return the loops of a kernel. Raises ImportError for NUMBA without numba."""
     if kernel is Kernel.NUMPY:
         return StrengthLoops(count_strengths, strong_points, threshold_of_levels)
+    prepare_cache()
     from sonar_processing.filters import compiled_strengths
 
     return StrengthLoops(_count_compiled, _strong_compiled, compiled_strengths.threshold_of_levels)

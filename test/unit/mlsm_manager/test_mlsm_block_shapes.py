@@ -5,10 +5,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_blocks import blocks_of
+from made_boxes import boxes_by_list
 
-from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists
+from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists, box_maker
 from mlsm_manager.surface_map.blocks import BlockType
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
+from node_support.kernels import Kernel
 
 BOTTOMS = st.floats(-50.0, 50.0)
 DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))
@@ -26,7 +28,7 @@ def _drawn(lists):
 @given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20), st.sampled_from([0.1, 0.5, 1.0]))
 def test_boxes_reach_from_bottom_to_top_without_a_gap(intervals, resolution):
     blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], resolution)
-    drawn = _drawn(box_lists(blocks))
+    drawn = _drawn(boxes_by_list(blocks))
     assert len(drawn) == len(blocks)
     for center, bottom, top in zip(blocks.centers, blocks.bottom, blocks.height):
         spans = drawn[tuple(center)]
@@ -39,7 +41,7 @@ def test_boxes_reach_from_bottom_to_top_without_a_gap(intervals, resolution):
 
 @given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20))
 def test_boxes_are_as_wide_as_a_cell_and_a_power_of_two_high(intervals):
-    lists = box_lists(blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], 0.5))
+    lists = boxes_by_list(blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], 0.5))
     assert [boxes.size.tolist() for boxes in lists] == [[0.5, 0.5, 0.5 * 2.0**boxes.power] for boxes in lists]
     assert len({(boxes.tile, boxes.power) for boxes in lists}) == len(lists)
 
@@ -48,42 +50,63 @@ def test_boxes_are_as_wide_as_a_cell_and_a_power_of_two_high(intervals):
 def test_every_list_holds_blocks_of_one_kind(intervals):
     blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], 0.5)
     kinds = dict(zip(map(tuple, blocks.centers), blocks.type))
-    for boxes in box_lists(blocks):
+    for boxes in boxes_by_list(blocks):
         assert {kinds[x, y] for x, y, _ in boxes.centers} == {boxes.type}
 
 
 def test_a_flat_block_is_drawn_a_sixteenth_of_a_cell_thick_around_its_height():
-    (boxes,) = box_lists(blocks_of([(-3.0, -3.0)]))
+    (boxes,) = boxes_by_list(blocks_of([(-3.0, -3.0)]))
     assert boxes.size.tolist() == [0.5, 0.5, 0.03125]
     np.testing.assert_allclose(boxes.centers, [[0.25, 0.25, -3.0]])
 
 
 def test_a_depth_that_is_a_power_of_two_takes_one_box():
-    (boxes,) = box_lists(blocks_of([(1.0, 3.0)]))
+    (boxes,) = boxes_by_list(blocks_of([(1.0, 3.0)]))
     assert boxes.centers.tolist() == [[0.25, 0.25, 2.0]]
     assert boxes.size.tolist() == [0.5, 0.5, 2.0]
 
 
 def test_any_other_depth_takes_two_boxes_that_overlap():
-    (boxes,) = box_lists(blocks_of([(0.0, 3.0)]))
+    (boxes,) = boxes_by_list(blocks_of([(0.0, 3.0)]))
     assert sorted(boxes.centers[:, 2].tolist()) == [1.0, 2.0]
     assert boxes.size[2] == 2.0
 
 
 def test_blocks_as_deep_as_a_cell_are_drawn_as_vertical():
-    assert [boxes.type for boxes in box_lists(blocks_of([(0.0, 0.5)]))] == [BlockType.VERTICAL]
-    assert [boxes.type for boxes in box_lists(blocks_of([(0.0, 0.4999)]))] == [BlockType.HORIZONTAL]
+    assert [boxes.type for boxes in boxes_by_list(blocks_of([(0.0, 0.5)]))] == [BlockType.VERTICAL]
+    assert [boxes.type for boxes in boxes_by_list(blocks_of([(0.0, 0.4999)]))] == [BlockType.HORIZONTAL]
 
 
 def test_a_tile_of_metres_needs_few_lists():
     depths = np.linspace(0.0, 60.0, 2000)
-    lists = box_lists(blocks_of([(0.0, depth) for depth in depths]))
+    lists = boxes_by_list(blocks_of([(0.0, depth) for depth in depths]))
     most = max(sum(boxes.tile == tile for boxes in lists) for tile in {boxes.tile for boxes in lists})
     assert most <= 11
 
 
 def test_a_box_lies_in_its_tile_and_knows_its_block():
     blocks = blocks_of([(0.0, 3.0)] * 50)
-    for boxes in box_lists(blocks):
+    for boxes in boxes_by_list(blocks):
         np.testing.assert_array_equal(boxes.centers[:, :2], blocks.centers[boxes.owners])
         assert {tuple(tile) for tile in (blocks.cells[boxes.owners] >> TILE_BITS).tolist()} == {boxes.tile}
+
+
+@given(st.lists(st.tuples(BOTTOMS, DEPTHS), max_size=60), st.sampled_from([0.1, 0.5, 1.0]), st.integers(-40, 40))
+def test_compiled_loops_make_the_same_boxes(intervals, resolution, cell):
+    pytest.importorskip("numba")
+    blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], resolution)
+    blocks.rows[:, :2] += cell * resolution
+    # Neighbours in the store need not be neighbours in space.
+    blocks = blocks.take(np.argsort(blocks.bottom))
+    expected, compiled = box_lists(blocks), box_maker(Kernel.NUMBA)(blocks)
+    for name in ("tiles", "powers", "starts", "owners"):
+        np.testing.assert_array_equal(getattr(compiled, name), getattr(expected, name), name)
+    np.testing.assert_allclose(compiled.centers, expected.centers, rtol=0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("kernel", list(Kernel))
+def test_no_blocks_make_no_boxes(kernel):
+    if kernel is Kernel.NUMBA:
+        pytest.importorskip("numba")
+    boxes = box_maker(kernel)(blocks_of([]))
+    assert (len(boxes.tiles), len(boxes.powers), boxes.starts.tolist(), len(boxes.centers)) == (0, 0, [0], 0)

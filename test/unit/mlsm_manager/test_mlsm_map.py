@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from map_comparison import partition
 
+from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.blocks import BlockType, cells_of
-from mlsm_manager.surface_map.mlsm import InsertReport, MultiLevelSurfaceMap
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 
 def _map_of(points, resolution=0.5, **options):

@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from made_blocks import blocks_of
+from made_boxes import boxes_by_list
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
-from mlsm_manager.surface_map.block_shapes import box_lists
 from mlsm_manager.surface_map.blocks import BlockType
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
 from mlsm_manager.surface_map.export.colors import ColorBy, block_colors
@@ -49,14 +49,14 @@ def test_the_bytes_are_those_of_markers_built_point_by_point(intervals):
     blocks = blocks_of(intervals)
     packed = BlockMarkers().whole(blocks, HEADER)
     numbers = [marker.id for marker in _read(packed)]
-    expected = [_object_by_object(boxes, number) for boxes, number in zip(box_lists(blocks), numbers)]
+    expected = [_object_by_object(boxes, number) for boxes, number in zip(boxes_by_list(blocks), numbers)]
     assert _bytes(packed) == _bytes(MarkerArray(markers=expected))
 
 
 def test_a_subscriber_reads_every_box():
     blocks = blocks_of(MIXED)
     points = [[p.x, p.y, p.z] for marker in _read(BlockMarkers().whole(blocks, HEADER)) for p in marker.points]
-    assert points == np.concatenate([boxes.centers for boxes in box_lists(blocks)]).tolist()
+    assert points == np.concatenate([boxes.centers for boxes in boxes_by_list(blocks)]).tolist()
 
 
 def test_an_empty_map_makes_no_markers():
@@ -107,7 +107,7 @@ def test_blocks_are_coloured_one_by_one_when_asked():
     blocks = blocks_of(MIXED)
     read = _read(BlockMarkers(ColorBy.HEIGHT).whole(blocks, HEADER))
     expected = block_colors(blocks, ColorBy.HEIGHT)
-    for marker, boxes in zip(read, box_lists(blocks)):
+    for marker, boxes in zip(read, boxes_by_list(blocks)):
         colors = [[color.r, color.g, color.b] for color in marker.colors]
         np.testing.assert_allclose(colors, expected[boxes.owners], atol=1e-6)
         assert {color.a for color in marker.colors} == {1.0}

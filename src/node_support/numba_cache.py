@@ -1,0 +1,49 @@
+"""Where numba keeps what it compiles: it refuses to work where it finds no folder to write to."""
+
+import atexit
+import logging
+import shutil
+import tempfile
+from functools import lru_cache
+
+HOW_TO_INSTALL = "apt install python3-numba"
+ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
+
+
+@lru_cache(maxsize=None)
+def has_cache() -> bool:
+    """Return whether numba finds a folder that lasts; the first time that there is none, one line says what to do.
+
+    Raises ImportError, which says what to install, without numba.
+    """
+    try:
+        from numba import njit
+    except ImportError:
+        raise ImportError(f"NUMBA needs numba; install it with: {HOW_TO_INSTALL}") from None
+    try:
+        njit(cache=True)(_probe)
+    except RuntimeError:
+        logging.getLogger(__name__).warning("numba finds no folder to keep compiled loops in: %s", ADVICE)
+        return False
+    return True
+
+
+@lru_cache(maxsize=None)
+def prepare_cache() -> None:
+    """Let numba compile into a temporary folder of this process where it finds none that lasts.
+
+    Called before loops are imported. Raises ImportError without numba, and where no temporary folder can be made.
+    """
+    if has_cache():
+        return
+    from numba.core import config
+
+    try:
+        config.CACHE_DIR = tempfile.mkdtemp(prefix="compiled_loops_")
+    except OSError as error:
+        raise ImportError(f"no temporary folder for compiled loops: {error}; {ADVICE}, or use NUMPY") from None
+    atexit.register(shutil.rmtree, config.CACHE_DIR, ignore_errors=True)
+
+
+def _probe() -> None:
+    """Stand for any function of this package."""

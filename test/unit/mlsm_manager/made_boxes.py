@@ -1,0 +1,32 @@
+"""The boxes that show blocks, list by list."""
+
+from typing import List, NamedTuple, Tuple
+
+import numpy as np
+
+from mlsm_manager.surface_map.block_shapes import box_lists, box_size, box_type
+from mlsm_manager.surface_map.blocks import Blocks, BlockType
+
+
+class BoxList(NamedTuple):
+    """Boxes of one size in one tile: centers (n, 3) m, owners (n,) indices of the blocks that they show."""
+
+    tile: Tuple[int, int]
+    power: int
+    type: BlockType
+    size: np.ndarray
+    centers: np.ndarray
+    owners: np.ndarray
+
+
+def boxes_by_list(blocks: Blocks) -> List[BoxList]:
+    """Return the lists of boxes that show `blocks`."""
+    lists, centers, owners = box_lists(blocks), [], []
+    for start, end in zip(lists.starts, lists.starts[1:]):
+        centers.append(lists.centers[start:end])
+        owners.append(lists.owners[start:end])
+    kinds = zip(map(tuple, lists.tiles.tolist()), lists.powers.tolist(), centers, owners)
+    return [
+        BoxList(tile, power, box_type(power), np.array(box_size(blocks.resolution, power)), *boxes)
+        for tile, power, *boxes in kinds
+    ]
