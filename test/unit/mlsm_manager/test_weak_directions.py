@@ -85,6 +85,12 @@ def test_scans_around_a_scan_tell_with_it_which_direction_is_weak():
     assert abs(found.directions[SCANS // 2, 1]) < 0.03
 
 
+def test_scans_along_one_canal_have_one_direction():
+    """By so much as two scans differ, what is told across the canal would tell the way along it."""
+    found = WeakDirections.of([canal(0.3)], MATCHING)
+    np.testing.assert_allclose(found.directions, found.directions[:1].repeat(SCANS, axis=0), atol=1e-12)
+
+
 def test_scans_far_from_a_scan_do_not_say_what_it_tells():
     parts = canal(0.0), canal(0.5 * np.pi, first=100)
     found = WeakDirections.of(parts, MATCHING)
