@@ -5,6 +5,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.pauses import scans_of_pause
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
@@ -18,6 +19,7 @@ from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
 _CHECKED_SCANS = 20
@@ -28,7 +30,7 @@ _CHECKED_SCANS = 20
 class JointSession:
     """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
-    scans: all that it took, as they came.
+    scans: all that it took, as they came, and scans without echoes for pauses.
     """
 
     solver: LiveSolver
@@ -37,7 +39,12 @@ class JointSession:
     _shares: Dict[int, float] = field(default_factory=dict)
 
     def add(self, scan: Scan) -> LiveEstimate:
-        """Take the next scan; see LiveSolver.add."""
+        """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
+        for silent in scans_of_pause(scan, self.solver.log.node_times):
+            self._add(silent)
+        return self._add(scan)
+
+    def _add(self, scan: Scan) -> LiveEstimate:
         estimate = self.solver.add(_moved(scan, self.T_map_odom))
         self.scans.append(scan)
         return estimate
@@ -81,6 +88,7 @@ class JointSession:
             recent_agreement(times, agreements, _CHECKED_SCANS),
             told_deviation(times, np.array(radii)),
             *surfaces_tell(begin, times, surfaces, self.solver.parameters.odometry.distance_deviation),
+            *in_one_map(times, self.solver.islands.apart[-_CHECKED_SCANS:]),
         ]
 
     def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:
