@@ -5,6 +5,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.pauses import scans_of_pause
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
@@ -19,6 +20,7 @@ from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
 _CHECKED_SCANS = 20
@@ -29,7 +31,7 @@ _CHECKED_SCANS = 20
 class JointSession:
     """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
-    scans: all that it took, as they came.
+    scans: all that it took, as they came, and scans without echoes for pauses.
     """
 
     solver: LiveSolver
@@ -38,7 +40,12 @@ class JointSession:
     _shares: Dict[int, float] = field(default_factory=dict)
 
     def add(self, scan: Scan) -> LiveEstimate:
-        """Take the next scan; see LiveSolver.add."""
+        """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
+        for silent in scans_of_pause(scan, self.solver.log.node_times):
+            self._add(silent)
+        return self._add(scan)
+
+    def _add(self, scan: Scan) -> LiveEstimate:
         estimate = self.solver.add(_moved(scan, self.T_map_odom))
         self.scans.append(scan)
         return estimate
@@ -72,13 +79,15 @@ class JointSession:
     def verdicts(self) -> List[Verdict]:
         """Return how the newest scans agree with the map and each other, and how far the path is known."""
         parts = self.solver.parameters.matching.scan_parts
-        turns = Turns.of(self.solver.estimates[-_CHECKED_SCANS * parts :], parts)
+        newest = slice(-_CHECKED_SCANS * parts, None)
+        turns = Turns.of(self.solver.estimates[newest], self.solver.islands.apart[newest], parts)
         begin = self.start if len(turns.times) else np.nan
         return [
             *self._going_on(turns.times),
             recent_agreement(turns.times, turns.agreements, _CHECKED_SCANS),
             told_deviation(turns.times, turns.radii),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
+            *in_one_map(turns.times, turns.apart),
         ]
 
     def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:
