@@ -76,7 +76,7 @@ class JointSession:
         return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def verdicts(self) -> List[Verdict]:
-        """Return how the newest scans agree with the map and each other, and how far the path is known."""
+        """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
         newest = self.solver.estimates[-_CHECKED_SCANS:]
         times = np.array([estimate.time for estimate in newest])
         radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
@@ -86,7 +86,7 @@ class JointSession:
         return [
             *self._going_on(times),
             recent_agreement(times, agreements, _CHECKED_SCANS),
-            told_deviation(times, np.array(radii)),
+            *(told_deviation(times[-1:], np.array(radii[-1:])) for _ in newest[-1:]),
             *surfaces_tell(begin, times, surfaces, self.solver.parameters.odometry.distance_deviation),
             *in_one_map(times, self.solver.islands.apart[-_CHECKED_SCANS:]),
         ]
