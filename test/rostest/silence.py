@@ -11,6 +11,7 @@ import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import PACKAGE, Diagnostics, Inbox, wait_for_publisher_links
 from nav_msgs.msg import Odometry
+
 from underwater_map_construction.msg import SonarScanLine
 
 SILENCE = 200.0, 320.0  # s into the run

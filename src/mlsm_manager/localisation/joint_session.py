@@ -22,6 +22,7 @@ from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
+_AGREES = 0.5  # share of a scan's points on surfaces of others from which on it agrees with them
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
 
@@ -106,6 +107,13 @@ class JointSession:
         for old in [scan for scan in self._shares if scan < count - len(times)]:
             del self._shares[old]
         return (scans_go_on(times, np.array([self._shares[scan] for scan in range(count - len(times), count)])),)
+
+    @property
+    def is_provisional(self) -> bool:
+        """Whether the map hangs on scans of an unknown velocity, none of which agrees with another yet."""
+        if not np.isinf(self.solver.odometry.distance_deviation):
+            return False
+        return all(estimate.agreement < _AGREES for estimate in self.solver.estimates[:_CHECKED_SCANS])
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""
