@@ -8,6 +8,8 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
 from sonar_processing.filters.outliers import outlier_rules
 from sonar_processing.filters.strengths import strength_loops
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import SonarToCloudParameters
 
 
 def main() -> None:
@@ -18,6 +20,7 @@ def main() -> None:
     # These are compiled by being asked for.
     outlier_rules(Kernel.NUMBA)
     strength_loops(Kernel.NUMBA)
+    ScanAssembler(SonarToCloudParameters(kernel=Kernel.NUMBA))
     MultiLevelSurfaceMap(1.0, kernel=Kernel.NUMBA)
     box_maker(Kernel.NUMBA)
 

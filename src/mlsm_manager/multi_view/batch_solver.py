@@ -156,7 +156,7 @@ class _Batch:
         points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
         if self._lists is None:
             self._lists = self._comparing.neighbours(points, matching.block_scans)
-        pairs = pairs_of(self._lists, points, points, matching.cut, matching)
+        pairs = pairs_of(self._lists, points, points, matching.cut, matching, self._comparing.weighed)
         return points, self._islands.within(pairs, points, points)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:

@@ -143,7 +143,8 @@ class LiveWindow:
                 self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
             )
         to_frozen, to_recent = (
-            pairs_of(lists, sources, targets, cut, matching) for lists, targets in zip(self._lists, (frozen, recent))
+            pairs_of(lists, sources, targets, cut, matching, self._comparing.weighed)
+            for lists, targets in zip(self._lists, (frozen, recent))
         )
         to_frozen, to_recent = (
             self._islands.within(pairs, sources, targets)
