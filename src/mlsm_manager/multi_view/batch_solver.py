@@ -154,7 +154,8 @@ class _Batch:
     def _met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         matching = self._parameters.matching
-        points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
+        rows = self._log.rows(0, self._layout.last)
+        points = place(self._log, self._odometry, self.state, rows, self._comparing.placed)
         points = WeakDirections.of([points], matching).without(points, points.scans)
         if self._lists is None:
             self._lists = self._comparing.neighbours(points, matching.block_scans)

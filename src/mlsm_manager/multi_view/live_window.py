@@ -1,6 +1,6 @@
 """The problem of one scan: the newest nodes against each other and against the frozen map."""
 
-from typing import Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -45,6 +45,7 @@ class LiveWindow:
     ) -> None:  # fmt: skip
         self._islands = islands
         self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
+        self._comparing = Comparing.by(parameters.kernel)
         last = log.scan_count
         first = max(0, last - parameters.window.free_nodes)
         self._scans_per_block = parameters.matching.block_scans
@@ -56,6 +57,7 @@ class LiveWindow:
             first // self._scans_per_block,
             log.node_poses(last)[:2] + state.nodes[last, :2],
             parameters,
+            self._comparing.placed,
         )
         self._layout = Layout(first, last, odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
@@ -64,7 +66,6 @@ class LiveWindow:
         self._start, self._known = start, known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
-        self._comparing = Comparing.by(parameters.kernel)
         self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
         self._met = ()
         self._lone = self._lone_comparisons()
@@ -136,11 +137,12 @@ class LiveWindow:
 
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
         matching = self._parameters.matching
-        recent = place(self._log, self._odometry, self._state, self._log.rows(self._recent, self._layout.last))
+        rows = self._log.rows(self._recent, self._layout.last)
+        recent = place(self._log, self._odometry, self._state, rows, self._comparing.placed)
         frozen = self._frozen.moved_by_run(self._state.run)
         weak = WeakDirections.of((frozen, recent), matching)
         frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
-        sources = recent.selected(recent.scans >= self._layout.first)
+        sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         if self._lists is None:
             self._lists = tuple(
                 self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
@@ -176,24 +178,29 @@ class LiveWindow:
         """The oldest free node."""
         return self._layout.first
 
-    def covariances_of_oldest(self) -> np.ndarray:
-        """Return the pose covariances (2, 3, 3) of the two oldest free nodes, the next ones to be frozen."""
-        columns = self._layout.pose_columns(np.array([self._layout.first, self._layout.first + 1]))
+    def covariances_of_oldest(self, count: int) -> np.ndarray:
+        """Return the pose covariances (count + 1, 3, 3) of the oldest free nodes, the next ones to be frozen."""
+        columns = self._layout.pose_columns(self._layout.first + np.arange(count + 1))
         return np.stack([self._solution.covariance(own, self._held_covariance) for own in columns])
 
-    def estimate(self) -> LiveEstimate:
-        """Return what is known of the newest node."""
-        newest = np.arange(self._layout.size - self._layout.width - RUN_COLUMNS, self._layout.size)
-        T_odom_base, node = self._motion.poses[-1], self._state.nodes[-1].copy()
+    def estimates(self, count: int) -> List[LiveEstimate]:
+        """Return what is known of the newest `count` nodes, oldest first."""
+        return [self._estimate(node) for node in range(self._layout.last - count + 1, self._layout.last + 1)]
+
+    def _estimate(self, number: int) -> LiveEstimate:
+        """Return what is known of node `number`, at the end of the scan before it."""
+        own = self._layout.node_start(number) + np.arange(self._layout.width)
+        unknowns = np.append(own, self._layout.run_start + np.arange(RUN_COLUMNS))
+        T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
         T_map_base = T_odom_base + node[POSE]
-        share, distance = agreement(self._met, self._layout.last - 1, self._parameters.matching)
+        share, distance = agreement(self._met, number - 1, self._parameters.matching)
         return LiveEstimate(
-            time=float(self._log.node_times[-1]), T_odom_base=T_odom_base, T_map_base=T_map_base,
+            time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
-            covariance=self._solution.covariance(newest, self._held_covariance),
-            own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
+            covariance=self._solution.covariance(unknowns, self._held_covariance),
+            own_covariance=self._solution.covariance(unknowns, np.zeros_like(self._held_covariance)),
             world_scale_deviation=self._parameters.sonar.world_scale_deviation,
-            reported_velocity=self._log.odometry.velocity_at(self._motion.times[-1]),
+            reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
-            agreement=share, distance=distance, surfaces=surfaces_met(self._met, self._layout.last - 1),
+            agreement=share, distance=distance, surfaces=surfaces_met(self._met, number - 1),
         )  # fmt: skip

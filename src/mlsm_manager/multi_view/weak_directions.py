@@ -27,7 +27,6 @@ _FACING = (0.2, 0.5)
 first, one that bulges by up to 60 degrees as any other from the second on."""
 _NOTHING = 1e-12  # keeps scans without information, and normals along a weak direction, from dividing by zero
 _ALIKE = float(np.cos(0.1))  # cosine of the angle up to which directions are alike: half of what normals err by
-_WEIGHTS = 1.0 - np.abs(np.arange(-_SCANS, _SCANS + 1)) / (_SCANS + 1.0)
 
 
 @dataclass(frozen=True)
@@ -50,7 +49,9 @@ class WeakDirections:
             return cls(0, np.zeros((0, 2)), np.zeros(0))
         first = int(scans.min())
         told = np.concatenate([_told(points, matching) for points in sets])
-        sums = np.stack([_around(np.bincount(scans - first, part)) for part in told.T], axis=1)
+        sums = np.stack(
+            [_around(np.bincount(scans - first, part), _SCANS * matching.scan_parts) for part in told.T], axis=1
+        )
         sums = sums.reshape(-1, 2, 2)
         values, _ = np.linalg.eigh(sums)
         shares = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
@@ -100,6 +101,7 @@ def _told(points: PlacedPoints, matching: SurfaceMatching) -> np.ndarray:
     return np.einsum("n,na,nb->nab", weight, points.normals, points.normals).reshape(-1, 4)
 
 
-def _around(values: np.ndarray) -> np.ndarray:
-    """Return the sum (s,) of the values (s,) around each one, near ones counting more."""
-    return np.convolve(values, _WEIGHTS)[_SCANS : _SCANS + len(values)]
+def _around(values: np.ndarray, reach: int) -> np.ndarray:
+    """Return the sum (s,) of the values (s,) up to `reach` places from each one, near ones counting more."""
+    weights = 1.0 - np.abs(np.arange(-reach, reach + 1)) / (reach + 1.0)
+    return np.convolve(values, weights)[reach : reach + len(values)]
