@@ -49,10 +49,8 @@ class WeakDirections:
             return cls(0, np.zeros((0, 2)), np.zeros(0))
         first = int(scans.min())
         told = np.concatenate([_told(points, matching) for points in sets])
-        sums = np.stack(
-            [_around(np.bincount(scans - first, part), _SCANS * matching.scan_parts) for part in told.T], axis=1
-        )
-        sums = sums.reshape(-1, 2, 2)
+        reach = _SCANS * matching.scan_parts
+        sums = np.stack([_around(np.bincount(scans - first, part), reach) for part in told.T], axis=1).reshape(-1, 2, 2)
         values, _ = np.linalg.eigh(sums)
         shares = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
         all_counts, nothing_counts = (factor * matching.normal_deviation**2 for factor in _TOLD)
