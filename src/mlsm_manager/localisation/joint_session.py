@@ -23,6 +23,7 @@ from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
+_AGREES = 0.5  # share of a scan's points on surfaces of others from which on it agrees with them
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
 
@@ -77,7 +78,7 @@ class JointSession:
         return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def verdicts(self) -> List[Verdict]:
-        """Return how the newest scans agree with the map and each other, and how far the path is known."""
+        """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
         parts = self.solver.parameters.matching.scan_parts
         newest = slice(-_CHECKED_SCANS * parts, None)
         turns = Turns.of(self.solver.estimates[newest], self.solver.islands.apart[newest], parts)
@@ -85,7 +86,7 @@ class JointSession:
         return [
             *self._going_on(turns.times),
             recent_agreement(turns.times, turns.agreements, _CHECKED_SCANS),
-            told_deviation(turns.times, turns.radii),
+            *(told_deviation(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[-1:]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
             *in_one_map(turns.times, turns.apart),
         ]
@@ -105,6 +106,13 @@ class JointSession:
         known = {**self._shares, **dict(zip(range(first, count), found))}
         self._shares = {turn: known[turn] for turn in newest}
         return (scans_go_on(times, np.array([self._shares[turn] for turn in newest])),)
+
+    @property
+    def is_provisional(self) -> bool:
+        """Whether the map hangs on scans of an unknown velocity, none of which agrees with another yet."""
+        if not np.isinf(self.solver.odometry.distance_deviation):
+            return False
+        return all(estimate.agreement < _AGREES for estimate in self.solver.estimates[:_CHECKED_SCANS])
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""
