@@ -39,6 +39,23 @@ def quaternion_of(matrix: np.ndarray) -> np.ndarray:
     return row / math.sqrt(row.dot(row))
 
 
+def quaternions_of(matrices: np.ndarray) -> np.ndarray:
+    """Return the unit quaternions (n, 4), x y z w, of the rotations in (n, 3, 3) or (n, 4, 4) matrices."""
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(matrices[:, :3, :3], 0, -1)
+    products = np.array(
+        [
+            [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
+            [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
+            [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
+            [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
+        ]
+    )
+    largest = np.argmax(np.diagonal(products), axis=1)
+    rows = products[largest, :, np.arange(len(matrices))]
+    # numpy's dot product adds as in quaternion_of.
+    return rows / np.sqrt(rows[:, np.newaxis] @ rows[:, :, np.newaxis])[:, 0]
+
+
 def yaw_of(pose: np.ndarray) -> float:
     """Return the heading of a (4, 4) pose, rad in [-pi, pi]."""
     return math.atan2(pose[1, 0], pose[0, 0])
