@@ -221,7 +221,7 @@ class JointMapper(ShowsMaps):
         if not estimate.comparisons:
             return ScanUpdate(scan, None, True, self.belief)
         result = match_of(scan, estimate, self.belief, session, perf_counter() - start)
-        return ScanUpdate(scan, result, True, self.belief)
+        return ScanUpdate(scan, result, True, self.belief, session.solver.found)
 
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]

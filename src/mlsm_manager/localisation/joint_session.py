@@ -1,21 +1,25 @@
 """One run of the joint solver in the map."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, Mapping, Optional, Sequence
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.pauses import scans_of_pause
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.continuity import shares_heard_before
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.self_check.continuity import scans_go_on
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
 _CHECKED_SCANS = 20
@@ -26,15 +30,21 @@ _CHECKED_SCANS = 20
 class JointSession:
     """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
-    scans: all that it took, as they came.
+    scans: all that it took, as they came, and scans without echoes for pauses.
     """
 
     solver: LiveSolver
     T_map_odom: np.ndarray
     scans: List[Scan] = field(default_factory=list)
+    _shares: Dict[int, float] = field(default_factory=dict)
 
     def add(self, scan: Scan) -> LiveEstimate:
-        """Take the next scan; see LiveSolver.add."""
+        """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
+        for silent in scans_of_pause(scan, self.solver.log.node_times):
+            self._add(silent)
+        return self._add(scan)
+
+    def _add(self, scan: Scan) -> LiveEstimate:
         estimate = self.solver.add(_moved(scan, self.T_map_odom))
         self.scans.append(scan)
         return estimate
@@ -66,7 +76,7 @@ class JointSession:
         return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def verdicts(self) -> List[Verdict]:
-        """Return how the newest scans agree with the map, how far the path is known, and what surfaces tell of it."""
+        """Return how the newest scans agree with the map and each other, and how far the path is known."""
         newest = self.solver.estimates[-_CHECKED_SCANS:]
         times = np.array([estimate.time for estimate in newest])
         radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
@@ -74,10 +84,28 @@ class JointSession:
         surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
         begin = self.start if newest else np.nan
         return [
+            *self._going_on(times),
             recent_agreement(times, agreements, _CHECKED_SCANS),
             told_deviation(times, np.array(radii)),
             *surfaces_tell(begin, times, surfaces, self.solver.parameters.odometry.distance_deviation),
+            *in_one_map(times, self.solver.islands.apart[-_CHECKED_SCANS:]),
         ]
+
+    def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:
+        """Ask whether the newest scans, which ended at `times` (n,) [s], lie on those before them.
+
+        Of each it is found once: the solver may move a scan later, but hardly against those just before it.
+        """
+        solver = self.solver
+        if not np.isinf(solver.odometry.distance_deviation):
+            return ()
+        known, count = max(self._shares, default=-1), solver.log.scan_count
+        first = max(known + 1, count - len(times))
+        new = shares_heard_before(solver.log, solver.odometry, solver.state, solver.parameters.matching, first)
+        self._shares.update(zip(range(first, count), new))
+        for old in [scan for scan in self._shares if scan < count - len(times)]:
+            del self._shares[old]
+        return (scans_go_on(times, np.array([self._shares[scan] for scan in range(count - len(times), count)])),)
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""

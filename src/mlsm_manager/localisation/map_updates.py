@@ -19,12 +19,14 @@ class ScanUpdate:
     """What was done with a scan.
 
     result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
+    found: how the vehicle was found again with it after a silence of the sonar; empty where it was not.
     """
 
     scan: Scan
     result: Optional[MatchResult]
     accepted: bool
     belief: Belief
+    found: str = ""
 
 
 @dataclass(frozen=True)

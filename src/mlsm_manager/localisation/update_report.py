@@ -23,6 +23,9 @@ def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     health.show("fix standard deviations x y [m] yaw [rad]", " ".join(f"{value:.3f}" for value in deviations[:3]))
     health.show("odometry scale error", f"{result.motion[0]:.3f}")
     health.show("odometry direction error [rad]", f"{result.motion[1]:.4f}")
+    if update.found:
+        health.count("times found again after a silence")
+        health.show("found again", update.found)
     if not update.accepted:
         health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction are kept")
 

@@ -1,7 +1,7 @@
 """Which points are compared with which: each with its nearest neighbour in every block of scans."""
 
 from dataclasses import dataclass, replace
-from typing import Protocol, Tuple
+from typing import Callable, Protocol, Tuple
 
 import numpy as np
 
@@ -9,8 +9,8 @@ from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.surface_points import ramp
 
-_FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
-_COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one
+FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
+COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one
 
 
 @dataclass(frozen=True)
@@ -40,15 +40,15 @@ class Neighbours(Protocol):
         """
 
 
-def pairs_of(
-    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
-) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
+Weighing = Callable[[Tuple[np.ndarray, ...], PlacedPoints, PlacedPoints, float, SurfaceMatching], Pairs]
+"""Takes what Neighbours.within found, sources, targets, the cut [m] and the matching; returns the pairs that count."""
 
-    Points of one scan are never compared with each other, nor surfaces that face different ways. In its own block, a
-    point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
-    """
-    rows, neighbours, distance, shares = lists.within(sources, targets, cut)
+
+def weighed(
+    found: Tuple[np.ndarray, ...], sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
+) -> Pairs:
+    """Return the pairs that count; see Weighing."""
+    rows, neighbours, distance, shares = found
     cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals[neighbours])
     importance = shares * faded(distance, cosine, cut, matching)
     importance = importance * sources.qualities[rows] * targets.qualities[neighbours]
@@ -56,6 +56,22 @@ def pairs_of(
     return Pairs(rows[kept], neighbours[kept], importance[kept])
 
 
+def pairs_of(
+    lists: Neighbours,
+    sources: PlacedPoints,
+    targets: PlacedPoints,
+    cut: float,
+    matching: SurfaceMatching,
+    weighing: Weighing = weighed,
+) -> Pairs:
+    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
+
+    Points of one scan are never compared with each other, nor surfaces that face different ways. In its own block, a
+    point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
+    """
+    return weighing(lists.within(sources, targets, cut), sources, targets, cut, matching)
+
+
 def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, matching: SurfaceMatching) -> np.ndarray:
     """Return factors (m,) of pairs at `distance` (m,) [m] with `cosine` (m,) between normals: 0 where they drop out."""
-    return ramp(distance, cut, _FADING * cut) * ramp(cosine, matching.min_cosine, matching.min_cosine + _COSINE_FADING)
+    return ramp(distance, cut, FADING * cut) * ramp(cosine, matching.min_cosine, matching.min_cosine + COSINE_FADING)

@@ -9,6 +9,7 @@ from mlsm_manager.multi_view.association import Neighbours, Pairs, pairs_of
 from mlsm_manager.multi_view.comparing import Comparing
 from mlsm_manager.multi_view.comparisons import add_comparisons, support
 from mlsm_manager.multi_view.estimate import scale_covariance
+from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.loops import Loop, add_loops, loops_of
@@ -68,12 +69,13 @@ def closed(live: LiveSolver, batch: BatchResult) -> Closed:
     loops = loops_of(live.log, live.odometry, batch.state, live.parameters)
     if not loops:
         return Closed(batch, [], np.nan)
-    problem = _Batch(live.log, live.odometry, live.parameters, batch.state.copy(), loops)
+    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, batch.state.copy(), loops)
     for _ in range(_PULLED_STEPS):
         problem.step()
     other = solved(live, start=problem.state)
     without, with_loops = (
-        _Batch(live.log, live.odometry, live.parameters, some.state.copy()).evidence() for some in (batch, other)
+        _Batch(live.log, live.islands, live.odometry, live.parameters, some.state.copy()).evidence()
+        for some in (batch, other)
     )
     gain = with_loops - without
     return Closed(other, loops, gain) if gain > _CONVINCING else Closed(batch, [], gain)
@@ -87,7 +89,7 @@ def solved(
     parameters, start: others than those of `live`, with the same odometry.
     """
     parameters, start = parameters or live.parameters, start or live.state
-    problem = _Batch(live.log, live.odometry, parameters, start.copy())
+    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy())
     window = parameters.window
     steps, converged = 0, False
     while steps < window.batch_iterations and not converged:
@@ -101,12 +103,14 @@ class _Batch:
     def __init__(
         self,
         log: RunLog,
+        islands: Islands,
         odometry: OdometryModel,
         parameters: MultiViewParameters,
         state: State,
         loops: Sequence[Loop] = (),
     ) -> None:
         self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
+        self._islands = islands
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
         self._loops, self._start = list(loops), state.copy()
@@ -152,7 +156,8 @@ class _Batch:
         points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
         if self._lists is None:
             self._lists = self._comparing.neighbours(points, matching.block_scans)
-        return points, pairs_of(self._lists, points, points, matching.cut, matching)
+        pairs = pairs_of(self._lists, points, points, matching.cut, matching, self._comparing.weighed)
+        return points, self._islands.within(pairs, points, points)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)

@@ -2,7 +2,7 @@
 
 from typing import Callable, NamedTuple
 
-from mlsm_manager.multi_view.association import Neighbours
+from mlsm_manager.multi_view.association import Neighbours, Weighing, weighed
 from mlsm_manager.multi_view.comparisons import Summation, summed
 from mlsm_manager.multi_view.neighbours import NeighbourLists
 from mlsm_manager.multi_view.normal_equations import Scattering, scattered
@@ -11,11 +11,12 @@ from mlsm_manager.multi_view.solver_kernel import SolverKernel
 
 
 class Comparing(NamedTuple):
-    """neighbours: takes targets, ascending by scan, and how many scans are searched together. summed: see Summation.
-    scattered: see Scattering.
+    """neighbours: takes targets, ascending by scan, and how many scans are searched together. weighed: see Weighing.
+    summed: see Summation. scattered: see Scattering.
     """
 
     neighbours: Callable[[PlacedPoints, int], Neighbours]
+    weighed: Weighing
     summed: Summation
     scattered: Scattering
 
@@ -23,7 +24,12 @@ class Comparing(NamedTuple):
     def by(cls, kernel: SolverKernel) -> "Comparing":
         """Return what compares. Raises ImportError, which says what to install, for NUMBA without numba."""
         if kernel.resolved is SolverKernel.NUMPY:
-            return cls(NeighbourLists, summed, scattered)
+            return cls(NeighbourLists, weighed, summed, scattered)
         from mlsm_manager.multi_view import compiled_comparisons as compiled
 
-        return cls(compiled.CompiledNeighbours, compiled.summed_compiled, compiled.scattered_compiled)
+        return cls(
+            compiled.CompiledNeighbours,
+            compiled.weighed_compiled,
+            compiled.summed_compiled,
+            compiled.scattered_compiled,
+        )

@@ -7,9 +7,10 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.association import Pairs
+from mlsm_manager.multi_view.association import COSINE_FADING, FADING, Pairs
 from mlsm_manager.multi_view.compiled_search import shared_neighbours
 from mlsm_manager.multi_view.compiled_sums import POINT_COLUMNS, scattered_blocks, summed_comparisons
+from mlsm_manager.multi_view.compiled_weights import weighed_pairs
 from mlsm_manager.multi_view.neighbours import TIE
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
@@ -36,6 +37,19 @@ class CompiledNeighbours:
             np.ascontiguousarray(targets.places), np.ascontiguousarray(targets.scans),
             self._blocks, self._count, float(cut), TIE,
         )  # fmt: skip
+
+
+def weighed_compiled(
+    found: Tuple[np.ndarray, ...], sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
+) -> Pairs:
+    """Return the pairs that count; see association.Weighing."""
+    normals, other_normals = (np.ascontiguousarray(points.normals) for points in (sources, targets))
+    return Pairs(
+        *weighed_pairs(
+            *found, normals, sources.qualities, other_normals, targets.qualities,
+            cut, FADING * cut, matching.min_cosine, matching.min_cosine + COSINE_FADING,
+        )
+    )  # fmt: skip
 
 
 def summed_compiled(

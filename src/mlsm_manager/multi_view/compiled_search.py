@@ -1,4 +1,6 @@
-"""The compiled search for the nearest points of each block of scans, over square cells.
+"""The compiled search for the nearest points of each block of scans.
+
+Sources of one small cell have nearly the same neighbours: what may be one of theirs is gathered once for all of them.
 
 It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Raises
 ImportError without numba.
@@ -9,26 +11,33 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
+from mlsm_manager.multi_view.compiled_cells import grid_around, in_cells
+
 CANDIDATES = 6
 """Nearest points of a block that may share a comparison."""
-_CELLS_PER_REACH = 2  # small cells fill a circle better, many cells take time
-_MOST_CELLS = 512  # on each side of the grid of cells: bounds its memory, however far apart points lie
-_SLACK = 1.0 + 1e-9  # of a squared distance: so far may it be rounded
+_CELLS_PER_REACH = 2  # small cells leave less to compare for each source, but more to gather
+_HALF_DIAGONAL = 0.7072  # of a cell, in sides, rounded up
+_SLACK = 1e-9  # m, and of a squared distance: so far may it be rounded
+_NEVER = 1e300  # m^2: no point is so far away
 _FIRST_CAPACITY = 1024
 
-_Grid = namedtuple("_Grid", "low_x low_y rows columns side starts")
-"""Square cells of `side` [m]. starts: (rows * columns + 1,) where the points of each cell begin."""
 _Targets = namedtuple("_Targets", "x y scan block row")
 """Points in the order of their cells; row: (k,) where each stood before."""
-_Nearest = namedtuple("_Nearest", "distance row held limit touched")
-"""What one source has found: of each block the nearest points (b, CANDIDATES), how many are held (b,), and the squared
-distance (b,) from which on no more are needed; and the blocks with any (b,)."""
+_Around = namedtuple("_Around", "place square nearest scan other bound")
+"""What lies around the middle of a cell. place, square: (k,) points and their squared distances. Of each block (b,):
+the squared distance of the nearest one, its scan, the squared distance of the nearest one of another scan, and that up
+to which points may be neighbours of a source in the cell."""
+_Near = namedtuple("_Near", "x y scan row square starts")
+"""Points that may be neighbours, block by block. starts: (b + 2,) where each block begins. square: (k,) their squared
+distances from one source."""
+_Candidates = namedtuple("_Candidates", "distance row")
+_Found = namedtuple("_Found", "neighbours distances shares")
 
 
 @njit(cache=True)
-def _kept(distances, rows, held, distance, row):
-    """Put a point among the nearest ones of a block, of which `held` are known; return how many are known then."""
-    place = held
+def _kept(candidates, held, distance, row):
+    """Put a point among the nearest ones, of which `held` are known; return how many are known then."""
+    distances, rows, place = candidates.distance, candidates.row, held
     if held == CANDIDATES:
         if distance >= distances[CANDIDATES - 1]:
             return held
@@ -41,126 +50,176 @@ def _kept(distances, rows, held, distance, row):
 
 
 @njit(cache=True)
-def _doubled(array):
-    """Return an array that begins with `array` and is twice as long."""
-    longer = np.empty(2 * len(array), array.dtype)
-    longer[: len(array)] = array
-    return longer
-
-
-@njit(cache=True)
-def _write_shares(distances, rows, held, tie, neighbours, found, shares):
+def _write_shares(candidates, held, tie, found, made):
     """Share a comparison among the candidates that are hardly farther than the nearest; return how many are written."""
-    made = 0
-    total = 0.0
+    distances, total = candidates.distance, 0.0
     for place in range(held):
         total += max(1.0 - (distances[place] - distances[0]) / tie, 0.0)
     for place in range(held):
         share = max(1.0 - (distances[place] - distances[0]) / tie, 0.0) / total
         if share > 0.0:
-            neighbours[made], found[made], shares[made] = rows[place], distances[place], share
+            found.neighbours[made], found.distances[made] = candidates.row[place], distances[place]
+            found.shares[made] = share
             made += 1
     return made
 
 
 @njit(cache=True)
-def _grid_of(places, reach):
-    """Return the grid of places (n, 2), n > 0, and their order (n,) by its cells."""
-    low_x, low_y, high_x, high_y = places[0, 0], places[0, 1], places[0, 0], places[0, 1]
-    for point in range(len(places)):
-        low_x, high_x = min(low_x, places[point, 0]), max(high_x, places[point, 0])
-        low_y, high_y = min(low_y, places[point, 1]), max(high_y, places[point, 1])
-    side = max(reach / _CELLS_PER_REACH, max(high_x - low_x, high_y - low_y) / _MOST_CELLS)
-    columns, rows = int((high_x - low_x) / side) + 1, int((high_y - low_y) / side) + 1
-    cell = np.empty(len(places), np.int64)
-    starts = np.zeros(rows * columns + 1, np.int64)
-    for point in range(len(places)):
-        cell[point] = int((places[point, 1] - low_y) / side) * columns + int((places[point, 0] - low_x) / side)
-        starts[cell[point] + 1] += 1
-    for number in range(rows * columns):
-        starts[number + 1] += starts[number]
-    fill, order = starts[:-1].copy(), np.empty(len(places), np.int64)
-    for point in range(len(places)):
-        order[fill[cell[point]]] = point
-        fill[cell[point]] += 1
-    return _Grid(low_x, low_y, rows, columns, side, starts), order
+def _longer(found, least):
+    """Return arrays that begin with those of `found` and are at least `least` long."""
+    length = max(least, 2 * len(found.shares))
+    longer = _Found(np.empty(length, np.int64), np.empty(length), np.empty(length))
+    longer.neighbours[: len(found.shares)] = found.neighbours
+    longer.distances[: len(found.shares)] = found.distances
+    longer.shares[: len(found.shares)] = found.shares
+    return longer
 
 
 @njit(cache=True)
-def _outwards(middle, step):
-    """Return the numbers middle, middle + 1, middle - 1, middle + 2, ... for steps 0, 1, 2, 3, ..."""
-    return middle + (step + 1) // 2 if step % 2 else middle - step // 2
-
-
-@njit(cache=True)
-def _look_around(x, y, scan, reach, tie, grid, targets, nearest):
-    """Find the nearest points of each block around x, y; return how many blocks have any.
-
-    Near cells come first: what is far then needs one comparison only.
-    """
-    span, touched = int(np.ceil(reach / grid.side)), 0
-    own_row, own_column = int(np.floor((y - grid.low_y) / grid.side)), int(np.floor((x - grid.low_x) / grid.side))
-    for row_step in range(2 * span + 1):
-        row = _outwards(own_row, row_step)
-        if row < 0 or row >= grid.rows:
-            continue
-        for column_step in range(2 * span + 1):
-            column = _outwards(own_column, column_step)
-            if column < 0 or column >= grid.columns:
+def _look_around(row, column, reach, grid, starts, targets, around):
+    """Write down what lies around a cell; return how many points that are."""
+    x, y = grid.low_x + (column + 0.5) * grid.side, grid.low_y + (row + 0.5) * grid.side
+    farthest, count = (reach + _HALF_DIAGONAL * grid.side) ** 2, 0
+    around.nearest[:], around.other[:], around.scan[:] = _NEVER, _NEVER, -1
+    first, last = max(0, column - grid.span), min(grid.columns - 1, column + grid.span)
+    for line in range(max(0, row - grid.span), min(grid.rows - 1, row + grid.span) + 1):
+        for place in range(starts[line * grid.columns + first], starts[line * grid.columns + last + 1]):
+            across, along = targets.x[place] - x, targets.y[place] - y
+            square, block = across * across + along * along, targets.block[place]
+            if square >= farthest:
                 continue
-            cell = row * grid.columns + column
-            for place in range(grid.starts[cell], grid.starts[cell + 1]):
-                across, along = targets.x[place] - x, targets.y[place] - y
-                square, block = across * across + along * along, targets.block[place]
-                if square >= nearest.limit[block] or targets.scan[place] == scan:
-                    continue
-                if nearest.held[block] == 0:
-                    nearest.touched[touched] = block
-                    touched += 1
-                distances = nearest.distance[block]
-                nearest.held[block] = _kept(
-                    distances, nearest.row[block], nearest.held[block], np.sqrt(square), targets.row[place]
-                )
-                nearest.limit[block] = min(nearest.limit[block], _SLACK * (distances[0] + tie) ** 2)
-    return touched
+            around.place[count], around.square[count] = place, square
+            count += 1
+            if targets.scan[place] == around.scan[block]:
+                around.nearest[block] = min(around.nearest[block], square)
+            elif square < around.nearest[block]:
+                around.other[block], around.nearest[block] = around.nearest[block], square
+                around.scan[block] = targets.scan[place]
+            elif square < around.other[block]:
+                around.other[block] = square
+    return count
+
+
+@njit(cache=True)
+def _write_bounds(scans, reach, radius, tie, around):
+    """Write for each block how far from the middle of a cell neighbours of its sources, of `scans` (m,), may lie.
+
+    The nearest target is at most `radius` farther from a source than from the middle, unless the source's own scan
+    heard it; all that share the comparison are hardly farther.
+    """
+    for block in range(len(around.bound)):
+        square = around.nearest[block]
+        for scan in scans:
+            if scan == around.scan[block]:
+                square = around.other[block]
+        around.bound[block] = min(np.sqrt(square) + 2.0 * radius + tie + _SLACK, reach + radius) ** 2
+
+
+@njit(cache=True)
+def _take_near(count, around, targets, near):
+    """Write down, block by block, those of `count` points around a cell that are within the bounds; return how many."""
+    near.starts[:] = 0
+    for entry in range(count):
+        block = targets.block[around.place[entry]]
+        if around.square[entry] <= around.bound[block]:
+            near.starts[block + 2] += 1
+    for block in range(len(around.bound)):
+        near.starts[block + 2] += near.starts[block + 1]
+    for entry in range(count):
+        place = around.place[entry]
+        block = targets.block[place]
+        if around.square[entry] <= around.bound[block]:
+            own = near.starts[block + 1]
+            near.starts[block + 1] = own + 1
+            near.x[own], near.y[own] = targets.x[place], targets.y[place]
+            near.scan[own], near.row[own] = targets.scan[place], targets.row[place]
+    return near.starts[-1]
+
+
+@njit(cache=True)
+def _measure(x, y, scan, count, near):
+    """Write the squared distances of the `count` near points from x, y; what the same scan heard is never near."""
+    for place in range(count):
+        across, along = near.x[place] - x, near.y[place] - y
+        near.square[place] = across * across + along * along if near.scan[place] != scan else _NEVER
+
+
+@njit(cache=True)
+def _write_nearest(cut, tie, near, candidates, found, made):
+    """Write the points of each block nearest to one source after the `made` ones; return how many are written then."""
+    for block in range(len(near.starts) - 2):
+        start, end = near.starts[block], near.starts[block + 1]
+        least = _NEVER
+        for place in range(start, end):
+            least = near.square[place] if near.square[place] < least else least
+        if least >= cut * cut:
+            continue
+        limit, held = (np.sqrt(least) + tie) ** 2 * (1.0 + _SLACK), 0
+        for place in range(start, end):
+            if near.square[place] <= limit:
+                held = _kept(candidates, held, np.sqrt(near.square[place]), near.row[place])
+        made = _write_shares(candidates, held, tie, found, made)
+    return made
+
+
+@njit(cache=True)
+def _in_order(starts, ends, found):
+    """Return rows of sources, rows of their neighbours, distances and shares, source by source.
+
+    starts, ends: (n,) where in `found` those of each source stand.
+    """
+    count = (ends - starts).sum()
+    rows, neighbours = np.empty(count, np.int64), np.empty(count, np.int64)
+    distances, shares = np.empty(count), np.empty(count)
+    made = 0
+    for source in range(len(starts)):
+        for place in range(starts[source], ends[source]):
+            rows[made], neighbours[made] = source, found.neighbours[place]
+            distances[made], shares[made] = found.distances[place], found.shares[place]
+            made += 1
+    return rows, neighbours, distances, shares
 
 
 @njit(
     "Tuple((i8[::1], i8[::1], f8[::1], f8[::1]))(f8[:,::1], i8[::1], f8[:,::1], i8[::1], i8[::1], i8, f8, f8)",
     cache=True,
+    error_model="numpy",
 )
 def shared_neighbours(sources, source_scans, places, scans, blocks, count, cut, tie):
     """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see association.Neighbours.
 
     sources: (n, 2) m. places: (k, 2) m, scans: (k,), blocks: (k,) from 0 to before `count`: of the targets, k > 0.
     """
-    reach = cut + tie
-    grid, order = _grid_of(places, reach)
+    reach, size = cut + tie, len(places)
+    grid = grid_around(places, reach, _CELLS_PER_REACH)
+    radius = _HALF_DIAGONAL * grid.side
+    target_starts, order = in_cells(places, grid)
     targets = _Targets(places[order, 0], places[order, 1], scans[order], blocks[order], order)
-    nearest = _Nearest(
-        np.empty((count, CANDIDATES)), np.empty((count, CANDIDATES), np.int64), np.zeros(count, np.int64),
-        np.full(count, reach * reach), np.empty(count, np.int64),
+    source_starts, source_order = in_cells(sources, grid)
+    around = _Around(
+        np.empty(size, np.int64), np.empty(size), np.empty(count), np.empty(count, np.int64), np.empty(count),
+        np.empty(count),
     )  # fmt: skip
-    rows, neighbours = np.empty(_FIRST_CAPACITY, np.int64), np.empty(_FIRST_CAPACITY, np.int64)
-    distances, shares = np.empty(_FIRST_CAPACITY), np.empty(_FIRST_CAPACITY)
+    near = _Near(
+        np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size),
+        np.empty(count + 2, np.int64),
+    )  # fmt: skip
+    candidates = _Candidates(np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64))
+    found = _Found(np.empty(_FIRST_CAPACITY, np.int64), np.empty(_FIRST_CAPACITY), np.empty(_FIRST_CAPACITY))
+    starts, ends = np.zeros(len(sources), np.int64), np.zeros(len(sources), np.int64)
     made = 0
-    for source in range(len(sources)):
-        x, y = sources[source, 0], sources[source, 1]
-        if not (grid.low_x - reach < x < grid.low_x + grid.columns * grid.side + reach):
+    for cell in range(grid.rows * grid.columns):
+        own = source_order[source_starts[cell] : source_starts[cell + 1]]
+        if not len(own):
             continue
-        if not (grid.low_y - reach < y < grid.low_y + grid.rows * grid.side + reach):
-            continue
-        for number in range(_look_around(x, y, source_scans[source], reach, tie, grid, targets, nearest)):
-            block = nearest.touched[number]
-            if nearest.distance[block, 0] < cut:
-                if made + CANDIDATES > len(rows):
-                    rows, neighbours = _doubled(rows), _doubled(neighbours)
-                    distances, shares = _doubled(distances), _doubled(shares)
-                end = made + _write_shares(
-                    nearest.distance[block], nearest.row[block], nearest.held[block], tie,
-                    neighbours[made:], distances[made:], shares[made:],
-                )  # fmt: skip
-                rows[made:end] = source
-                made = end
-            nearest.held[block], nearest.limit[block] = 0, reach * reach
-    return rows[:made].copy(), neighbours[:made].copy(), distances[:made].copy(), shares[:made].copy()
+        looked_at = _look_around(cell // grid.columns, cell % grid.columns, reach, grid, target_starts, targets, around)
+        _write_bounds(source_scans[own], reach, radius, tie, around)
+        taken = _take_near(looked_at, around, targets, near)
+        for source in own:
+            if made + count * CANDIDATES > len(found.shares):
+                found = _longer(found, made + count * CANDIDATES)
+            starts[source] = made
+            _measure(sources[source, 0], sources[source, 1], source_scans[source], taken, near)
+            made = _write_nearest(cut, tie, near, candidates, found, made)
+            ends[source] = made
+    return _in_order(starts, ends, found)

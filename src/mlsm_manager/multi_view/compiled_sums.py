@@ -15,17 +15,42 @@ PAIR_COLUMNS = 14
 
 
 @njit(cache=True)
+def _groups_of(rows, neighbours, source_scans, target_scans):
+    """Return the group of each comparison (m,), and the scans of the source and of the target of each group, (g,)."""
+    lowest = target_scans.min() if len(target_scans) else 0
+    of_scan = np.full((target_scans.max() if len(target_scans) else 0) - lowest + 1, -1, np.int64)
+    group_of = np.empty(len(rows), np.int64)
+    scans, other_scans = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64)
+    groups, first = 0, 0
+    for pair in range(len(rows)):
+        scan, other = source_scans[rows[pair]], target_scans[neighbours[pair]]
+        if groups > 0 and scan != scans[groups - 1]:
+            first = groups
+        group = of_scan[other - lowest]
+        if group < first:
+            group = groups
+            of_scan[other - lowest] = group
+            scans[group], other_scans[group] = scan, other
+            groups += 1
+        group_of[pair] = group
+    return group_of, scans[:groups].copy(), other_scans[:groups].copy()
+
+
+@njit(cache=True)
 def _grouped(group_of, groups):
-    """Return the order (n,) in which those of one group follow each other; group_of: (n,) from 0 to before `groups`."""
-    starts, order = np.zeros(groups + 1, np.int64), np.empty(len(group_of), np.int64)
+    """Return the order (m,) in which those of one group follow each other, and where each group begins (groups + 1,).
+
+    group_of: (m,) from 0 to before `groups`.
+    """
+    starts, order = np.zeros(groups + 2, np.int64), np.empty(len(group_of), np.int64)
     for entry in range(len(group_of)):
-        starts[group_of[entry] + 1] += 1
+        starts[group_of[entry] + 2] += 1
     for group in range(groups):
-        starts[group + 1] += starts[group]
+        starts[group + 2] += starts[group + 1]
     for entry in range(len(group_of)):
-        order[starts[group_of[entry]]] = entry
-        starts[group_of[entry]] += 1
-    return order
+        order[starts[group_of[entry] + 1]] = entry
+        starts[group_of[entry] + 1] += 1
+    return order, starts[:-1]
 
 
 @njit(cache=True)
@@ -46,10 +71,42 @@ def _write_slopes(source, target, slopes):
     return residual
 
 
+@njit(cache=True)
+def _write_sums(slopes, residuals, weights, information, gradient):
+    """Write the information (c, c) and the gradient (c,) of comparisons with slopes (n, c).
+
+    A row is summed in variables, not in an array: so the compiler keeps it in registers, three times as fast.
+    """
+    for row in range(PAIR_COLUMNS):
+        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = s11 = s12 = s13 = by_residual = 0.0
+        for pair in range(len(slopes)):
+            own = slopes[pair]
+            weighted = weights[pair] * own[row]
+            by_residual += weighted * residuals[pair]
+            s0 += weighted * own[0]
+            s1 += weighted * own[1]
+            s2 += weighted * own[2]
+            s3 += weighted * own[3]
+            s4 += weighted * own[4]
+            s5 += weighted * own[5]
+            s6 += weighted * own[6]
+            s7 += weighted * own[7]
+            s8 += weighted * own[8]
+            s9 += weighted * own[9]
+            s10 += weighted * own[10]
+            s11 += weighted * own[11]
+            s12 += weighted * own[12]
+            s13 += weighted * own[13]
+        gradient[row] = by_residual
+        information[row, 0:7] = s0, s1, s2, s3, s4, s5, s6
+        information[row, 7:14] = s7, s8, s9, s10, s11, s12, s13
+
+
 @njit(
     "Tuple((i8[::1], i8[::1], f8[:,:,::1], f8[:,::1]))"
     "(i8[::1], i8[::1], f8[::1], f8[:,::1], i8[::1], f8[:,::1], i8[::1], f8, f8, f8, f8)",
     cache=True,
+    error_model="numpy",
 )
 def summed_comparisons(
     rows, neighbours, importance, sources, source_scans, targets, target_scans,
@@ -60,38 +117,23 @@ def summed_comparisons(
     rows, neighbours, importance: (m,) as in Pairs; those of one source scan follow each other. The variance of a
     comparison is `least_variance` + `by_slant` * (sum of both squared slants).
     """
-    lowest = target_scans.min() if len(target_scans) else 0
-    of_scan = np.full((target_scans.max() if len(target_scans) else 0) - lowest + 1, -1, np.int64)
-    group_of = np.empty(len(rows), np.int64)
-    scans, other_scans = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64)
-    groups, first = 0, 0
-    for pair in range(len(rows)):
-        scan, other = source_scans[rows[pair]], target_scans[neighbours[pair]]
-        if groups > 0 and scan != scans[groups - 1]:
-            first = groups
-        group = of_scan[other - lowest]
-        if group < first:
-            group = groups
-            of_scan[other - lowest] = group
-            scans[group], other_scans[group] = scan, other
-            groups += 1
-        group_of[pair] = group
-    information = np.zeros((groups, PAIR_COLUMNS, PAIR_COLUMNS))
-    gradient = np.zeros((groups, PAIR_COLUMNS))
-    slopes = np.empty(PAIR_COLUMNS)
-    for pair in _grouped(group_of, groups):
-        source, target = sources[rows[pair]], targets[neighbours[pair]]
-        residual = _write_slopes(source, target, slopes)
-        variance = least_variance + by_slant * (source[SLANT] * source[SLANT] + target[SLANT] * target[SLANT])
-        kernel = 1.0 + residual * residual / variance / (widening * widening)
-        weight = least_weight / variance / (kernel * kernel) * importance[pair]
-        block, summed = information[group_of[pair]], gradient[group_of[pair]]
-        for column in range(PAIR_COLUMNS):
-            weighted = weight * slopes[column]
-            summed[column] += weighted * residual
-            for other in range(PAIR_COLUMNS):
-                block[column, other] += weighted * slopes[other]
-    return scans[:groups].copy(), other_scans[:groups].copy(), information, gradient
+    group_of, scans, other_scans = _groups_of(rows, neighbours, source_scans, target_scans)
+    order, starts = _grouped(group_of, len(scans))
+    most = (starts[1:] - starts[:-1]).max() if len(scans) else 0
+    slopes, residuals, weights = np.empty((most, PAIR_COLUMNS)), np.empty(most), np.empty(most)
+    information, gradient = np.empty((len(scans), PAIR_COLUMNS, PAIR_COLUMNS)), np.empty((len(scans), PAIR_COLUMNS))
+    for group in range(len(scans)):
+        pairs = order[starts[group] : starts[group + 1]]
+        for place in range(len(pairs)):
+            pair = pairs[place]
+            source, target = sources[rows[pair]], targets[neighbours[pair]]
+            residual = _write_slopes(source, target, slopes[place])
+            variance = least_variance + by_slant * (source[SLANT] * source[SLANT] + target[SLANT] * target[SLANT])
+            kernel = 1.0 + residual * residual / variance / (widening * widening)
+            weights[place] = least_weight / variance / (kernel * kernel) * importance[pair]
+            residuals[place] = residual
+        _write_sums(slopes[: len(pairs)], residuals, weights, information[group], gradient[group])
+    return scans, other_scans, information, gradient
 
 
 @njit("void(f8[:,::1], i8[:,::1], f8[:,:,::1])", cache=True)

@@ -1,13 +1,21 @@
 """How much of each scan lies on what was heard just before it."""
 
-import numpy as np
+from typing import Tuple
 
-from mlsm_manager.multi_view.motion_search import COMPARED_SCANS, fits
+import numpy as np
+from scipy.spatial import cKDTree
+
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.placement import place
+from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import State
+
+_SCANS_BEFORE = 10  # a few minutes, in which a vehicle sees the same
+_SURROUNDINGS = 8.0  # m around a point within which surfaces may be the one that it lies on, or lie beside it
+_ON_SURFACE = 1.0  # m: about twice the deviation of an echo
+_CANDIDATES = 24  # points heard before that are looked at for each point: enough to find one that faces the same way
+_FEWEST_POINTS = 2.0  # points with surfaces around them: fewer tell nothing
 
 
 def shares_heard_before(
@@ -15,15 +23,28 @@ def shares_heard_before(
 ) -> np.ndarray:
     """Return which share (n,) of the points of scans `first` and newer lies on surfaces that the scans before heard.
 
-    NaN for scans without points on surfaces, and for the first of the run. A scan that lies where it was heard has most
-    of its points there, since a small vehicle goes less far in a turn of the head than the sonar reaches.
+    Only points count around which a surface was heard that faces the same way: others may be new. NaN for scans with
+    hardly any such points.
     """
     return np.array([_share(log, odometry, state, matching, scan) for scan in range(first, log.scan_count)])
 
 
 def _share(log: RunLog, odometry: OdometryModel, state: State, matching: SurfaceMatching, scan: int) -> float:
-    before, own = log.rows(max(0, scan - COMPARED_SCANS), scan), log.rows(scan, scan + 1)
+    before, own = log.rows(max(0, scan - _SCANS_BEFORE), scan), log.rows(scan, scan + 1)
     if not len(before) or not len(own):
         return np.nan
     sources, targets = (place(log, odometry, state, rows) for rows in (own, before))
-    return float(fits(sources, targets, sources.places[np.newaxis], matching)[0] / sources.qualities.sum())
+    distances, known = _distances(sources, targets, matching)
+    total = sources.qualities[known].sum()
+    if total <= _FEWEST_POINTS:
+        return np.nan
+    return float(sources.qualities[known] @ np.exp(-0.5 * (distances[known] / _ON_SURFACE) ** 2) / total)
+
+
+def _distances(sources: PlacedPoints, targets: PlacedPoints, matching: SurfaceMatching) -> Tuple[np.ndarray, ...]:
+    """Return how far (n,) [m] each source is from the nearest target that faces the same way, and where one is near."""
+    distance, index = cKDTree(targets.places).query(sources.places, k=_CANDIDATES, distance_upper_bound=_SURROUNDINGS)
+    found = np.isfinite(distance)
+    facing = np.einsum("na,nka->nk", sources.normals, targets.normals[np.where(found, index, 0)])
+    nearest = np.where(found & (facing > matching.min_cosine), distance, np.inf).min(axis=1)
+    return nearest, np.isfinite(nearest)

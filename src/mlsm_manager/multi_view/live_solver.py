@@ -7,11 +7,13 @@ import numpy as np
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.growing import GrowingArray
+from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
 from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.place_search import Whereabouts, island_place, silent_scans, whereabouts
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.stacking import stacked, unstacked
@@ -26,6 +28,8 @@ class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
     sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan. state: of all nodes so far.
+    islands: which scans are compared with each other. search: what came of the search for the newest scans in the map
+    after scans that heard nothing; None where none was needed.
     """
 
     def __init__(
@@ -48,6 +52,8 @@ class LiveSolver:
         self._node_covariances = GrowingArray(3, 3)
         self._run = run_mean(parameters.sonar)
         self._start, self._known = start, known
+        self.islands = Islands(np.empty(0))
+        self.search: Optional[Whereabouts] = None
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
@@ -58,6 +64,7 @@ class LiveSolver:
             "run_unknowns": self._run.copy(),
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
+            "islands": self.islands.numbers,
             **stacked(self.estimates, _ESTIMATE),
         }
 
@@ -87,9 +94,12 @@ class LiveSolver:
         solver._nodes.replace_from(0, nodes)
         solver._node_covariances.replace_from(0, covariances)
         solver._run[:] = stored["run_unknowns"]
+        solver.islands = Islands(stored["islands"])
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
         if len(solver.estimates) != len(scans):
             raise ValueError(f"{len(solver.estimates)} estimates for {len(scans)} scans")
+        if len(stored["islands"]) != len(scans):
+            raise ValueError(f"{len(stored['islands'])} islands for {len(scans)} scans")
         return solver
 
     @property
@@ -99,55 +109,93 @@ class LiveSolver:
 
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
-
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
-        scans, first = self.log.scan_count, self._first_free(self.log.scan_count + 1)
-        nodes, run = self._nodes.values[first:].copy(), self._run.copy()
+        scans, nodes, run = self.log.scan_count, self._nodes.values.copy(), self._run.copy()
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self.log.append(scan, self.parameters.window.lookahead)
+                self.islands.append()
                 self.estimates.append(self._solved())
         except RefusedInput:
             raise
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
-            self._nodes.replace_from(first, nodes)
+            self._nodes.replace_from(0, nodes)
             self._run[:] = run
             if self.log.scan_count > scans:
                 self.log.remove_newest()
+            self.islands.shorten(self.log.scan_count)
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
         return self.estimates[-1]
-
-    def _first_free(self, scans: int) -> int:
-        return max(0, scans - self.parameters.window.free_nodes)
 
     def _solved(self) -> LiveEstimate:
         """Return what is known when the log has one scan more than there are estimates."""
         motion = self.log.node_motion(np.array([-2, -1]))
         self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
+        self.search = None
         self._search()
+        window = self._fitted()
+        if self.islands.is_apart and self._join(window.estimate()):
+            window = self._fitted()
+        estimate, covariances = window.estimate(), window.covariances_of_oldest()
+        self._node_covariances.replace_from(window.oldest, covariances)
+        return estimate
+
+    def _fitted(self) -> LiveWindow:
+        """Return the newest nodes' problem after they were moved to its solution."""
         window = LiveWindow(
             self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
-            self._start, self._known,
+            self._start, self._known, self.islands,
         )  # fmt: skip
         cut = self.parameters.matching.wide_cut
         for _ in range(self.parameters.window.live_iterations):
             window.step(cut)
             cut = max(self.parameters.matching.cut, _CUT_FACTOR * cut)
-        estimate, covariances = window.estimate(), window.covariances_of_oldest()
-        self._node_covariances.replace_from(window.oldest, covariances)
-        return estimate
+        return window
+
+    @property
+    def found(self) -> str:
+        """How the vehicle was found again with the newest scan after a silence; empty where it was not."""
+        return self.search.line() if self.search is not None and self.search.is_certain else ""
 
     def _search(self) -> None:
-        """Put the newest node where its scan fits, if the motion is hardly known."""
-        if not self.estimates:
+        """Put the newest node where its scan fits, if the motion is hardly known; or let it begin an island."""
+        silent = silent_scans(self.log)
+        if len(self.estimates) <= silent:
             return
-        covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+        covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         matching = self.parameters.matching
-        self._nodes.values[-1] = searched_node(self.log, self.odometry, self.state, covariance, matching)
+        if silent:
+            self.search = whereabouts(self.log, self.odometry, self.state, self.islands, covariance, silent, matching)
+        if self.search is not None and self.search.is_certain and not self.islands.is_apart:
+            self._move(self.search.moves)
+        elif self.search is not None and self.search.reach > matching.wide_cut:
+            self.islands.begin()
+        else:
+            self._search_beside_scan_before(covariance)
+
+    def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
+        """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
+        first = self.islands.start
+        self._nodes.values[-1] = searched_node(
+            self.log, self.odometry, self.state, covariance, self.parameters.matching, first
+        )
+
+    def _join(self, estimate: LiveEstimate) -> bool:
+        """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""
+        covariance, matching = estimate.covariance[:2, :2], self.parameters.matching
+        self.search = island_place(self.log, self.odometry, self.state, self.islands, covariance, matching)
+        if self.search.is_certain:
+            self._move(self.search.moves)
+            self.islands.join()
+        return self.search.is_certain
+
+    def _move(self, moves: np.ndarray) -> None:
+        """Move the newest nodes by `moves` (k, width)."""
+        self._nodes.values[-len(moves) :] += moves
 
 
 def _name_of(odometry: OdometryModel) -> np.ndarray:

@@ -10,6 +10,7 @@ from mlsm_manager.multi_view.comparing import Comparing
 from mlsm_manager.multi_view.comparisons import add_comparisons
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.frozen_map import joint_covariance, nearest_blocks
+from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations
@@ -33,13 +34,15 @@ class LiveWindow:
 
     estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
     standard deviations of the first node's pose, None where it defines the map. known: what was in the map before.
+    islands: which scans are compared with each other.
     """
 
     def __init__(
         self, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, state: State,
         estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
-        known: Optional[KnownSurfaces],
+        known: Optional[KnownSurfaces], islands: Islands,
     ) -> None:  # fmt: skip
+        self._islands = islands
         self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
         last = log.scan_count
         first = max(0, last - parameters.window.free_nodes)
@@ -71,6 +74,8 @@ class LiveWindow:
         recent = np.arange(self._recent, self._layout.last)
         importance = np.repeat(self._frozen.block_importance, self._scans_per_block)
         scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
+        same = self._islands.numbers[scans] == self._islands.newest
+        scans, importance = scans[same], importance[same]
         return LoneComparisons(self._log, self._odometry, self._parameters.matching, scans, importance)
 
     def _groups(self, first: int) -> np.ndarray:
@@ -138,12 +143,18 @@ class LiveWindow:
                 self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
             )
         to_frozen, to_recent = (
-            pairs_of(lists, sources, targets, cut, matching) for lists, targets in zip(self._lists, (frozen, recent))
+            pairs_of(lists, sources, targets, cut, matching, self._comparing.weighed)
+            for lists, targets in zip(self._lists, (frozen, recent))
+        )
+        to_frozen, to_recent = (
+            self._islands.within(pairs, sources, targets)
+            for pairs, targets in ((to_frozen, frozen), (to_recent, recent))
         )
         met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
         summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, matching)
+            to_known = self._islands.within(to_known, sources, known)
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])
         self._met = tuple(met)

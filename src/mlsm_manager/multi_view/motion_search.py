@@ -21,12 +21,18 @@ _NATS = 0.1  # that a point on a surface is worth: neighbours share errors
 
 
 def searched_node(
-    log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, matching: SurfaceMatching
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    covariance: np.ndarray,
+    matching: SurfaceMatching,
+    first: int = 0,
 ) -> np.ndarray:
     """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
 
-    covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
-    far from the expected one must fit better by what the motion's covariance asks (correlative search, Olson 2009).
+    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
+    is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
+    covariance asks (correlative search, Olson 2009).
     """
     newest = state.nodes[-1]
     transition = Transition.of(odometry, state.nodes[-2:], log.node_motion(np.array([-2, -1])))
@@ -34,11 +40,11 @@ def searched_node(
     if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut:
         return newest
     last = log.scan_count
-    before, own = log.rows(max(0, last - 1 - COMPARED_SCANS), last - 1), log.rows(last - 1, last)
+    before, own = log.rows(min(max(first, last - 1 - COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
     sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
-    shifts = _cells(step[:2, :2])
+    shifts = cells(step[:2, :2], _MOST_CELLS)
     found = _NATS * fits(sources, place(log, odometry, state, before), _moved(sources, shifts), matching)
     if matching.lone_quality:
         found = found + matching.lone_quality * _LONE_NATS * _lone_fits(log, odometry, state, shifts, matching)
@@ -67,10 +73,13 @@ def _lone_fits(
     return (near * sources.qualities).sum(axis=1)
 
 
-def _cells(covariance: np.ndarray) -> np.ndarray:
-    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none."""
+def cells(covariance: np.ndarray, most: int) -> np.ndarray:
+    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none.
+
+    They are a cell apart; farther where there would be more than `most` on each side.
+    """
     reach = _REACH * np.sqrt(np.diag(covariance))
-    cell = max(_CELL, float(reach.max()) / _MOST_CELLS)
+    cell = max(_CELL, float(reach.max()) / most)
     x, y = (cell * np.arange(-np.floor(one / cell), np.floor(one / cell) + 1.0) for one in reach)
     shifts = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(covariance))

@@ -76,9 +76,11 @@ class Recording:
 def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[Tuple[Scan, int]]:
     """Yield one scan of echoes per turn of the head, with its number of beams.
 
-    Its track begins a minute before its end and reaches 10 s beyond, for stamps that are to be moved.
+    Its track begins a minute before its end, or where the scan before ended if that was earlier, and reaches 10 s
+    beyond, for stamps that are to be moved.
     """
     collector, extractor, cloud = RevolutionCollector(), EchoExtractor(echoes), SonarToCloudParameters()
+    before = np.inf
     for placed in recording.beams:
         turn = collector.add(placed)
         if turn is None:
@@ -88,7 +90,8 @@ def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[
         except RefusedInput:
             continue
         end = found.stamp_ns * 1e-9
-        track = track_between(recording.track, end - _BEFORE, end + _AFTER)
+        track = track_between(recording.track, min(end - _BEFORE, before), end + _AFTER)
+        before = end
         yield Scan.from_stamps(found.points, found.time_stamps, end, track), len(turn)
 
 

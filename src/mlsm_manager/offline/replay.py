@@ -50,6 +50,12 @@ class Replayed:
         return sum(update.accepted and update.result is not None for update in self.updates)
 
     @property
+    def found_again(self) -> List[str]:
+        """How the vehicle was found again after silences of the sonar, a line for each."""
+        start = self.times[0]
+        return [f"{one.scan.reference_time - start:.0f} s: {one.found}" for one in self.updates if one.found]
+
+    @property
     def rejected(self) -> int:
         """Scans whose match was not accepted."""
         return sum(not update.accepted for update in self.updates)

@@ -22,6 +22,7 @@ def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: 
         "solver_kernel": parameters.solver_kernel.resolved.value,
         "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
         **({} if mapped.found is None else mapped.found.to_mapping()),
+        **({"found_again": mapped.replayed.found_again} if mapped.replayed.found_again else {}),
         **({"sessions": [session.to_mapping() for session in mapped.sessions]} if mapped.sessions else {}),
         **errors,
     }
@@ -43,6 +44,7 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
         found = session["found_after_scans"]
         place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
         lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
+    lines += [f"found again after a silence of the sonar at {line}" for line in summary.get("found_again", [])]
     if "loops" in summary:
         lines += [f"loop: {line}" for line in summary["loops"]["found"][:_MOST_LOOPS]]
     if "trust" in summary:

@@ -21,6 +21,7 @@ from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.odometry_agreement import against_odometry
 from mlsm_manager.self_check.path_spread import per_minute, told_deviation
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.wholeness import in_one_map
 
 # A window's worth of scans: fewer say too little of scale and delay.
 _FEWEST_SCANS = 20
@@ -96,6 +97,7 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
             np.array([estimate.surfaces for estimate in estimates]),
             solver.odometry.distance_deviation,
         ),
+        *in_one_map(ends, solver.islands.apart),
     ]
     found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
     before = Calibration.expected(solver)

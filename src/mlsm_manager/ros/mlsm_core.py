@@ -132,6 +132,8 @@ class MlsmCore:
         for update in taken.clouds:
             self._report_cloud(update, cloud.stamp_ns)
         report_scan(self.health, taken.scan, self._localiser.matching)
+        if taken.scan.found:
+            rospy.loginfo("%s: found again after a silence of the sonar: %s", self.health.name, taken.scan.found)
         report_verdicts(self.health, self._localiser.verdicts())
         self._publish_fix(taken.scan, cloud.stamp_ns)
 

@@ -10,6 +10,7 @@ import numpy as np
 from node_support.kernels import Kernel
 from node_support.numba_cache import prepare_cache
 from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.pause import long_after
 from sonar_processing.beams.placed_beam import PlacedBeam, servo_moved
 from sonar_processing.beams.projection import bin_headings, kept_bins, project_beams
 from sonar_processing.cloud import IntensityCloud
@@ -64,8 +65,11 @@ class ScanAssembler:
 
         A scan ends after `scan_size` beams or when the next beam is expected where the scan began. It also ends when
         the servo moved or when the last beams of a turn were lost: then the new beam belongs to the next scan. In the
-        continuous modes every beam returns the newest `scan_size` beams.
+        continuous modes every beam returns the newest `scan_size` beams. An unfinished scan before a long silence of
+        the head is forgotten: it would come long after its time.
         """
+        if self._last is not None and long_after(placed.beam, self._last):
+            self.clear()
         finished = self._finish() if self._begins_a_scan(placed.beam) else None
         self._last = placed.beam
         self._turn.add(placed.beam.angle)

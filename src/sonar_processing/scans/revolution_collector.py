@@ -4,6 +4,7 @@ from collections import deque
 from typing import Deque, List, Optional
 
 from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.pause import long_after
 from sonar_processing.beams.placed_beam import PlacedBeam, servo_moved
 from sonar_processing.scans.head_turn import HeadTurn
 
@@ -29,8 +30,8 @@ class RevolutionCollector:
     def add(self, placed: PlacedBeam) -> Optional[List[PlacedBeam]]:
         """Add a beam; return the beams of the turn or sweep that it completes, or None.
 
-        All beams of a turn have the same bins. A turn in which the servo or the range of the sonar changed is
-        forgotten; a sweep ends where the head goes back.
+        All beams of a turn have the same bins. A turn in which the servo or the range of the sonar changed, or the head
+        was silent for long, is forgotten; a sweep ends where the head goes back.
         """
         beam, finished = placed.beam, None
         if self._beams and _differs(beam, self._beams[-1].beam):
@@ -52,6 +53,7 @@ class RevolutionCollector:
 def _differs(beam: Beam, earlier: Beam) -> bool:
     return (
         servo_moved(beam, earlier)
+        or long_after(beam, earlier)
         or beam.intensities.size != earlier.intensities.size
         or beam.range_resolution != earlier.range_resolution
         or beam.frame_id != earlier.frame_id

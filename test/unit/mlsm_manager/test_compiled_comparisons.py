@@ -53,6 +53,24 @@ def test_sums_of_any_comparisons_are_the_same(seed, count, scans):
             np.testing.assert_allclose(found, expected, rtol=SAME, atol=SAME * np.abs(expected).max())
 
 
+@given(st.integers(0, 10**6), st.integers(0, 100))
+@settings(max_examples=30)
+def test_comparisons_count_as_much(seed, count):
+    rng, matching = np.random.RandomState(seed), SurfaceMatching()
+    sources, targets = some_points(rng, 30, [5, 6]), some_points(rng, 40, [0, 1, 2])
+    found = (
+        np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count), rng.uniform(0.0, 3.0, count),
+        rng.uniform(0.1, 1.0, count),
+    )  # fmt: skip
+    expected, pairs = (
+        Comparing.by(kernel).weighed(found, sources, targets, matching.cut, matching)
+        for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA)
+    )
+    np.testing.assert_array_equal(pairs.rows, expected.rows)
+    np.testing.assert_array_equal(pairs.neighbours, expected.neighbours)
+    np.testing.assert_allclose(pairs.importance, expected.importance, rtol=SAME)
+
+
 @given(st.integers(0, 10**6), st.integers(0, 20))
 @settings(max_examples=30)
 def test_blocks_are_added_to_the_same_places_of_a_matrix(seed, count):

@@ -6,6 +6,7 @@ from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
 from node_support.errors import RefusedInput
@@ -113,6 +114,15 @@ def test_a_scan_that_comes_twice_is_refused_and_the_run_goes_on():
 def test_a_run_says_whether_it_can_be_trusted():
     localiser, _ = localiser_after(6)
     assert [verdict.fires for verdict in localiser.verdicts()] == [False, False]
+
+
+def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
+    localiser = PARAMETERS.changed({"odometry": OdometryKind.HEADING}).build_localiser(SONAR_IN_BASE)
+    for scan in tour(22).scans:
+        localiser.take_scan(scan)
+    first, again = (next(v for v in localiser.verdicts() if v.name == "scans go on") for _ in range(2))
+    assert first.limit < first.value <= 1.0
+    assert again.value == first.value
 
 
 def test_late_beams_make_it_wait_for_odometry():

@@ -297,3 +297,11 @@ def test_projecting_a_beam_shows_it_and_leaves_the_scan_alone():
     shown = assembler.project(_placed(seconds=1))
     assert shown.points[:, 3].tolist() == [20, 30]
     assert assembler.add(_placed(seconds=2)) is None
+
+
+def test_an_unfinished_scan_before_a_silence_is_forgotten():
+    assembler = _assembler(scan_size=3)
+    assembler.add(_placed(seconds=1))
+    later = [assembler.add(_placed(seconds=seconds)) for seconds in (100, 101, 102)]
+    assert later[:2] == [None, None]
+    assert np.unique(np.abs(later[2].time_stamps)).tolist() == [100, 101, 102]

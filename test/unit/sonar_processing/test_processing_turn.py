@@ -1,6 +1,7 @@
 """When a turn of the head is over, and which beams it holds."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,10 +17,12 @@ STEP = math.radians(3.0)
 
 
 def _turns(beams):
-    """Return the seconds of the beams of every turn; beams are dictionaries for `beam_of`."""
+    """Return the `seconds` of the beams of every turn; beams are dictionaries for `beam_of`, ten in a second."""
     collector = RevolutionCollector()
-    turns = [collector.add(PlacedBeam(beam_of(**beam), np.eye(4), is_moving=False)) for beam in beams]
-    return [[placed.beam.stamp_ns // 10**9 for placed in turn] for turn in turns if turn is not None]
+    made = [beam_of(**beam) for beam in beams]
+    made = [replace(beam, stamp_ns=beam.stamp_ns // 10) for beam in made]
+    turns = [collector.add(PlacedBeam(beam, np.eye(4), is_moving=False)) for beam in made]
+    return [[placed.beam.stamp_ns // 10**8 for placed in turn] for turn in turns if turn is not None]
 
 
 def _lengths(angles):
@@ -93,3 +96,9 @@ def test_a_sector_after_whole_turns_gives_its_sweeps():
 def test_a_change_of_range_forgets_only_the_turn_in_which_it_happens():
     beams = [{"angle": STEP * number, "strengths": (1,) * (3 if number < 150 else 5)} for number in range(400)]
     assert [len(turn) for turn in _turns(beams)] == [120, 120, 120]
+
+
+def test_beams_before_and_after_a_silence_make_no_turn_together():
+    before = [{"angle": STEP * number, "seconds": number} for number in range(50)]
+    after = [{"angle": STEP * number, "seconds": 1000 + number} for number in range(50, 180)]
+    assert _turns(before + after) == [list(range(1050, 1170))]

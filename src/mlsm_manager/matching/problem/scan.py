@@ -87,6 +87,10 @@ class Scan:
             return self
         return Scan(self.points[known], self.times[known], self.moving[known], self.track, self.reference_time)
 
+    def without_points(self, end: float) -> "Scan":
+        """Return a scan that ends at `end` [s] and heard nothing, with the same odometry."""
+        return Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), self.track, end)
+
     @property
     def start(self) -> float:
         """Time of the oldest point, s; the reference time when there is none."""

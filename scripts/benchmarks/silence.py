@@ -1,0 +1,182 @@
+"""Prints where a vehicle finds itself again after its sonar heard nothing for minutes, while it moved on.
+
+PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.silence [--tours basin_ahead_tour ...] [--odometry heading dvl]
+    [--seeds N] [--seconds S] [--marina]
+
+One line per tour, odometry, kind of silence and beginning of it. The error is that of the position against where it
+should be, the marina's against the path by its own DVL without the silence.
+"""
+
+import argparse
+from dataclasses import replace
+from enum import Enum
+from typing import Iterator, List, NamedTuple, Tuple
+
+import numpy as np
+
+from benchmarks.heads import recorded as recording_of
+from benchmarks.heads import simulated, tour_setup
+from benchmarks.recorded import recorded
+from benchmarks.twins.odometry import reported
+from benchmarks.twins.parameters import TwinParameters
+from benchmarks.without_dvl import HEAD
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.echo_length import echo_sigma
+from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
+from mlsm_manager.offline.odometry_kind import with_odometry
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.geometry.planar import composed, inverse, matrices
+from recordings.reading.reader import Request
+
+TOURS = ("harbour_ahead_tour", "basin_ahead_tour")
+SHARES = (0.4, 0.55, 0.7)  # of the run's length, where the silence begins
+_SURE = 3.0  # told deviations
+_FIXED = 6.0  # m told, from which on a place is known
+_WRONG = 3.0  # m: as far off no wall of the map is met, and a second one is drawn
+
+
+class Silence(Enum):
+    """What is missing in the recording."""
+
+    NO_BEAMS = "no beams"
+    NO_ECHOES = "beams without echoes"
+    NOTHING = "neither beams nor odometry"
+
+
+class Figures(NamedTuple):
+    """Of the fixes after a silence.
+
+    before: error of the last fix before it [m]. way: by which the vehicle was carried on meanwhile [m]. turns: scans
+    until the first fix that is told to be good. first, told: error of that and its deviation [m]. end: of the last one.
+    most: of all from then on. lies: share of all since the silence that are wrong and farther off than three told
+    deviations.
+    """
+
+    before: float
+    way: float
+    turns: int
+    first: float
+    told: float
+    end: float
+    most: float
+    lies: float
+
+    def line(self) -> str:
+        """Return them for people."""
+        return (
+            f"{self.way:.0f} m on, error before {self.before:.2f} m; first fix after {self.turns} scans "
+            f"{self.first:.2f} m off with {self.told:.2f} m told; then at most {self.most:.2f} m, at the end "
+            f"{self.end:.2f} m; wrong but surely told {100.0 * self.lies:.0f} %"
+        )
+
+
+def silenced(recording: Recording, kind: Silence, start: float, seconds: float) -> Recording:
+    """Return the recording without what is missing from `start` on for `seconds` [s]."""
+    end, beams = start + seconds, []
+    for placed in recording.beams:
+        if not start <= placed.beam.stamp_ns * 1e-9 < end:
+            beams.append(placed)
+        elif kind is Silence.NO_ECHOES:
+            silent = replace(placed.beam, intensities=np.zeros_like(placed.beam.intensities))
+            beams.append(replace(placed, beam=silent))
+    track = recording.track
+    if kind is Silence.NOTHING:
+        known = (track.times < start) | (track.times >= end)
+        track = Track(track.times[known], track.poses[known])
+    return replace(recording, beams=beams, track=track)
+
+
+def replayed(recording: Recording, kind: OdometryKind, shape: EchoShape) -> Replayed:
+    """Return what map_bag makes of a recording of an odometry and of a sonar whose echoes have a shape."""
+    sigma = echo_sigma([placed.beam for placed in recording.beams])
+    parameters = suited(with_odometry(ReplayParameters(), kind, ()), shape, (), sigma)
+    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
+    return replay(recording, scans, parameters, lambda count: None)
+
+
+def figures(found: Replayed, truth: Track, start: float, seconds: float) -> Figures:
+    """Return those of a replay with a silence; truth: T_map_base as it should be."""
+    fixes = [one for one in found.updates if one.accepted and one.result is not None]
+    times = np.array([one.scan.reference_time for one in fixes])
+    error = np.hypot(*(np.array([one.result.pose[:2] for one in fixes]) - truth.at(times)[:, :2]).T)
+    told = np.array([np.sqrt(np.trace(one.result.covariance[:2, :2])) for one in fixes])
+    before, after = times < start, times > start + seconds
+    way = float(np.hypot(*np.diff(truth.at(np.array([start, start + seconds]))[:, :2], axis=0)[0]))
+    lies = float((error > np.maximum(_SURE * told, _WRONG))[after].mean()) if after.any() else np.nan
+    known = np.flatnonzero(after & (told < _FIXED))
+    if not len(known):
+        return Figures(error[before][-1], way, int(after.sum()), np.nan, np.nan, error[-1], np.nan, lies)
+    first = int(known[0])
+    turns = int(after[: first + 1].sum())
+    return Figures(error[before][-1], way, turns, error[first], told[first], error[-1], error[known].max(), lies)
+
+
+def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[str, Recording, Track]]:
+    """Yield simulated tours: name, recording and where the vehicle is in the map that begins where it does."""
+    for name in names:
+        tour = simulated(tour_setup(*name.split("_", 1), HEAD))
+        for seed in range(seeds):
+            made = reported(tour.truth, TwinParameters(direction=0.0, scale=0.01), np.random.RandomState(seed)).poses
+            odometry = made * [0.0, 0.0, 1.0] if kind is OdometryKind.HEADING else made
+            origin = np.append(tour.truth.poses[0, :2] - odometry[0, :2], 0.0)
+            yield (
+                f"{name}, seed {seed}",
+                recording_of(tour, Track(tour.truth.times, odometry)),
+                Track(tour.truth.times, tour.truth.poses - origin),
+            )
+
+
+def marina(kind: OdometryKind) -> Tuple[str, Recording, Track]:
+    """Return the marina's first part, and the vehicle's path in it by its DVL."""
+    recording = read_recording(recorded("marina_first.bag"), Request())
+    whole = replayed(recording, OdometryKind.DVL, echo_shape_of([placed.beam for placed in recording.beams]))
+    truth = Track(whole.times, whole.corrected)
+    if kind is OdometryKind.HEADING:
+        recording = heading_only(recording)
+    return "marina", recording, truth
+
+
+def heading_only(recording: Recording) -> Recording:
+    """Return the recording with positions that stay at 0."""
+    track = Track(recording.track.times, recording.track.poses * [0.0, 0.0, 1.0])
+    times = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
+    moves = matrices(composed(track.at(times), inverse(recording.track.at(times))))
+    beams = [
+        replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in zip(recording.beams, moves)
+    ]
+    return replace(recording, track=track, beams=beams)
+
+
+def main() -> None:
+    """Print one line per silence."""
+    parser = argparse.ArgumentParser(prog="benchmarks.silence", description=__doc__)
+    parser.add_argument("--tours", nargs="*", default=TOURS, choices=TOURS, help="which ones; default: all")
+    parser.add_argument("--odometry", nargs="+", default=["heading", "dvl"], choices=["heading", "dvl"])
+    parser.add_argument("--seeds", type=int, default=1, help="compasses with each tour (default: %(default)s)")
+    parser.add_argument("--seconds", type=float, default=120.0, help="of silence (default: %(default)s)")
+    parser.add_argument("--marina", action="store_true", help="the marina's recording as well")
+    options = parser.parse_args()
+    for kind in (OdometryKind(name.upper()) for name in options.odometry):
+        for name, recording, truth in _runs(options, kind):
+            shape = echo_shape_of([placed.beam for placed in recording.beams])
+            for silence in Silence:
+                for share in SHARES:
+                    start = recording.track.times[0] + share * recording.seconds
+                    missing = silenced(recording, silence, start, options.seconds)
+                    found = figures(replayed(missing, kind, shape), truth, start, options.seconds)
+                    told = f"{name}, {kind.value.lower()}, {silence.value} from {share * recording.seconds:.0f} s on"
+                    print(f"{told}: {found.line()}", flush=True)
+
+
+def _runs(options: argparse.Namespace, kind: OdometryKind) -> Iterator[Tuple[str, Recording, Track]]:
+    yield from tours(options.tours, kind, options.seeds)
+    if options.marina:
+        yield marina(kind)
+
+
+if __name__ == "__main__":
+    main()
