@@ -109,6 +109,7 @@ class LiveSolver:
 
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
+
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
