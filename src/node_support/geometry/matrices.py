@@ -10,7 +10,9 @@ _IDENTITY = np.eye(4)
 
 def pose_matrix(xyz: Sequence[float], rpy: Sequence[float] = (0.0, 0.0, 0.0)) -> np.ndarray:
     """Return the (4, 4) pose at `xyz` m, turned by `rpy` rad about the fixed axes x, y, z (as SDF does)."""
-    (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = np.sin(rpy), np.cos(rpy)
+    angles = np.asarray(rpy, dtype=np.float64)
+    # Python multiplies its own numbers several times faster than numpy's.
+    (sin_r, sin_p, sin_y), (cos_r, cos_p, cos_y) = np.sin(angles).tolist(), np.cos(angles).tolist()
     pose = _IDENTITY.copy()
     pose[:3, :3] = [
         [cos_y * cos_p, cos_y * sin_p * sin_r - sin_y * cos_r, cos_y * sin_p * cos_r + sin_y * sin_r],
