@@ -153,7 +153,8 @@ class _Batch:
     def _met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         matching = self._parameters.matching
-        points = place(self._log, self._odometry, self.state, self._log.rows(0, self._layout.last))
+        rows = self._log.rows(0, self._layout.last)
+        points = place(self._log, self._odometry, self.state, rows, self._comparing.placed)
         if self._lists is None:
             self._lists = self._comparing.neighbours(points, matching.block_scans)
         pairs = pairs_of(self._lists, points, points, matching.cut, matching, self._comparing.weighed)

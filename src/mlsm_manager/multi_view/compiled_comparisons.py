@@ -8,6 +8,7 @@ from typing import Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.association import COSINE_FADING, FADING, Pairs
+from mlsm_manager.multi_view.compiled_cells import Cells, sorted_into_cells
 from mlsm_manager.multi_view.compiled_search import shared_neighbours
 from mlsm_manager.multi_view.compiled_sums import POINT_COLUMNS, scattered_blocks, summed_comparisons
 from mlsm_manager.multi_view.compiled_weights import weighed_pairs
@@ -32,10 +33,11 @@ class CompiledNeighbours:
             return nothing, nothing, np.empty(0), np.empty(0)
         if not (np.isfinite(sources.places).all() and np.isfinite(targets.places).all()):
             raise ValueError("points without a finite place")
+        places, other_places = np.ascontiguousarray(sources.places), np.ascontiguousarray(targets.places)
+        cells = Cells(*sorted_into_cells(places, other_places, cut + TIE))
         return shared_neighbours(
-            np.ascontiguousarray(sources.places), np.ascontiguousarray(sources.scans),
-            np.ascontiguousarray(targets.places), np.ascontiguousarray(targets.scans),
-            self._blocks, self._count, float(cut), TIE,
+            places, np.ascontiguousarray(sources.scans), other_places, np.ascontiguousarray(targets.scans),
+            self._blocks, self._count, cut, TIE, *cells,
         )  # fmt: skip
 
 

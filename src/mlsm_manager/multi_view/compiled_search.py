@@ -11,25 +11,24 @@ from collections import namedtuple
 import numpy as np
 from numba import njit
 
-from mlsm_manager.multi_view.compiled_cells import grid_around, in_cells
-
 CANDIDATES = 6
 """Nearest points of a block that may share a comparison."""
-_CELLS_PER_REACH = 2  # small cells leave less to compare for each source, but more to gather
 _HALF_DIAGONAL = 0.7072  # of a cell, in sides, rounded up
 _SLACK = 1e-9  # m, and of a squared distance: so far may it be rounded
 _NEVER = 1e300  # m^2: no point is so far away
 _FIRST_CAPACITY = 1024
 
+_Grid = namedtuple("_Grid", "low_x low_y rows columns side span")
+"""See compiled_cells.Cells."""
 _Targets = namedtuple("_Targets", "x y scan block row")
 """Points in the order of their cells; row: (k,) where each stood before."""
-_Around = namedtuple("_Around", "place square nearest scan other bound")
+_Around = namedtuple("_Around", "place square count nearest scan other bound")
 """What lies around the middle of a cell. place, square: (k,) points and their squared distances. Of each block (b,):
-the squared distance of the nearest one, its scan, the squared distance of the nearest one of another scan, and that up
-to which points may be neighbours of a source in the cell."""
-_Near = namedtuple("_Near", "x y scan row square starts")
-"""Points that may be neighbours, block by block. starts: (b + 2,) where each block begins. square: (k,) their squared
-distances from one source."""
+its number of points, the squared distance of the nearest one, its scan, the squared distance of the nearest one of
+another scan, and that up to which points may be neighbours of a source in the cell."""
+_Near = namedtuple("_Near", "x y scan row square starts ends blocks")
+"""Points that may be neighbours, block by block. starts, ends: (b,) where those of each block stand. blocks: (b,) those
+that have any. square: (k,) squared distances from one source."""
 _Candidates = namedtuple("_Candidates", "distance row")
 _Found = namedtuple("_Found", "neighbours distances shares")
 
@@ -76,21 +75,22 @@ def _longer(found, least):
 
 
 @njit(cache=True)
-def _look_around(row, column, reach, grid, starts, targets, around):
-    """Write down what lies around a cell; return how many points that are."""
-    x, y = grid.low_x + (column + 0.5) * grid.side, grid.low_y + (row + 0.5) * grid.side
-    farthest, count = (reach + _HALF_DIAGONAL * grid.side) ** 2, 0
-    around.nearest[:], around.other[:], around.scan[:] = _NEVER, _NEVER, -1
+def _look_around(row, column, among_sources, grid, starts, targets, around):
+    """Write down what lies around a cell; return how many points that are.
+
+    among_sources: whether the scans of the targets may be those of sources, which do not find what they heard.
+    """
+    x, y, count = grid.low_x + (column + 0.5) * grid.side, grid.low_y + (row + 0.5) * grid.side, 0
+    around.nearest[:], around.other[:], around.scan[:], around.count[:] = _NEVER, _NEVER, -1, 0
     first, last = max(0, column - grid.span), min(grid.columns - 1, column + grid.span)
     for line in range(max(0, row - grid.span), min(grid.rows - 1, row + grid.span) + 1):
         for place in range(starts[line * grid.columns + first], starts[line * grid.columns + last + 1]):
             across, along = targets.x[place] - x, targets.y[place] - y
             square, block = across * across + along * along, targets.block[place]
-            if square >= farthest:
-                continue
             around.place[count], around.square[count] = place, square
             count += 1
-            if targets.scan[place] == around.scan[block]:
+            around.count[block] += 1
+            if not among_sources or targets.scan[place] == around.scan[block]:
                 around.nearest[block] = min(around.nearest[block], square)
             elif square < around.nearest[block]:
                 around.other[block], around.nearest[block] = around.nearest[block], square
@@ -117,44 +117,65 @@ def _write_bounds(scans, reach, radius, tie, around):
 
 @njit(cache=True)
 def _take_near(count, around, targets, near):
-    """Write down, block by block, those of `count` points around a cell that are within the bounds; return how many."""
-    near.starts[:] = 0
-    for entry in range(count):
-        block = targets.block[around.place[entry]]
-        if around.square[entry] <= around.bound[block]:
-            near.starts[block + 2] += 1
+    """Write down, block by block, those of `count` points around a cell that are within the bounds.
+
+    Return how many blocks have any. There is no branch for each point, which would be guessed wrongly too often.
+    """
+    start = 0
     for block in range(len(around.bound)):
-        near.starts[block + 2] += near.starts[block + 1]
+        near.starts[block], near.ends[block] = start, start
+        start += around.count[block]
     for entry in range(count):
         place = around.place[entry]
         block = targets.block[place]
-        if around.square[entry] <= around.bound[block]:
-            own = near.starts[block + 1]
-            near.starts[block + 1] = own + 1
-            near.x[own], near.y[own] = targets.x[place], targets.y[place]
-            near.scan[own], near.row[own] = targets.scan[place], targets.row[place]
-    return near.starts[-1]
+        own = near.ends[block]
+        near.x[own], near.y[own] = targets.x[place], targets.y[place]
+        near.scan[own], near.row[own] = targets.scan[place], targets.row[place]
+        near.ends[block] = own + (1 if around.square[entry] <= around.bound[block] else 0)
+    blocks = 0
+    for block in range(len(around.bound)):
+        if near.ends[block] > near.starts[block]:
+            near.blocks[blocks] = block
+            blocks += 1
+    return blocks
 
 
 @njit(cache=True)
 def _measure(x, y, scan, count, near):
-    """Write the squared distances of the `count` near points from x, y; what the same scan heard is never near."""
+    """Write the squared distances of the first `count` places from x, y; what the same scan heard is never near."""
     for place in range(count):
         across, along = near.x[place] - x, near.y[place] - y
         near.square[place] = across * across + along * along if near.scan[place] != scan else _NEVER
 
 
 @njit(cache=True)
-def _write_nearest(cut, tie, near, candidates, found, made):
+def _nearest_place(start, end, near):
+    """Return where from `start` to before `end` the nearest point stands."""
+    least, nearest = _NEVER, start
+    for place in range(start, end):
+        nearer = near.square[place] < least
+        least = near.square[place] if nearer else least
+        nearest = place if nearer else nearest
+    return nearest
+
+
+@njit(cache=True)
+def _write_nearest(blocks, cut, tie, near, candidates, found, made):
     """Write the points of each block nearest to one source after the `made` ones; return how many are written then."""
-    for block in range(len(near.starts) - 2):
-        start, end = near.starts[block], near.starts[block + 1]
-        least = _NEVER
-        for place in range(start, end):
-            least = near.square[place] if near.square[place] < least else least
-        if least >= cut * cut:
+    for number in range(blocks):
+        start, end = near.starts[near.blocks[number]], near.ends[near.blocks[number]]
+        nearest = _nearest_place(start, end, near)
+        if near.square[nearest] >= cut * cut:
             continue
-        limit, held = (np.sqrt(least) + tie) ** 2 * (1.0 + _SLACK), 0
+        distance = np.sqrt(near.square[nearest])
+        limit, held = (distance + tie) ** 2 * (1.0 + _SLACK), 0
+        for place in range(start, end):
+            held += near.square[place] <= limit
+        if held == 1:
+            found.neighbours[made], found.distances[made], found.shares[made] = near.row[nearest], distance, 1.0
+            made += 1
+            continue
+        held = 0
         for place in range(start, end):
             if near.square[place] <= limit:
                 held = _kept(candidates, held, np.sqrt(near.square[place]), near.row[place])
@@ -180,46 +201,57 @@ def _in_order(starts, ends, found):
     return rows, neighbours, distances, shares
 
 
+@njit(cache=True)
+def _room(points, blocks):
+    """Return room for what lies around a cell, and for what is near its sources."""
+    around = _Around(
+        np.empty(points, np.int64), np.empty(points), np.empty(blocks, np.int64), np.empty(blocks),
+        np.empty(blocks, np.int64), np.empty(blocks), np.empty(blocks),
+    )  # fmt: skip
+    near = _Near(
+        np.empty(points), np.empty(points), np.empty(points, np.int64), np.empty(points, np.int64), np.empty(points),
+        np.empty(blocks, np.int64), np.empty(blocks, np.int64), np.empty(blocks, np.int64),
+    )  # fmt: skip
+    return around, near
+
+
 @njit(
-    "Tuple((i8[::1], i8[::1], f8[::1], f8[::1]))(f8[:,::1], i8[::1], f8[:,::1], i8[::1], i8[::1], i8, f8, f8)",
+    "Tuple((i8[::1], i8[::1], f8[::1], f8[::1]))(f8[:,::1], i8[::1], f8[:,::1], i8[::1], i8[::1], i8, f8, f8,"
+    "f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1])",
     cache=True,
     error_model="numpy",
 )
-def shared_neighbours(sources, source_scans, places, scans, blocks, count, cut, tie):
+def shared_neighbours(
+    sources, source_scans, places, scans, blocks, count, cut, tie,
+    low_x, low_y, rows, columns, side, span, target_starts, target_order, source_starts, source_order,
+):  # fmt: skip
     """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see association.Neighbours.
 
     sources: (n, 2) m. places: (k, 2) m, scans: (k,), blocks: (k,) from 0 to before `count`: of the targets, k > 0.
+    low_x to source_order: Cells for a reach of `cut` + `tie`.
     """
-    reach, size = cut + tie, len(places)
-    grid = grid_around(places, reach, _CELLS_PER_REACH)
-    radius = _HALF_DIAGONAL * grid.side
-    target_starts, order = in_cells(places, grid)
-    targets = _Targets(places[order, 0], places[order, 1], scans[order], blocks[order], order)
-    source_starts, source_order = in_cells(sources, grid)
-    around = _Around(
-        np.empty(size, np.int64), np.empty(size), np.empty(count), np.empty(count, np.int64), np.empty(count),
-        np.empty(count),
-    )  # fmt: skip
-    near = _Near(
-        np.empty(size), np.empty(size), np.empty(size, np.int64), np.empty(size, np.int64), np.empty(size),
-        np.empty(count + 2, np.int64),
-    )  # fmt: skip
+    reach, radius = cut + tie, _HALF_DIAGONAL * side
+    grid = _Grid(low_x, low_y, rows, columns, side, span)
+    x, y = places[:, 0].copy()[target_order], places[:, 1].copy()[target_order]
+    targets = _Targets(x, y, scans[target_order], blocks[target_order], target_order)
+    around, near = _room(len(places), count)
+    among_sources = scans.max() >= source_scans.min() and scans.min() <= source_scans.max()
     candidates = _Candidates(np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64))
     found = _Found(np.empty(_FIRST_CAPACITY, np.int64), np.empty(_FIRST_CAPACITY), np.empty(_FIRST_CAPACITY))
     starts, ends = np.zeros(len(sources), np.int64), np.zeros(len(sources), np.int64)
     made = 0
-    for cell in range(grid.rows * grid.columns):
+    for cell in range(rows * columns):
         own = source_order[source_starts[cell] : source_starts[cell + 1]]
         if not len(own):
             continue
-        looked_at = _look_around(cell // grid.columns, cell % grid.columns, reach, grid, target_starts, targets, around)
+        looked_at = _look_around(cell // columns, cell % columns, among_sources, grid, target_starts, targets, around)
         _write_bounds(source_scans[own], reach, radius, tie, around)
-        taken = _take_near(looked_at, around, targets, near)
+        blocks_near = _take_near(looked_at, around, targets, near)
         for source in own:
             if made + count * CANDIDATES > len(found.shares):
                 found = _longer(found, made + count * CANDIDATES)
             starts[source] = made
-            _measure(sources[source, 0], sources[source, 1], source_scans[source], taken, near)
-            made = _write_nearest(cut, tie, near, candidates, found, made)
+            _measure(sources[source, 0], sources[source, 1], source_scans[source], looked_at, near)
+            made = _write_nearest(blocks_near, cut, tie, near, candidates, found, made)
             ends[source] = made
     return _in_order(starts, ends, found)

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.placement import PlacedPoints, place
+from mlsm_manager.multi_view.placement import PlacedPoints, Placing, place, placed
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import POSE_COLUMNS, State
 
@@ -41,6 +41,7 @@ def nearest_blocks(
     count: int,
     place_now: np.ndarray,
     parameters: MultiViewParameters,
+    placing: Placing = placed,
 ) -> FrozenMap:
     """Return the blocks nearest to `place_now` (2,) among the first `count` blocks of the run."""
     scans = parameters.matching.block_scans
@@ -52,7 +53,7 @@ def nearest_blocks(
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
     )
-    points = place(log, odometry, state, rows)
+    points = place(log, odometry, state, rows, placing)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
     return FrozenMap(points, per_point, numbers, importance[numbers], state.run.copy())
 

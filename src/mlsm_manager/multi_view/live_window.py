@@ -44,6 +44,7 @@ class LiveWindow:
     ) -> None:  # fmt: skip
         self._islands = islands
         self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
+        self._comparing = Comparing.by(parameters.kernel)
         last = log.scan_count
         first = max(0, last - parameters.window.free_nodes)
         self._scans_per_block = parameters.matching.block_scans
@@ -55,6 +56,7 @@ class LiveWindow:
             first // self._scans_per_block,
             log.node_poses(last)[:2] + state.nodes[last, :2],
             parameters,
+            self._comparing.placed,
         )
         self._layout = Layout(first, last, odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
@@ -63,7 +65,6 @@ class LiveWindow:
         self._start, self._known = start, known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
-        self._comparing = Comparing.by(parameters.kernel)
         self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
         self._met = ()
         self._lone = self._lone_comparisons()
@@ -135,8 +136,9 @@ class LiveWindow:
 
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
         matching = self._parameters.matching
-        recent = place(self._log, self._odometry, self._state, self._log.rows(self._recent, self._layout.last))
-        sources = recent.selected(recent.scans >= self._layout.first)
+        rows = self._log.rows(self._recent, self._layout.last)
+        recent = place(self._log, self._odometry, self._state, rows, self._comparing.placed)
+        sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         frozen = self._frozen.moved_by_run(self._state.run)
         if self._lists is None:
             self._lists = tuple(

@@ -59,7 +59,7 @@ class OdometryModel(Protocol):
         """Add what ties the free nodes together. nodes: (n, width), motion: (n), of nodes layout.first to last."""
 
     def reference(self, motion: Motion) -> np.ndarray:
-        """Return the positions (m,) x + i y [m] of the reference path."""
+        """Return the positions (m,) x + i y [m] of the reference path; even where the motion is."""
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         """Return the complex factors (n,) of the reference path after `nodes` (n, width)."""

@@ -67,6 +67,11 @@ class OdometryTimeline:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""
         return _between(times, self._times.values, self._poses.values)
 
+    def between(self, start: float, end: float) -> Motion:
+        """Return the known poses between `start` and `end` [s], and the nearest beyond both."""
+        near = _around(self._times.values, start, end)
+        return Motion(self._times.values[near], self._poses.values[near], self._ahead.values[near])
+
     def velocity_at(self, time: float) -> np.ndarray:
         """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
         before, after = self.at(np.array([time - _WINDOW, time]))
@@ -83,7 +88,12 @@ def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.nda
     Only what lies around `times` is touched: the cost does not grow with the run.
     """
     if times.size and len(known):
-        first, last = np.searchsorted(known, [times.min(), times.max()])
-        near = slice(max(first - 1, 0), last + 2)
+        near = _around(known, times.min(), times.max())
         known, values = known[near], values[near]
     return np.stack([np.interp(times, known, column) for column in values.T], axis=-1)
+
+
+def _around(known: np.ndarray, start: float, end: float) -> slice:
+    """Return which of the times `known` (n,) lie between `start` and `end`, and the nearest beyond."""
+    first, last = np.searchsorted(known, [start, end])
+    return slice(max(first - 1, 0), last + 2)

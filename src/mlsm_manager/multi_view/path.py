@@ -27,6 +27,14 @@ class NodePath:
         gain = odometry.gain(nodes)
         self._gain, self._last_gain = (gain[:-1] + gain[1:]) / 2.0, gain[-1:]
 
+    @property
+    def table(self) -> np.ndarray:
+        """(n, 8): times of the nodes, places x y, yaw, reference path x y, and the gain x y from each to the next."""
+        gain = np.append(self._gain, self._last_gain)
+        columns = (self._times, self._places, self._nodes[:, YAW], self._reference, gain)
+        parts = [(one.real, one.imag) if np.iscomplexobj(one) else (one,) for one in columns]
+        return np.column_stack([part for pair in parts for part in pair])
+
     def poses(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s] between nodes `legs` (m,) and the next ones, or about there."""
         return self._poses_of(self._timeline.motion(times), legs)

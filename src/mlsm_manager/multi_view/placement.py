@@ -1,6 +1,7 @@
 """Where the points of scans lie in the map, given the unknowns, and how these move them."""
 
 from dataclasses import dataclass, fields, replace
+from typing import Callable, Union
 
 import numpy as np
 
@@ -11,7 +12,8 @@ from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE, YAW, State
 from mlsm_manager.multi_view.surface_points import SurfacePoints
 from node_support.geometry.planar import rotated
 
-_HALF_SECOND = 0.5  # s: the velocity of a point is averaged over one second, longer than the odometry's period
+HALF_SECOND = 0.5
+"""s: the velocity of a point is averaged over one second, longer than the odometry's period."""
 
 
 @dataclass(frozen=True)
@@ -41,24 +43,19 @@ class PlacedPoints:
         places = self.places + self.by_run @ change
         return replace(self, places=places)
 
-    def selected(self, rows: np.ndarray) -> "PlacedPoints":
-        """Return the points in `rows`: indices, or (n,) bool."""
+    def selected(self, rows: Union[np.ndarray, slice]) -> "PlacedPoints":
+        """Return the points in `rows`: indices, (n,) bool, or a slice, which copies nothing."""
         return PlacedPoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
 
-def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the surface points in `rows` of the log; NodePath says where the vehicle was between two nodes."""
-    return _placed(log, odometry, state, log.points(rows), log.scans(rows))
+Placing = Callable[[RunLog, OdometryModel, State, SurfacePoints, np.ndarray], PlacedPoints]
+"""Takes the log, the odometry, the state, points and the scans (n,) that heard them."""
 
 
-def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the lone points in `rows` of the log's table of these."""
-    return _placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
-
-
-def _placed(
+def placed(
     log: RunLog, odometry: OdometryModel, state: State, points: SurfacePoints, scans: np.ndarray
 ) -> PlacedPoints:
+    """Return points in the map; see Placing. NodePath says where the vehicle was between two nodes."""
     times = points.times + state.run[DELAY]
     nodes = np.unique(np.concatenate([scans, scans + 1]))
     legs = np.searchsorted(nodes, scans)
@@ -67,7 +64,7 @@ def _placed(
     sight = _unit(points.bearings + poses[:, YAW]) * points.ranges[:, np.newaxis]
     mounting = rotated(np.broadcast_to(log.sonar_in_base, sight.shape), poses[:, YAW])
     arms = mounting + (1.0 + state.run[RANGE_SCALE]) * sight
-    velocity = path.velocities(times, legs, _HALF_SECOND)
+    velocity = path.velocities(times, legs, HALF_SECOND)
     by_delay = velocity[:, :2] + velocity[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
     return PlacedPoints(
         scans=scans, places=poses[:, :2] + arms, arms=arms + bows,
@@ -75,6 +72,18 @@ def _placed(
         slants=points.slants, qualities=points.qualities, shares=path.shares(times, legs),
         by_run=np.stack([sight, by_delay], axis=2),
     )  # fmt: skip
+
+
+def place(
+    log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray, placing: Placing = placed
+) -> PlacedPoints:
+    """Return the surface points in `rows` of the log."""
+    return placing(log, odometry, state, log.points(rows), log.scans(rows))
+
+
+def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
+    """Return the lone points in `rows` of the log's table of these."""
+    return placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
 
 
 def _unit(angles: np.ndarray) -> np.ndarray:

@@ -25,7 +25,8 @@ class SolverKernel(Enum):
             if self is SolverKernel.AUTO and not has_cache():
                 return SolverKernel.NUMPY
             prepare_cache()
-            import mlsm_manager.multi_view.compiled_comparisons  # noqa: F401
+            import mlsm_manager.multi_view.compiled_comparisons
+            import mlsm_manager.multi_view.compiled_placement  # noqa: F401
         except ImportError:
             if self is SolverKernel.NUMBA:
                 raise

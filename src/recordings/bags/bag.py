@@ -3,14 +3,14 @@
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, Tuple, Union
+from typing import Any, Callable, Dict, Iterator, List, Tuple, Union
 
 from rosbags.interfaces import Connection
-from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
 from rosbags.typesys.store import Typestore
 
 from recordings.bags.message_types import defined_in, ros2_types
+from recordings.bags.ros1_reader import Ros1Reader
 from recordings.bags.single_file import LONE_FILES, folder_of
 from recordings.errors import RecordingError
 
@@ -62,19 +62,22 @@ class Bag:
     def messages(self, topic: str) -> Iterator[Tuple[int, Any]]:
         """Yield (time of recording [ns], message) of one topic, in the order of these times; none without the topic.
 
-        One topic at a time: a reader keeps one decompressed chunk, and topics often lie in chunks of their own.
+        One topic at a time: topics often lie in chunks of their own.
         """
         connections = [one for one in self._reader.connections if one.topic == topic]
         if not connections:
             return
         with _told(self.path):
+            readers = {connection.id: self._deserializer(connection) for connection in connections}
             for connection, time, raw in self._reader.messages(connections):
-                store = self._store_of(connection)
-                if self.is_ros2:
-                    message = store.deserialize_cdr(raw, connection.msgtype)
-                else:
-                    message = store.deserialize_ros1(raw, connection.msgtype)
-                yield time, message
+                yield time, readers[connection.id](raw)
+
+    def _deserializer(self, connection: Connection) -> Callable[[bytes], Any]:
+        """Return what turns the bytes of a connection's messages into objects."""
+        store = self._store_of(connection)
+        if self.is_ros2:
+            return lambda raw: store.deserialize_cdr(raw, connection.msgtype)
+        return lambda raw: store.deserialize_ros1(raw, connection.msgtype)
 
     def _store_of(self, connection: Connection) -> Typestore:
         """Return the types of a topic alone: what other topics define wrongly, or otherwise, does not matter."""

@@ -1,7 +1,7 @@
-"""Comparisons by compiled loops are those by numpy, but for rounding."""
+"""Places of points and comparisons by compiled loops are those by numpy, but for rounding."""
 
 import sys
-from dataclasses import replace
+from dataclasses import fields, replace
 
 import numpy as np
 import pytest
@@ -12,14 +12,25 @@ from made_harbour import SONAR_IN_BASE, tour
 from mlsm_manager.multi_view.association import Pairs
 from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.comparing import Comparing
+from mlsm_manager.multi_view.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.heading_factors import HeadingFactors
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.odometry_parameters import DvlOdometry, HeadingOdometry, ThrusterOdometry, UnaidedOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
-from mlsm_manager.multi_view.placement import PlacedPoints
+from mlsm_manager.multi_view.placement import PlacedPoints, place
+from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.thruster_factors import ThrusterFactors
+from mlsm_manager.multi_view.unaided_factors import UnaidedFactors
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 
 pytest.importorskip("numba")
 SAME = 1e-9
+MODELS = [
+    DvlFactors(DvlOdometry()), ThrusterFactors(ThrusterOdometry()), HeadingFactors(HeadingOdometry()),
+    UnaidedFactors(UnaidedOdometry()),
+]  # fmt: skip
 
 
 def some_points(rng, count, scans):
@@ -51,6 +62,32 @@ def test_sums_of_any_comparisons_are_the_same(seed, count, scans):
         )
         for expected, found in zip(one, other):
             np.testing.assert_allclose(found, expected, rtol=SAME, atol=SAME * np.abs(expected).max())
+
+
+@pytest.fixture(scope="module")
+def log():
+    made = RunLog(SONAR_IN_BASE)
+    for scan in tour(3, direction=0.1, delay=0.3).scans:
+        made.append(scan, 1.0)
+    return made
+
+
+@pytest.mark.parametrize("odometry", MODELS, ids=lambda model: type(model).__name__)
+@pytest.mark.parametrize("delay", [0.0, -1.7, 900.0])
+def test_points_lie_at_the_same_places_whatever_the_odometry_tells(log, odometry, delay):
+    nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, odometry.width))
+    expected, found = (
+        place(log, odometry, State(nodes, np.array([0.01, delay])), log.rows(1, 3), Comparing.by(kernel).placed)
+        for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA)
+    )
+    for field in fields(PlacedPoints):
+        one, other = getattr(expected, field.name), getattr(found, field.name)
+        np.testing.assert_allclose(other, one, rtol=SAME, atol=SAME * np.abs(one).max(), err_msg=field.name)
+
+
+def test_no_points_lie_nowhere(log):
+    state = State(np.zeros((log.scan_count + 1, 5)), np.zeros(2))
+    assert not len(place(log, MODELS[0], state, log.rows(0, 0), Comparing.by(SolverKernel.NUMBA).placed))
 
 
 @given(st.integers(0, 10**6), st.integers(0, 100))

@@ -1,5 +1,6 @@
 """Bags of every kind give the same messages, and damaged ones one line."""
 
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -7,9 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
+from rosbags.rosbag1 import Reader
 
 from mlsm_manager.offline.bag_recording import read_recording
 from recordings.bags.bag import Bag
+from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
+from recordings.bags.ros1_reader import Ros1Reader
 from recordings.errors import RecordingError
 from recordings.reading.reader import Request
 
@@ -40,6 +44,24 @@ def assert_same(recording, expected):
         assert (one.beam.angle, one.is_moving) == (other.beam.angle, other.is_moving)
     np.testing.assert_allclose(recording.track.poses, expected.track.poses, rtol=0.0, atol=1e-9)
     assert np.array_equal(recording.truth.positions, expected.truth.positions)
+
+
+def numbered(messages):
+    """Return messages with the number of their connection, which also names its reader."""
+    return [(connection.id, time, bytes(data)) for connection, time, data in messages]
+
+
+@pytest.mark.parametrize("kept_bytes", [0, 10**8])
+@pytest.mark.parametrize("compression", COMPRESSIONS)
+def test_messages_of_a_ros1_bag_are_those_that_rosbags_reads(tmp_path, compression, kept_bytes):
+    copy = tmp_path / "copy.bag"
+    with Bag(BASIN) as bag, BagWriter(copy, compression) as writer:
+        for topic in ("/tf", "/sonar/raw"):
+            for stamp, message in islice(bag.messages(topic), 60):
+                writer.write(topic, message, stamp)
+    with Reader(copy) as expected, Ros1Reader(copy, kept_bytes) as found:
+        for connections in ([], *([one] for one in expected.connections)):
+            assert numbered(found.messages(connections)) == numbered(expected.messages(connections))
 
 
 def test_a_ros2_folder_gives_what_the_ros1_bag_gives(folder, expected):

@@ -1,0 +1,95 @@
+"""Where points lie in the map, in a compiled loop: as in `placement` but for rounding.
+
+It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Raises
+ImportError without numba.
+"""
+
+import numpy as np
+from numba import njit
+
+TIME, NODE_X, NODE_Y, NODE_YAW, REFERENCE_X, REFERENCE_Y, GAIN_X, GAIN_Y = range(8)
+"""Columns of the nodes: NodePath's time, place, yaw, reference path and gain."""
+KNOT_TIME, KNOT_YAW, KNOT_X, KNOT_Y = range(4)
+"""Columns of the odometry's poses: time, yaw, and where the reference path is then."""
+_ARMS, _NORMALS, _BY_RUN, _SHARE = 2, 4, 6, 10
+PLACED_COLUMNS = 11
+"""Of a placed point: place, arm, normal (x and y each), derivatives by the run (2 x 2), and share."""
+
+
+@njit(cache=True)
+def _knot_before(time, knots, guess):
+    """Return the last of the knots (k, 4) not after `time`, but for the last of all; the search begins at a guess."""
+    while guess < len(knots) - 2 and knots[guess + 1, KNOT_TIME] <= time:
+        guess += 1
+    while guess > 0 and knots[guess, KNOT_TIME] > time:
+        guess -= 1
+    return guess
+
+
+@njit(cache=True)
+def _at(time, knot, knots, column):
+    """Return a column linearly between two knots; the nearest beyond the first and the last one."""
+    before, after = knots[knot], knots[min(knot + 1, len(knots) - 1)]
+    if time <= before[KNOT_TIME]:
+        return before[column]
+    if time >= after[KNOT_TIME]:
+        return after[column]
+    slope = (after[column] - before[column]) / (after[KNOT_TIME] - before[KNOT_TIME])
+    return slope * (time - before[KNOT_TIME]) + before[column]
+
+
+@njit(cache=True)
+def _pose(time, knot, knots, node, next_node):
+    """Return x, y and heading in map, x and y of the bow, and the share of the time between two nodes."""
+    share = (time - node[TIME]) / (next_node[TIME] - node[TIME])
+    yaw = (1.0 - share) * node[NODE_YAW] + share * next_node[NODE_YAW]
+    x = _at(time, knot, knots, KNOT_X) - node[REFERENCE_X]
+    y = _at(time, knot, knots, KNOT_Y) - node[REFERENCE_Y]
+    x -= share * (next_node[REFERENCE_X] - node[REFERENCE_X])
+    y -= share * (next_node[REFERENCE_Y] - node[REFERENCE_Y])
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    turn_x = node[GAIN_X] * cosine - node[GAIN_Y] * sine
+    turn_y = node[GAIN_X] * sine + node[GAIN_Y] * cosine
+    bow_x, bow_y = turn_x * x - turn_y * y, turn_x * y + turn_y * x
+    place_x = (1.0 - share) * node[NODE_X] + share * next_node[NODE_X] + bow_x
+    place_y = (1.0 - share) * node[NODE_Y] + share * next_node[NODE_Y] + bow_y
+    return place_x, place_y, _at(time, knot, knots, KNOT_YAW) + yaw, bow_x, bow_y, share
+
+
+@njit(
+    "f8[:,::1](f8[::1], i8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,::1], f8)",
+    cache=True,
+    error_model="numpy",
+)
+def placed_rows(times, legs, ranges, bearings, normals, sonar_in_base, range_scale, nodes, knots, half_window):
+    """Return points (n, PLACED_COLUMNS) that were heard at `times` (n,) between nodes `legs` (n,) and the next ones.
+
+    ranges: (n,) m. bearings: (n,) rad. normals: (n, 2). nodes: (m, 8). knots: (k, 4), k > 0, all that is around the
+    times. half_window: s before and after, over which the velocity is averaged.
+    """
+    result, knot = np.empty((len(times), PLACED_COLUMNS)), 0
+    for point in range(len(times)):
+        time, node, next_node = times[point], nodes[legs[point]], nodes[legs[point] + 1]
+        knot = _knot_before(time, knots, knot)
+        x, y, heading, bow_x, bow_y, share = _pose(time, knot, knots, node, next_node)
+        earlier, later = time - half_window, time + half_window
+        before = _pose(earlier, _knot_before(earlier, knots, knot), knots, node, next_node)
+        after = _pose(later, _knot_before(later, knots, knot), knots, node, next_node)
+        velocity_x, velocity_y, turn_rate = (
+            (after[0] - before[0]) / (2.0 * half_window),
+            (after[1] - before[1]) / (2.0 * half_window),
+            (after[2] - before[2]) / (2.0 * half_window),
+        )
+        cosine, sine = np.cos(heading), np.sin(heading)
+        sight_x = np.cos(bearings[point] + heading) * ranges[point]
+        sight_y = np.sin(bearings[point] + heading) * ranges[point]
+        arm_x = cosine * sonar_in_base[0] - sine * sonar_in_base[1] + (1.0 + range_scale) * sight_x
+        arm_y = sine * sonar_in_base[0] + cosine * sonar_in_base[1] + (1.0 + range_scale) * sight_y
+        row = result[point]
+        row[0], row[1], row[_ARMS], row[_ARMS + 1] = x + arm_x, y + arm_y, arm_x + bow_x, arm_y + bow_y
+        row[_NORMALS] = cosine * normals[point, 0] - sine * normals[point, 1]
+        row[_NORMALS + 1] = sine * normals[point, 0] + cosine * normals[point, 1]
+        row[_BY_RUN], row[_BY_RUN + 1] = sight_x, velocity_x - turn_rate * arm_y
+        row[_BY_RUN + 2], row[_BY_RUN + 3] = sight_y, velocity_y + turn_rate * arm_x
+        row[_SHARE] = share
+    return result
