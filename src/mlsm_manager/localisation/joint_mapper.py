@@ -219,9 +219,9 @@ class JointMapper(ShowsMaps):
         self._know(scan, session)
         estimate = session.solver.estimates[-1]
         if not estimate.comparisons:
-            return ScanUpdate(scan, None, True, self.belief)
+            return ScanUpdate(scan, None, True, self.belief, provisional=session.is_provisional)
         result = match_of(scan, estimate, self.belief, session, perf_counter() - start)
-        return ScanUpdate(scan, result, True, self.belief, session.solver.found)
+        return ScanUpdate(scan, result, True, self.belief, session.solver.found, session.is_provisional)
 
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]

@@ -56,6 +56,10 @@ class JointParameters(OdometryChoice):
         0.0, "how certain a strong echo that stands alone is of something small that stays, as a post; above 0, such "
         "echoes are compared with each other", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
+    scan_parts: int = parameter(
+        1, "parts into which each turn of the head is cut, each with its own speed: more where speeds change within a "
+        "turn", low=1, high=12, tunable=False,
+    )  # fmt: skip
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
     )
@@ -91,10 +95,11 @@ class JointParameters(OdometryChoice):
                 range_deviation=self.echo_deviation,
                 normal_deviation=self.normal_deviation,
                 lone_quality=self.lone_quality,
-                block_scans=self.block_scans,
+                scan_parts=self.scan_parts,
+                block_scans=self.block_scans * self.scan_parts,
             ),
             window=SolverWindow(
-                free_nodes=self.free_scans,
+                free_nodes=self.free_scans * self.scan_parts,
                 settled=0.0 if odometry.distance_deviation < _POOR_DISTANCES else _SETTLED,
                 lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
                 max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),

@@ -14,6 +14,7 @@ from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.turns import Turns
 from mlsm_manager.self_check.continuity import scans_go_on
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell
@@ -22,6 +23,7 @@ from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry.planar import composed, transformed
 
+_AGREES = 0.5  # share of a scan's points on surfaces of others from which on it agrees with them
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
 
@@ -76,36 +78,41 @@ class JointSession:
         return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def verdicts(self) -> List[Verdict]:
-        """Return how the newest scans agree with the map and each other, and how far the path is known."""
-        newest = self.solver.estimates[-_CHECKED_SCANS:]
-        times = np.array([estimate.time for estimate in newest])
-        radii = [np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in newest]
-        agreements = np.array([estimate.agreement for estimate in newest])
-        surfaces = np.array([estimate.surfaces for estimate in newest]).reshape(-1, 2, 2)
-        begin = self.start if newest else np.nan
+        """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
+        parts = self.solver.parameters.matching.scan_parts
+        newest = slice(-_CHECKED_SCANS * parts, None)
+        turns = Turns.of(self.solver.estimates[newest], self.solver.islands.apart[newest], parts)
+        begin = self.start if len(turns.times) else np.nan
         return [
-            *self._going_on(times),
-            recent_agreement(times, agreements, _CHECKED_SCANS),
-            told_deviation(times, np.array(radii)),
-            *surfaces_tell(begin, times, surfaces, self.solver.parameters.odometry.distance_deviation),
-            *in_one_map(times, self.solver.islands.apart[-_CHECKED_SCANS:]),
+            *self._going_on(turns.times),
+            recent_agreement(turns.times, turns.agreements, _CHECKED_SCANS),
+            *(told_deviation(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[-1:]),
+            *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
+            *in_one_map(turns.times, turns.apart),
         ]
 
     def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:
-        """Ask whether the newest scans, which ended at `times` (n,) [s], lie on those before them.
+        """Ask whether the newest turns, which ended at `times` (n,) [s], lie on those before them.
 
-        Of each it is found once: the solver may move a scan later, but hardly against those just before it.
+        Of each it is found once: the solver may move a turn later, but hardly against those just before it.
         """
-        solver = self.solver
+        solver, matching = self.solver, self.solver.parameters.matching
         if not np.isinf(solver.odometry.distance_deviation):
             return ()
-        known, count = max(self._shares, default=-1), solver.log.scan_count
-        first = max(known + 1, count - len(times))
-        new = shares_heard_before(solver.log, solver.odometry, solver.state, solver.parameters.matching, first)
-        self._shares.update(zip(range(first, count), new))
-        for old in [scan for scan in self._shares if scan < count - len(times)]:
-            del self._shares[old]
-        return (scans_go_on(times, np.array([self._shares[scan] for scan in range(count - len(times), count)])),)
+        count = solver.log.scan_count // matching.scan_parts
+        newest = range(count - len(times), count)
+        first = max(newest.start, max(self._shares, default=-1) + 1)
+        found = shares_heard_before(solver.log, solver.odometry, solver.state, matching, first)
+        known = {**self._shares, **dict(zip(range(first, count), found))}
+        self._shares = {turn: known[turn] for turn in newest}
+        return (scans_go_on(times, np.array([self._shares[turn] for turn in newest])),)
+
+    @property
+    def is_provisional(self) -> bool:
+        """Whether the map hangs on scans of an unknown velocity, none of which agrees with another yet."""
+        if not np.isinf(self.solver.odometry.distance_deviation):
+            return False
+        return all(estimate.agreement < _AGREES for estimate in self.solver.estimates[:_CHECKED_SCANS])
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""

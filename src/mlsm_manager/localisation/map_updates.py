@@ -20,6 +20,7 @@ class ScanUpdate:
 
     result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
     found: how the vehicle was found again with it after a silence of the sonar; empty where it was not.
+    provisional: whether the map hangs on scans of an unknown velocity, none of which agrees with another yet.
     """
 
     scan: Scan
@@ -27,6 +28,7 @@ class ScanUpdate:
     accepted: bool
     belief: Belief
     found: str = ""
+    provisional: bool = False
 
 
 @dataclass(frozen=True)

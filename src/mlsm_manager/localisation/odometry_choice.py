@@ -33,6 +33,7 @@ class OdometryKind(Enum):
     DVL = "DVL"
     THRUSTERS = "THRUSTERS"
     HEADING = "HEADING"
+    HOVERING = "HOVERING"
     NONE = "NONE"
 
 
@@ -43,7 +44,8 @@ class OdometryChoice(ParameterSet):
     odometry: OdometryKind = parameter(
         OdometryKind.DVL,
         "what the joint solver takes from the odometry. DVL: positions that are right to some percent. THRUSTERS: "
-        "positions whose scale is unknown and walks, in a current. HEADING: the heading alone. NONE: nothing",
+        "positions whose scale is unknown and walks, in a current. HEADING: the heading alone; HOVERING: "
+        "also, of a vehicle that stops and strafes. NONE: nothing",
         tunable=False,
     )  # fmt: skip
     odometry_scale: float = parameter(
@@ -143,5 +145,6 @@ _MODELS: Dict[OdometryKind, Callable[[OdometryChoice, OdometryErrors], OdometryM
     OdometryKind.DVL: _dvl,
     OdometryKind.THRUSTERS: _thrusters,
     OdometryKind.HEADING: _heading,
+    OdometryKind.HOVERING: _heading,
     OdometryKind.NONE: _none,
 }

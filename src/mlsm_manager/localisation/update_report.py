@@ -6,10 +6,14 @@ from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health
 
+_PROVISIONAL = "provisional: one scan of an unknown velocity; the next ones draw it anew"
+
 
 def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     """Count a scan and show what its match found."""
     health.show("matching", "on" if matching else "off")
+    if matching:
+        health.show("map", _PROVISIONAL if update.provisional else "scans agree with each other")
     result = update.result
     if result is None:
         health.count("scans placed by odometry")

@@ -35,7 +35,9 @@ def add_comparisons(
         return 0
     scans, other_scans, information, gradient = summation(pairs, sources, targets, matching, cut)
     if matching.normal_deviation > 0.0:
-        information, gradient = discounted(information, gradient, scans, _PLACES, matching.normal_deviation)
+        # The parts of a turn together hear walls on all sides, each part alone perhaps one.
+        turns = scans // matching.scan_parts
+        information, gradient = discounted(information, gradient, turns, _PLACES, matching.normal_deviation)
     equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
     return len(pairs.rows)
 

@@ -11,7 +11,7 @@ from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import State
 
-_SCANS_BEFORE = 10  # a few minutes, in which a vehicle sees the same
+_TURNS_BEFORE = 10  # a few minutes, in which a vehicle sees the same
 _SURROUNDINGS = 8.0  # m around a point within which surfaces may be the one that it lies on, or lie beside it
 _ON_SURFACE = 1.0  # m: about twice the deviation of an echo
 _CANDIDATES = 24  # points heard before that are looked at for each point: enough to find one that faces the same way
@@ -21,16 +21,19 @@ _FEWEST_POINTS = 2.0  # points with surfaces around them: fewer tell nothing
 def shares_heard_before(
     log: RunLog, odometry: OdometryModel, state: State, matching: SurfaceMatching, first: int
 ) -> np.ndarray:
-    """Return which share (n,) of the points of scans `first` and newer lies on surfaces that the scans before heard.
+    """Return which share (n,) of the points of turns `first` and newer lies on surfaces that those before heard.
 
-    Only points count around which a surface was heard that faces the same way: others may be new. NaN for scans with
-    hardly any such points.
+    Only points count around which a surface was heard that faces the same way: others may be new. NaN for turns with
+    hardly any such points. A turn is a scan, or all its parts.
     """
-    return np.array([_share(log, odometry, state, matching, scan) for scan in range(first, log.scan_count)])
+    turns = range(first, log.scan_count // matching.scan_parts)
+    return np.array([_share(log, odometry, state, matching, turn) for turn in turns])
 
 
-def _share(log: RunLog, odometry: OdometryModel, state: State, matching: SurfaceMatching, scan: int) -> float:
-    before, own = log.rows(max(0, scan - _SCANS_BEFORE), scan), log.rows(scan, scan + 1)
+def _share(log: RunLog, odometry: OdometryModel, state: State, matching: SurfaceMatching, turn: int) -> float:
+    parts = matching.scan_parts
+    before = log.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
+    own = log.rows(parts * turn, parts * (turn + 1))
     if not len(before) or not len(own):
         return np.nan
     sources, targets = (place(log, odometry, state, rows) for rows in (own, before))

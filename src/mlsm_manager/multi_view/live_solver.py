@@ -10,12 +10,14 @@ from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
+from mlsm_manager.multi_view.motion_samples import searched_nodes
 from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.place_search import Whereabouts, island_place, silent_scans, whereabouts
 from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.run_log import RunLog
+from mlsm_manager.multi_view.scan_parts import parts_of
 from mlsm_manager.multi_view.stacking import stacked, unstacked
 from mlsm_manager.multi_view.state import RUN_COLUMNS, State
 from node_support.errors import RefusedInput
@@ -27,7 +29,7 @@ _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
-    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan. state: of all nodes so far.
+    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan of the log. state: of all nodes.
     islands: which scans are compared with each other. search: what came of the search for the newest scans in the map
     after scans that heard nothing; None where none was needed.
     """
@@ -87,18 +89,18 @@ class LiveSolver:
             parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None
         )
         for scan in scans:
-            solver.log.append(scan, parameters.window.lookahead)
+            solver._append(scan)
         nodes, covariances = stored["nodes"], stored["node_covariances"]
-        if nodes.shape != (len(scans) + 1, solver.odometry.width) or covariances.shape[1:] != (3, 3):
+        if nodes.shape != (solver.log.scan_count + 1, solver.odometry.width) or covariances.shape[1:] != (3, 3):
             raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {len(scans)} scans")
         solver._nodes.replace_from(0, nodes)
         solver._node_covariances.replace_from(0, covariances)
         solver._run[:] = stored["run_unknowns"]
         solver.islands = Islands(stored["islands"])
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
-        if len(solver.estimates) != len(scans):
+        if len(solver.estimates) != solver.log.scan_count:
             raise ValueError(f"{len(solver.estimates)} estimates for {len(scans)} scans")
-        if len(stored["islands"]) != len(scans):
+        if len(stored["islands"]) != solver.log.scan_count:
             raise ValueError(f"{len(stored['islands'])} islands for {len(scans)} scans")
         return solver
 
@@ -110,40 +112,61 @@ class LiveSolver:
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
 
+        It may be cut into parts (`scan_parts`), each of which then is a scan of the log with an estimate of its own.
+
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
         scans, nodes, run = self.log.scan_count, self._nodes.values.copy(), self._run.copy()
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                self.log.append(scan, self.parameters.window.lookahead)
-                self.islands.append()
-                self.estimates.append(self._solved())
+                self._append(scan)
+                self.estimates += self._solved()
         except RefusedInput:
             raise
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
             self._nodes.replace_from(0, nodes)
             self._run[:] = run
-            if self.log.scan_count > scans:
-                self.log.remove_newest()
-            self.islands.shorten(self.log.scan_count)
+            self._shorten(scans)
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
         return self.estimates[-1]
 
-    def _solved(self) -> LiveEstimate:
-        """Return what is known when the log has one scan more than there are estimates."""
-        motion = self.log.node_motion(np.array([-2, -1]))
-        self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
+    @property
+    def _parts(self) -> int:
+        return self.parameters.matching.scan_parts
+
+    def _append(self, scan: Scan) -> None:
+        """Append the parts of a scan to the log, all or none."""
+        scans = self.log.scan_count
+        try:
+            for part in parts_of(scan, self._parts, self.log.node_times[-1] if scans else None):
+                self.log.append(part, self.parameters.window.lookahead)
+                self.islands.append()
+        except RefusedInput:
+            self._shorten(scans)
+            raise
+
+    def _shorten(self, scans: int) -> None:
+        """Keep the oldest `scans` of the log."""
+        while self.log.scan_count > scans:
+            self.log.remove_newest()
+        self.islands.shorten(scans)
+
+    def _solved(self) -> List[LiveEstimate]:
+        """Return what is known of the scans of the log that have no estimates yet."""
+        for node in range(len(self._nodes), self.log.scan_count + 1):
+            motion = self.log.node_motion(np.array([node - 1, node]))
+            self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
         self.search = None
         self._search()
         window = self._fitted()
-        if self.islands.is_apart and self._join(window.estimate()):
+        if self.islands.is_apart and self._join(window.estimates(1)[0]):
             window = self._fitted()
-        estimate, covariances = window.estimate(), window.covariances_of_oldest()
+        estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
         self._node_covariances.replace_from(window.oldest, covariances)
-        return estimate
+        return estimates
 
     def _fitted(self) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution."""
@@ -163,7 +186,10 @@ class LiveSolver:
         return self.search.line() if self.search is not None and self.search.is_certain else ""
 
     def _search(self) -> None:
-        """Put the newest node where its scan fits, if the motion is hardly known; or let it begin an island."""
+        """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin an island."""
+        if self._parts > 1:
+            self._search_by_parts()
+            return
         silent = silent_scans(self.log)
         if len(self.estimates) <= silent:
             return
@@ -177,6 +203,13 @@ class LiveSolver:
             self.islands.begin()
         else:
             self._search_beside_scan_before(covariance)
+
+    def _search_by_parts(self) -> None:
+        """Put the nodes of the newest turn where its parts fit to the scans before."""
+        if self.estimates:
+            covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+            found = searched_nodes(self.log, self.odometry, self.state, covariance, self.parameters.matching)
+            self._nodes.values[-self._parts :] = found
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""

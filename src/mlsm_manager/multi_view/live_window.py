@@ -1,6 +1,6 @@
 """The problem of one scan: the newest nodes against each other and against the frozen map."""
 
-from typing import Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -174,24 +174,29 @@ class LiveWindow:
         """The oldest free node."""
         return self._layout.first
 
-    def covariances_of_oldest(self) -> np.ndarray:
-        """Return the pose covariances (2, 3, 3) of the two oldest free nodes, the next ones to be frozen."""
-        columns = self._layout.pose_columns(np.array([self._layout.first, self._layout.first + 1]))
+    def covariances_of_oldest(self, count: int) -> np.ndarray:
+        """Return the pose covariances (count + 1, 3, 3) of the oldest free nodes, the next ones to be frozen."""
+        columns = self._layout.pose_columns(self._layout.first + np.arange(count + 1))
         return np.stack([self._solution.covariance(own, self._held_covariance) for own in columns])
 
-    def estimate(self) -> LiveEstimate:
-        """Return what is known of the newest node."""
-        newest = np.arange(self._layout.size - self._layout.width - RUN_COLUMNS, self._layout.size)
-        T_odom_base, node = self._motion.poses[-1], self._state.nodes[-1].copy()
+    def estimates(self, count: int) -> List[LiveEstimate]:
+        """Return what is known of the newest `count` nodes, oldest first."""
+        return [self._estimate(node) for node in range(self._layout.last - count + 1, self._layout.last + 1)]
+
+    def _estimate(self, number: int) -> LiveEstimate:
+        """Return what is known of node `number`, at the end of the scan before it."""
+        own = self._layout.node_start(number) + np.arange(self._layout.width)
+        unknowns = np.append(own, self._layout.run_start + np.arange(RUN_COLUMNS))
+        T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
         T_map_base = T_odom_base + node[POSE]
-        share, distance = agreement(self._met, self._layout.last - 1, self._parameters.matching)
+        share, distance = agreement(self._met, number - 1, self._parameters.matching)
         return LiveEstimate(
-            time=float(self._log.node_times[-1]), T_odom_base=T_odom_base, T_map_base=T_map_base,
+            time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
-            covariance=self._solution.covariance(newest, self._held_covariance),
-            own_covariance=self._solution.covariance(newest, np.zeros_like(self._held_covariance)),
+            covariance=self._solution.covariance(unknowns, self._held_covariance),
+            own_covariance=self._solution.covariance(unknowns, np.zeros_like(self._held_covariance)),
             world_scale_deviation=self._parameters.sonar.world_scale_deviation,
-            reported_velocity=self._log.odometry.velocity_at(self._motion.times[-1]),
+            reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
-            agreement=share, distance=distance, surfaces=surfaces_met(self._met, self._layout.last - 1),
+            agreement=share, distance=distance, surfaces=surfaces_met(self._met, number - 1),
         )  # fmt: skip

@@ -55,7 +55,12 @@ class Loop:
 
 
 def loops_of(log: RunLog, odometry: OdometryModel, state: State, parameters: MultiViewParameters) -> List[Loop]:
-    """Return the places visited again that neighbouring scans agree on, in the order of time."""
+    """Return the places visited again that neighbouring scans agree on, in the order of time.
+
+    None where turns are cut into parts: a part hears too little to be told from others.
+    """
+    if parameters.matching.scan_parts > 1:
+        return []
     points = place(log, odometry, state, log.rows(0, log.scan_count))
     shifts = _shifts()
     found = [_loop(points, scan, shifts, parameters) for scan in range(_APART, log.scan_count)]

@@ -35,9 +35,8 @@ def searched_node(
     covariance asks (correlative search, Olson 2009).
     """
     newest = state.nodes[-1]
-    transition = Transition.of(odometry, state.nodes[-2:], log.node_motion(np.array([-2, -1])))
-    step = transition.step_covariance(covariance)
-    if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut:
+    step = step_covariance(log, odometry, state, covariance, 1)
+    if is_known(step, matching):
         return newest
     last = log.scan_count
     before, own = log.rows(min(max(first, last - 1 - COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
@@ -51,6 +50,22 @@ def searched_node(
     costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
     best = shifts[np.argmax(found - costs)]
     return newest + step[:, :2] @ np.linalg.solve(step[:2, :2], best)
+
+
+def step_covariance(
+    log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, count: int
+) -> np.ndarray:
+    """Return that (width, width) of the newest node as seen from the pose of the node `count` before it.
+
+    covariance: (width, width) of that node.
+    """
+    ends = np.array([log.scan_count - count, log.scan_count])
+    return Transition.of(odometry, state.nodes[ends], log.node_motion(ends)).step_covariance(covariance)
+
+
+def is_known(step: np.ndarray, matching: SurfaceMatching) -> bool:
+    """Return whether the solver's own steps reach as far as a motion with covariance `step` (width, width) may go."""
+    return _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut
 
 
 def _moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:

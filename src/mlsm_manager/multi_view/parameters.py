@@ -64,8 +64,12 @@ class SurfaceMatching(ParameterSet):
         0.0, "how certain a strong echo that stands alone is of something small, as a post; 0: none is compared",
         low=0.0, high=1.0,
     )  # fmt: skip
+    scan_parts: int = parameter(
+        1, "parts into which each turn of the head is cut, each a scan with its own speed: more where speeds change "
+        "within a turn", low=1, high=12,
+    )  # fmt: skip
     block_scans: int = parameter(
-        5, "scans that are searched together: about as far as they see the same", low=1, high=50
+        5, "scans that are searched together: about as far as they see the same", low=1, high=600
     )
 
 
@@ -75,7 +79,7 @@ class SolverWindow(ParameterSet):
 
     free_nodes: int = parameter(
         40, "newest nodes that may still move: about ten minutes, in which most places are seen from all sides",
-        low=2, high=200,
+        low=2, high=2400,
     )  # fmt: skip
     max_frozen_blocks: int = parameter(
         16,

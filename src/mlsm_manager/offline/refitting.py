@@ -37,7 +37,7 @@ def other_settings(parameters: MultiViewParameters) -> List[MultiViewParameters]
         {"cut": _NARROWER * own.cut},
         {"range_deviation": _WIDER * own.range_deviation},
         {"weight": _HALF * own.weight},
-        {"block_scans": own.block_scans + _MORE_SCANS},
+        {"block_scans": own.block_scans + _MORE_SCANS * own.scan_parts},
     )
     return [replace(parameters, matching=replace(own, **change)) for change in changes]
 

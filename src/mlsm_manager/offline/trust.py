@@ -11,6 +11,7 @@ from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.turns import Turns
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
@@ -82,22 +83,21 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
     further: what other checks say.
     """
     solver = replayed.solver
-    estimates = solver.estimates
-    ends = np.array([estimate.time for estimate in estimates])
+    turns = Turns.of(solver.estimates, solver.islands.apart, solver.parameters.matching.scan_parts)
     path = replayed.corrected if refined is None else refined.poses
     deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
     verdicts = [
         *_against_odometry(replayed, path, solver.odometry),
-        *_going_on(solver, solver.state if refined is None else refined.batch.state, ends),
-        recent_agreement(ends, np.array([estimate.agreement for estimate in estimates])),
+        *_going_on(solver, solver.state if refined is None else refined.batch.state, turns.times),
+        recent_agreement(turns.times, turns.agreements),
         told_deviation(deviations.times, deviations.radii),
         *surfaces_tell(
             float(solver.log.node_times[0]),
-            ends,
-            np.array([estimate.surfaces for estimate in estimates]),
+            turns.times,
+            turns.surfaces,
             solver.odometry.distance_deviation,
         ),
-        *in_one_map(ends, solver.islands.apart),
+        *in_one_map(turns.times, turns.apart),
     ]
     found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
     before = Calibration.expected(solver)
@@ -142,7 +142,7 @@ def _halves(scans: List[Scan], solver: LiveSolver) -> Optional[Verdict]:
     middle = len(scans) // 2
     if middle < _FEWEST_SCANS:
         return None
-    first = Calibration.of_estimate(solver, solver.estimates[middle - 1])
+    first = Calibration.of_estimate(solver, solver.estimates[middle * solver.parameters.matching.scan_parts - 1])
     second = _calibrated(scans[middle:], solver.parameters, solver.log.sonar_in_base)
     return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
 

@@ -71,6 +71,16 @@ def test_a_vehicle_is_found_in_its_own_map(harbour):
     assert errors(session, truth)[-3:].max() < 1.5
 
 
+def test_the_map_is_provisional_until_a_second_scan_agrees():
+    session = JointSession.begun(PARAMETERS, SONAR_IN_BASE, np.zeros(3), None, np.empty((0, 2)))
+    told = []
+    for scan in tour(4, path=ahead).scans:
+        session.add(with_heading_only(scan))
+        told.append(session.is_provisional)
+    assert told[0]
+    assert not told[-1]
+
+
 def test_the_motion_in_a_silence_has_nodes(harbour):
     session, _ = harbour
     assert np.diff(session.solver.log.node_times).max() < 2.0 * TURN

@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""A vehicle with a compass alone hears nothing for two minutes, moves on, and finds itself again in its own map."""
+
+import sys
+import unittest
+from typing import Any
+
+import numpy as np
+import rospy
+import rostest
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph import PACKAGE, Diagnostics, Inbox, wait_for_publisher_links
+from nav_msgs.msg import Odometry
+
+from underwater_map_construction.msg import SonarScanLine
+
+SILENCE = 200.0, 320.0  # s into the run
+KNOWN = 2.0  # m told, from which on the place is known
+FARTHEST = 3.0  # m, of the place that is found from the truth
+LONGEST = 200.0  # s, on a machine that cannot keep up with the simulation
+
+
+class Silence(unittest.TestCase):
+    """Hands the simulated head's beams on, but for those of the silence."""
+
+    def test_the_vehicle_is_found_again(self) -> None:
+        """The first fix that claims to be good is near the truth, and the node tells that it found the vehicle."""
+        truth, fixes = Inbox("/ground_truth", Odometry), Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        diagnostics = Diagnostics()
+        self.heard = rospy.Publisher("/heard", SonarScanLine, queue_size=1000)
+        wait_for_publisher_links(self.heard, 1)
+        self.first = np.nan
+        rospy.Subscriber("/sonar/raw", SonarScanLine, self._hand_on, queue_size=1000)
+        diagnostics.wait_for("mlsm_core", "times found again after a silence", 1, LONGEST)
+        found = fixes.wait_for(lambda fix: self._seconds(fix) > SILENCE[1] and _told(fix) < KNOWN, LONGEST)
+        truth.wait_for(lambda message: message.header.stamp >= found.header.stamp)
+        before = next(fix for fix in fixes.messages if self._seconds(fix) > SILENCE[0] / 2.0)
+        moved, true = (_place(found) - _place(before), _at(truth, found) - _at(truth, before))
+        self.assertGreater(np.hypot(*true), FARTHEST)
+        self.assertLess(np.hypot(*(moved - true)), FARTHEST)
+
+    def _hand_on(self, beam: SonarScanLine) -> None:
+        self.first = np.nanmin([self.first, beam.header.stamp.to_sec()])
+        if not SILENCE[0] <= self._seconds(beam) < SILENCE[1]:
+            self.heard.publish(beam)
+
+    def _seconds(self, message: Any) -> float:
+        return message.header.stamp.to_sec() - self.first
+
+
+def _told(fix: PoseWithCovarianceStamped) -> float:
+    return float(np.sqrt(fix.pose.covariance[0] + fix.pose.covariance[7]))
+
+
+def _place(message: Any) -> np.ndarray:
+    return np.array([message.pose.pose.position.x, message.pose.pose.position.y])
+
+
+def _at(truth: Inbox, fix: PoseWithCovarianceStamped) -> np.ndarray:
+    """Return where the vehicle truly was at a fix, (2,) m."""
+    known = [message for message in truth.messages if message.header.stamp <= fix.header.stamp]
+    return _place(known[-1])
+
+
+if __name__ == "__main__":
+    rospy.init_node("silence_test")
+    rostest.rosrun(PACKAGE, "silence", Silence, sys.argv)

@@ -1,0 +1,95 @@
+"""A vehicle that knows its heading only, and that stops, starts and goes sideways."""
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, TURN, tour
+
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.multi_view.live_solver import LiveSolver
+from node_support.errors import RefusedInput
+
+pytestmark = pytest.mark.long
+
+PARTS = profile_values(OdometryKind.HOVERING)["scan_parts"]
+STOPS = np.array([[0.0, 0.0], [6.0, 7.0], [-8.0, 6.0], [-12.0, -6.0], [2.0, -8.0]])
+GOING, RESTING = 28.0, 10.0  # s
+
+
+def strafed(times):
+    """Return poses (m, 3): from stop to stop along straight lines at up to 1 m/s, and always looking ahead."""
+    moves, into = np.divmod(np.asarray(times, dtype=float), GOING + RESTING)
+    share = np.clip(into / GOING, 0.0, 1.0)
+    share = share**3 * (10.0 - 15.0 * share + 6.0 * share**2)
+    first, last = (STOPS[(moves.astype(int) + further) % len(STOPS)] for further in (0, 1))
+    places = first + share[:, np.newaxis] * (last - first)
+    return np.column_stack([places, 0.1 * np.sin(np.asarray(times) / 20.0)])
+
+
+MADE = tour(14, path=strafed)
+
+
+def solver_of(kind):
+    profile = MlsmCoreParameters(estimator=Estimator.JOINT).changed(profile_values(kind))
+    return LiveSolver(profile.solver_parameters(profile.part(OdometryErrors), 0.0), SONAR_IN_BASE)
+
+
+def followed(kind, scans=MADE.scans):
+    solver = solver_of(kind)
+    for scan in scans:
+        solver.add(scan)
+    return solver
+
+
+@pytest.fixture(scope="module")
+def hovering():
+    return followed(OdometryKind.HOVERING)
+
+
+def errors_of(solver):
+    ends = np.array([estimate.time for estimate in solver.estimates])
+    path = np.array([estimate.T_map_base[:2] for estimate in solver.estimates])
+    start = solver.log.node_poses(np.array([0]))[0, :2]
+    return np.hypot(*(path - start - (MADE.truth.at(ends) - MADE.truth.at(0.0))[:, :2]).T)
+
+
+def test_it_is_found_where_it_is(hovering):
+    assert np.median(errors_of(hovering)) < 1.0
+
+
+def test_the_profile_for_vehicles_that_go_ahead_loses_it():
+    assert np.median(errors_of(followed(OdometryKind.HEADING))) > 3.0
+
+
+def test_each_part_of_a_turn_has_an_estimate(hovering):
+    ends = [estimate.time for estimate in hovering.estimates]
+    assert len(ends) == PARTS * len(MADE.scans)
+    np.testing.assert_allclose(ends[PARTS - 1 :: PARTS], TURN * np.arange(1, len(MADE.scans) + 1))
+
+
+def test_equal_runs_find_equal_paths(hovering):
+    again = followed(OdometryKind.HOVERING, MADE.scans[:4])
+    few = len(again.estimates)
+    np.testing.assert_allclose(
+        [estimate.T_map_base for estimate in again.estimates],
+        [estimate.T_map_base for estimate in hovering.estimates[:few]],
+    )
+
+
+def test_a_stored_run_goes_on_as_it_would_have():
+    first = followed(OdometryKind.HOVERING, MADE.scans[:5])
+    again = LiveSolver.resumed(first.parameters, SONAR_IN_BASE, MADE.scans[:5], first.stored())
+    ends = [solver.add(MADE.scans[5]).T_map_base for solver in (first, again)]
+    np.testing.assert_allclose(ends[1], ends[0])
+
+
+def test_a_scan_that_comes_twice_leaves_nothing_behind():
+    solver = followed(OdometryKind.HOVERING, MADE.scans[:3])
+    before = solver.state.copy(), solver.log.scan_count
+    with pytest.raises(RefusedInput):
+        solver.add(MADE.scans[2])
+    assert solver.log.scan_count == before[1] == len(solver.estimates)
+    np.testing.assert_array_equal(solver.state.nodes, before[0].nodes)
