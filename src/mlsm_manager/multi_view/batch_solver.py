@@ -8,11 +8,12 @@ import numpy as np
 from mlsm_manager.multi_view.association import Neighbours, Pairs, pairs_of
 from mlsm_manager.multi_view.comparing import Comparing
 from mlsm_manager.multi_view.comparisons import add_comparisons, support
-from mlsm_manager.multi_view.estimate import scale_covariance
+from mlsm_manager.multi_view.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.lone_comparisons import LoneComparisons
 from mlsm_manager.multi_view.loops import Loop, add_loops, loops_of
+from mlsm_manager.multi_view.misfit import misfit_variances
 from mlsm_manager.multi_view.normal_equations import NormalEquations, solution_of
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -97,7 +98,15 @@ def solved(
         converged = problem.step() < window.tolerance or problem.step_deviations < window.settled
         steps += 1
     poses, run = problem.covariances()
+    poses = poses + misfit_covariance(_misfit(live, problem.state))
     return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
+
+
+def _misfit(live: LiveSolver, state: State) -> np.ndarray:
+    """Return how uncertain scans that fit nowhere make the place of each node (n,) [m^2]."""
+    matching = live.parameters.matching
+    of_turns = misfit_variances(live.log, live.odometry, state, matching, 0)
+    return np.cumsum(np.append(0.0, np.repeat(of_turns / matching.scan_parts, matching.scan_parts)))
 
 
 class _Batch:

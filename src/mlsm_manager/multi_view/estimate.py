@@ -20,6 +20,7 @@ class LiveEstimate:
     world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
     mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
+    misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place.
     """
 
     time: float
@@ -37,13 +38,13 @@ class LiveEstimate:
     agreement: float
     distance: float
     surfaces: np.ndarray
+    misfit_variance: float = 0.0
 
     @property
     def pose_covariance(self) -> np.ndarray:
         """(3, 3) of T_map_base: m^2, m rad, rad^2; what the world's scale adds grows from the map's origin."""
-        return (
-            self.covariance[POSE, POSE] + scale_covariance(self.T_map_base[np.newaxis], self.world_scale_deviation)[0]
-        )
+        by_scale = scale_covariance(self.T_map_base[np.newaxis], self.world_scale_deviation)[0]
+        return self.covariance[POSE, POSE] + by_scale + misfit_covariance(np.array([self.misfit_variance]))[0]
 
     @property
     def node_deviations(self) -> np.ndarray:
@@ -91,3 +92,8 @@ def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:
     """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map."""
     lengths = poses * np.array([1.0, 1.0, 0.0])
     return deviation**2 * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]
+
+
+def misfit_covariance(variances: np.ndarray) -> np.ndarray:
+    """Return what an uncertainty of the place by `variances` (n,) [m^2] adds to the covariances (n, 3, 3) of poses."""
+    return variances[:, np.newaxis, np.newaxis] * np.diag([1.0, 1.0, 0.0])

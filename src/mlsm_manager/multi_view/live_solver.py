@@ -1,5 +1,6 @@
 """Follows the vehicle scan by scan: the newest nodes are free, what is older stays where it was found."""
 
+from dataclasses import replace
 from typing import Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
@@ -10,6 +11,7 @@ from mlsm_manager.multi_view.growing import GrowingArray
 from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
+from mlsm_manager.multi_view.misfit import misfit_variances
 from mlsm_manager.multi_view.motion_samples import searched_nodes
 from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.odometry_model import OdometryModel
@@ -23,6 +25,7 @@ from mlsm_manager.multi_view.state import RUN_COLUMNS, State
 from node_support.errors import RefusedInput
 
 _ESTIMATE = "estimate."
+_UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 
 
@@ -53,6 +56,7 @@ class LiveSolver:
         self._nodes.extend(self.odometry.first_node()[np.newaxis])
         self._node_covariances = GrowingArray(3, 3)
         self._run = run_mean(parameters.sonar)
+        self._misfits = GrowingArray()
         self._start, self._known = start, known
         self.islands = Islands(np.empty(0))
         self.search: Optional[Whereabouts] = None
@@ -64,6 +68,7 @@ class LiveSolver:
             "nodes": self._nodes.values.copy(),
             "node_covariances": self._node_covariances.values.copy(),
             "run_unknowns": self._run.copy(),
+            "misfits": self._misfits.values.copy(),
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             "islands": self.islands.numbers,
@@ -96,6 +101,7 @@ class LiveSolver:
         solver._nodes.replace_from(0, nodes)
         solver._node_covariances.replace_from(0, covariances)
         solver._run[:] = stored["run_unknowns"]
+        solver._misfits.replace_from(0, stored["misfits"])
         solver.islands = Islands(stored["islands"])
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
         if len(solver.estimates) != solver.log.scan_count:
@@ -166,7 +172,15 @@ class LiveSolver:
             window = self._fitted()
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
         self._node_covariances.replace_from(window.oldest, covariances)
-        return estimates
+        variance = self._misfit_variance()
+        return [replace(estimate, misfit_variance=variance) for estimate in estimates]
+
+    def _misfit_variance(self) -> float:
+        """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
+        first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
+        newest = misfit_variances(self.log, self.odometry, self.state, self.parameters.matching, first)
+        self._misfits.replace_from(first, newest)
+        return float(self._misfits.values.sum())
 
     def _fitted(self) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution."""

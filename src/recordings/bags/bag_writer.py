@@ -2,12 +2,14 @@
 
 import struct
 from pathlib import Path
-from typing import Any, Dict, NamedTuple
+from typing import Any, Dict, List, NamedTuple
 
+import numpy as np
 from rosbags.rosbag1 import Writer
 
 from recordings.bags.blank_message import blank_message
 from recordings.bags.message_bytes import Write, serializer
+from recordings.bags.message_rows import message_rows
 from recordings.bags.message_types import ros1_types
 
 COMPRESSIONS = ("none", "lz4", "bz2")
@@ -35,6 +37,17 @@ class _Topic(NamedTuple):
     connection: int
     head: bytes
     to_bytes: Write
+
+
+class PackedMessages(NamedTuple):
+    """Messages of one topic that can be appended.
+
+    connection: number of the topic. stamps_ns: of each message. records: the bytes of each in the file.
+    """
+
+    connection: int
+    stamps_ns: List[int]
+    records: List[bytes]
 
 
 class BagWriter:
@@ -68,10 +81,36 @@ class BagWriter:
 
     def write(self, topic: str, message: Any, stamp_ns: int) -> None:
         """Append a message, made by `make` or read from a bag of the same type. Raises OSError."""
+        known = self._known(topic, message)
+        data = known.to_bytes(message)
+        record = known.head + _TIME_AND_SIZE.pack(*divmod(stamp_ns, 10**9), len(data)) + data
+        self._append(known.connection, record, stamp_ns)
+
+    def pack(self, topic: str, message: Any, stamps_ns: np.ndarray) -> PackedMessages:
+        """Return messages with stamps (n,) int64, ready to be appended; `message_rows` says how `message` holds them.
+
+        Topics get their numbers in the order in which they are packed or written first.
+        """
+        known = self._known(topic, message)
+        rows = message_rows(ros1_types(), message.__msgtype__, message, len(stamps_ns))
+        start = len(known.head)
+        records = np.empty((len(rows), start + _TIME_AND_SIZE.size + rows.shape[1]), np.uint8)
+        records[:, :start] = np.frombuffer(known.head, np.uint8)
+        seconds, nanoseconds = np.divmod(stamps_ns, 10**9)
+        times = np.column_stack([seconds, nanoseconds, np.full(len(rows), rows.shape[1])]).astype("<u4")
+        records[:, start : start + _TIME_AND_SIZE.size] = times.view(np.uint8)
+        records[:, start + _TIME_AND_SIZE.size :] = rows
+        return PackedMessages(known.connection, stamps_ns.tolist(), [record.tobytes() for record in records])
+
+    def append(self, messages: PackedMessages, place: int) -> None:
+        """Append the message at `place` of packed ones. Raises OSError."""
+        self._append(messages.connection, messages.records[place], messages.stamps_ns[place])
+
+    def _known(self, topic: str, message: Any) -> _Topic:
         known = self._topics.get(topic)
         if known is None:
             known = self._topics[topic] = self._added(topic, message.__msgtype__)
-        self._append(known, known.to_bytes(message), stamp_ns)
+        return known
 
     def _added(self, topic: str, kind: str) -> _Topic:
         number = self._writer.add_connection(topic, kind, typestore=ros1_types()).id
@@ -81,16 +120,15 @@ class BagWriter:
             serializer(ros1_types(), kind),
         )
 
-    def _append(self, topic: _Topic, data: bytes, stamp_ns: int) -> None:
+    def _append(self, connection: int, record: bytes, stamp_ns: int) -> None:
         """Do what rosbags's Writer.write does, without making the record's header anew for each message."""
         chunk = self._writer.chunks[-1]
         place = chunk.data.tell()
-        chunk.connections[topic.connection].append((stamp_ns, place))
+        chunk.connections[connection].append((stamp_ns, place))
         if stamp_ns < chunk.start:
             chunk.start = stamp_ns
         if stamp_ns > chunk.end:
             chunk.end = stamp_ns
-        record = topic.head + _TIME_AND_SIZE.pack(*divmod(stamp_ns, 10**9), len(data)) + data
         chunk.data.write(record)
         if place + len(record) > self._writer.chunk_threshold:
             self._writer.write_chunk(chunk)

@@ -4,7 +4,7 @@ import struct
 from functools import lru_cache
 from itertools import groupby
 from operator import attrgetter
-from typing import Any, Callable, Iterator, List, NamedTuple
+from typing import Any, Callable, Iterator, List, NamedTuple, Tuple
 
 from rosbags.interfaces import Nodetype
 from rosbags.typesys.store import Typestore
@@ -12,10 +12,11 @@ from rosbags.typesys.store import Typestore
 Write = Callable[[Any], bytes]
 """Takes a message and returns the bytes of some of its fields, or of all."""
 
-_CODES = {
+CODES = {
     "bool": "?", "byte": "B", "char": "B", "octet": "B", "int8": "b", "uint8": "B", "int16": "h", "uint16": "H",
     "int32": "i", "uint32": "I", "int64": "q", "uint64": "Q", "float32": "f", "float64": "d",
 }  # fmt: skip
+"""Of the numbers that messages hold, as struct and numpy call them."""
 _LENGTH = struct.Struct("<i")
 
 
@@ -51,16 +52,23 @@ def serializer(store: Typestore, name: str) -> Write:
 
 
 def _flattened(store: Typestore, name: str, prefix: str) -> Iterator[_Field]:
-    for field, (node, detail) in store.FIELDDEFS[name][1]:
+    for field, node, detail in fields_of(store, name):
         if node == Nodetype.NAME:
             yield from _flattened(store, detail, f"{prefix}{field}.")
-        elif field != "structure_needs_at_least_one_member":
+        else:
             yield _Field(prefix + field, node, detail)
+
+
+def fields_of(store: Typestore, name: str) -> Iterator[Tuple[str, Nodetype, Any]]:
+    """Yield name, node type and detail, as in rosbags, of each field of a type that is in its bytes."""
+    for field, (node, detail) in store.FIELDDEFS[name][1]:
+        if field != "structure_needs_at_least_one_member":
+            yield field, node, detail
 
 
 def _numbers(fields: List[_Field]) -> Write:
     """Return what packs numbers that follow each other at once."""
-    packed = struct.Struct("<" + "".join(_CODES[field.detail[0]] for field in fields))
+    packed = struct.Struct("<" + "".join(CODES[field.detail[0]] for field in fields))
     paths = [field.path for field in fields]
     take = attrgetter(*paths)
     if len(paths) == 1:
@@ -71,7 +79,7 @@ def _numbers(fields: List[_Field]) -> Write:
 def _writer(store: Typestore, field: _Field) -> Write:
     take = attrgetter(field.path)
     if field.node == Nodetype.BASE:
-        return lambda message: _text(take(message))
+        return lambda message: text_bytes(take(message))
     kind, length = field.detail
     to_bytes = _elements(store, *kind)
     if field.node == Nodetype.ARRAY:
@@ -90,8 +98,8 @@ def _elements(store: Typestore, node: Nodetype, detail: Any) -> Write:
         write = serializer(store, detail)
         return lambda values: b"".join([write(value) for value in values])
     if detail[0] == "string":
-        return lambda values: b"".join([_text(value) for value in values])
-    dtype = "<" + _CODES[detail[0]]
+        return lambda values: b"".join([text_bytes(value) for value in values])
+    dtype = "<" + CODES[detail[0]]
     return lambda values: values.astype(dtype, copy=False).tobytes()
 
 
@@ -102,6 +110,7 @@ def _of_length(values: Any, length: int, path: str) -> Any:
 
 
 @lru_cache(maxsize=1000)  # Texts: names of frames and joints mostly, which come with every message
-def _text(text: str) -> bytes:
+def text_bytes(text: str) -> bytes:
+    """Return a text with its length before it."""
     encoded = text.encode()
     return _LENGTH.pack(len(encoded)) + encoded

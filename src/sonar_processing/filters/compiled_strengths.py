@@ -11,7 +11,8 @@ _STAMPS = types.Array(float64, 1, "C", readonly=True)
 _SILENT = HIGHEST_LEVEL + 1
 _COUNTERS = 4
 """Neighbouring bins often have the same level, and a single counter would wait for its own last result."""
-_ZERO, _HIGHEST = np.float32(0.0), np.float32(HIGHEST_LEVEL)
+_ZERO, _HIGHEST, _INFINITE = np.float32(0.0), np.float32(HIGHEST_LEVEL), np.float32(np.inf)
+_EXPONENT, _LONG_EXPONENT = np.int32(0x7F800000), np.int64(0x7FF0000000000000)
 _GREATEST, _GREATEST_STAMP = np.finfo(np.float32).max, np.finfo(np.float64).max
 
 
@@ -26,26 +27,35 @@ def _is_finite(points, stamps, point):
     )
 
 
+@njit(cache=True)
+def _are_all_finite(points, stamps):
+    """Return whether no bits of an exponent are all set: without a branch many values are looked at together."""
+    words, long_words = points.reshape(-1).view(np.int32), stamps.view(np.int64)
+    broken, long_broken = np.int32(0), np.int64(0)
+    for place in range(len(words)):
+        broken |= (words[place] & _EXPONENT) == _EXPONENT
+    for place in range(len(long_words)):
+        long_broken |= (long_words[place] & _LONG_EXPONENT) == _LONG_EXPONENT
+    return (broken == 0) & (long_broken == 0)
+
+
 @njit(types.Tuple((int64[::1], float32[::1]))(_POINTS, _STAMPS), cache=True)
 def count_strengths(points, stamps):
     """Return how many finite points (n, 4) with stamps (n,) have each level, (257,), the last those of strength 0 or
     less; and the lowest and the highest strength, and the lowest above 0, (3,).
     """
-    counts = np.zeros((_COUNTERS, _SILENT + 1), np.int64)
-    lowest, highest, weakest = np.float32(np.inf), np.float32(-np.inf), np.float32(np.inf)
+    counts, are_finite = np.zeros((_COUNTERS, _SILENT + 1), np.int64), _are_all_finite(points, stamps)
+    lowest, highest, weakest = _INFINITE, -_INFINITE, _INFINITE
     for point in range(len(points)):
-        if not _is_finite(points, stamps, point):
+        if not are_finite and not _is_finite(points, stamps, point):
             continue
         strength = points[point, 3]
-        level = _SILENT
-        if strength > _ZERO:
-            level = np.int64(min(strength, _HIGHEST))
-            if strength < weakest:
-                weakest = strength
-        if strength < lowest:
-            lowest = strength
-        if strength > highest:
-            highest = strength
+        is_silent = strength <= _ZERO
+        level = _SILENT if is_silent else np.int64(min(strength, _HIGHEST))
+        echo = _INFINITE if is_silent else strength
+        weakest = echo if echo < weakest else weakest
+        lowest = strength if strength < lowest else lowest
+        highest = strength if strength > highest else highest
         counts[point % _COUNTERS, level] += 1
     return counts.sum(axis=0), np.array([lowest, highest, weakest], np.float32)
 

@@ -1,45 +1,24 @@
 """Writes the bag of a whole simulation."""
 
-import math
-from itertools import cycle
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator
+from typing import Any, Callable, Dict, List, Sequence, Tuple
 
 import numpy as np
 import yaml
 
 from node_support import topics
 from node_support.files import whole_file
-from recordings.bags.bag_writer import BagWriter
+from recordings.bags.bag_writer import BagWriter, PackedMessages
 from sonar_simulator.simulation.moment_messages import MomentMessages
-from sonar_simulator.simulation.simulation import Moment
+from sonar_simulator.simulation.simulation import Moment, stacked
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup
 from sonar_simulator.vehicle.robot_description import RobotDescription
 from sonar_simulator.vehicle.servo import tilted
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head
-_OF_A_KIND = 4  # Messages of one type that a moment has at most, and some to spare
 _RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
 _SETTINGS_TOPIC = "/sonar_simulator/settings"
-
-
-class ReusedMessages:
-    """Gives messages of a moment again, filled in as they were, for a later one: making them takes longer than writing.
-
-    Whoever fills them in must set the same fields each time, and write them before the next moment.
-    """
-
-    def __init__(self, make: Callable[[str], Any]) -> None:
-        """`make` returns an empty message of a type, package/Name."""
-        self._make = make
-        self._made: Dict[str, Iterator[Any]] = {}
-
-    def __call__(self, kind: str) -> Any:
-        """Return a message of a type."""
-        if kind not in self._made:
-            self._made[kind] = cycle([self._make(kind) for _ in range(_OF_A_KIND)])
-        return next(self._made[kind])
 
 
 class SimulatedBag:
@@ -50,13 +29,11 @@ class SimulatedBag:
         self._setup = setup
         self._settings = settings
         self._messages = MomentMessages(bag.make, np.asarray)
-        self._of_moment = MomentMessages(ReusedMessages(bag.make), np.asarray)
-        self._tilt = math.nan
-        self._mount: Any = None
 
     def begin(self, robot: RobotDescription) -> None:
         """Write what applies to the whole bag: the fixed transforms and the parameters."""
-        stamp_ns, stamp = self._stamp(0.0)
+        stamp_ns = _stamp_ns(0.0)
+        stamp = self._bag.time(stamp_ns)
         transforms = [
             self._messages.transform(joint.T_parent_child, stamp, joint.parent, joint.child)
             for joint in robot.fixed_joints
@@ -66,31 +43,49 @@ class SimulatedBag:
         told.data = _told(self._settings)
         self._write(_SETTINGS_TOPIC, told, stamp_ns)
 
-    def add(self, moment: Moment) -> None:
-        """Write everything that belongs to a moment; its transforms are one message."""
-        stamp_ns, stamp = self._stamp(moment.time)
+    def add(self, moments: Sequence[Moment]) -> None:
+        """Write everything that belongs to moments, one after the other; the transforms of a moment are one message."""
+        kinds: Dict[Tuple[bool, bool], List[int]] = {}
+        for number, moment in enumerate(moments):
+            kinds.setdefault((moment.is_tick, moment.ping is not None), []).append(number)
+        packed: Dict[int, Tuple[List[PackedMessages], int]] = {}
+        for numbers in kinds.values():
+            topics_of_kind = self._packed(stacked([moments[number] for number in numbers]))
+            packed.update((number, (topics_of_kind, place)) for place, number in enumerate(numbers))
+        for number in range(len(moments)):
+            topics_of_kind, place = packed[number]
+            for messages in topics_of_kind:
+                self._bag.append(messages, place)
+
+    def _packed(self, moment: Moment) -> List[PackedMessages]:
+        """Return the messages of moments of a kind, topic by topic."""
+        stamps_ns = np.array([_stamp_ns(seconds) for seconds in moment.time.tolist()])
+        stamp = self._bag.time(stamps_ns)
         instruments = self._settings.simulator.instruments
-        messages = self._of_moment.at(moment, stamp, self._setup.sonar.max_range, instruments)
+        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
-        messages[0][1].transforms.append(self._mount_at(moment.tilt, stamp))
-        for topic, message in messages:
-            self._write(_RENAMED.get(topic, topic), message, stamp_ns)
+        messages[0][1].transforms.append(self._mounts(moment.tilt, stamp))
+        return [self._bag.pack(_name(topic), message, stamps_ns) for topic, message in messages]
 
-    def _mount_at(self, tilt: float, stamp: Any) -> Any:
-        """Return the sonar's mount as a message, which is written before the next one is asked for."""
-        if tilt != self._tilt:
-            pose = tilted(self._setup.T_base_sonar, tilt)
-            self._tilt, self._mount = tilt, self._messages.transform(pose, stamp, BASE_FRAME, SONAR_FRAME)
-        self._mount.header.stamp = stamp
-        return self._mount
-
-    def _stamp(self, seconds: float) -> Any:
-        stamp_ns = round(float(START_TIME + seconds) * 1e9)
-        return stamp_ns, self._bag.time(stamp_ns)
+    def _mounts(self, tilts: np.ndarray, stamp: Any) -> Any:
+        """Return the sonar's mount at each of the tilts (n,) as one message."""
+        angles, places = np.unique(tilts, return_inverse=True)
+        poses = np.array([tilted(self._setup.T_base_sonar, angle) for angle in angles])
+        return self._messages.transform(poses[places], stamp, BASE_FRAME, SONAR_FRAME)
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
-        self._bag.write(topic if topic.startswith("/") else f"/{topic}", message, stamp_ns)
+        self._bag.write(_name(topic), message, stamp_ns)
+
+
+def _stamp_ns(seconds: float) -> int:
+    return round(float(START_TIME + seconds) * 1e9)
+
+
+def _name(topic: str) -> str:
+    """Return a topic of the simulator as the bag has it."""
+    topic = _RENAMED.get(topic, topic)
+    return topic if topic.startswith("/") else f"/{topic}"
 
 
 def write_bag(
@@ -109,11 +104,11 @@ def write_bag(
     with whole_file(path) as temporary, BagWriter(temporary, compression) as bag:
         writer = SimulatedBag(bag, setup, settings)
         writer.begin(robot)
-        for moment in setup.simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
-            writer.add(moment)
-            if moment.ping is not None:
-                beams += 1
-                tell(moment.time)
+        for moments in setup.simulation.batches(settings.simulator.clock_rate, BEAMS_AT_ONCE):
+            if moments:
+                writer.add(moments)
+                beams += sum(moment.ping is not None for moment in moments)
+                tell(moments[-1].time)
     return beams
 
 

@@ -168,15 +168,14 @@ class VehicleScript:
 
 
 def _pose(position: np.ndarray) -> np.ndarray:
-    x, y, z, yaw = position
+    x, y, z, yaw = position.tolist()
     return pose_matrix((x, y, z), (0.0, 0.0, yaw))
 
 
 def _twist(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     cos_yaw, sin_yaw = math.cos(position[3]), math.sin(position[3])
-    forward = cos_yaw * velocity[0] + sin_yaw * velocity[1]
-    left = cos_yaw * velocity[1] - sin_yaw * velocity[0]
-    return np.array([forward, left, velocity[2], 0.0, 0.0, velocity[3]])
+    x, y, z, turn = velocity.tolist()
+    return np.array([cos_yaw * x + sin_yaw * y, cos_yaw * y - sin_yaw * x, z, 0.0, 0.0, turn])
 
 
 def _kind_of(values: Any) -> type:
