@@ -21,6 +21,7 @@ from mlsm_manager.multi_view.placement import PlacedPoints, place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS, Layout, State
+from mlsm_manager.multi_view.weak_directions import WeakDirections
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
@@ -164,6 +165,7 @@ class _Batch:
         matching = self._parameters.matching
         rows = self._log.rows(0, self._layout.last)
         points = place(self._log, self._odometry, self.state, rows, self._comparing.placed)
+        points = WeakDirections.of([points], matching).without(points, points.scans)
         if self._lists is None:
             self._lists = self._comparing.neighbours(points, matching.block_scans)
         pairs = pairs_of(self._lists, points, points, matching.cut, matching, self._comparing.weighed)

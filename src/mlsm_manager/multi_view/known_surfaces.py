@@ -59,7 +59,7 @@ class KnownSurfaces:
         self._look_at(np.concatenate(parts))
 
     def compared(self, sources: PlacedPoints, cut: float, matching: SurfaceMatching) -> tuple:
-        """Return the Pairs of `sources` with their nearest blocks within `cut` [m], and these as PlacedPoints.
+        """Return m Pairs of `sources` with their nearest blocks within `cut` [m], and these as m PlacedPoints.
 
         Blocks that are as near share the comparison. The blocks' normals point as those of the sources do.
         """
@@ -79,7 +79,7 @@ class KnownSurfaces:
         importance = share * faded(distance, np.abs(cosine), cut, matching)
         importance = importance * sources.qualities[rows] * targets.qualities
         kept = importance > 0.0
-        return Pairs(rows[kept], np.flatnonzero(kept), importance[kept]), targets
+        return Pairs(rows[kept], np.arange(int(kept.sum())), importance[kept]), targets.selected(kept)
 
 
 def _placed(places: np.ndarray, normals: np.ndarray, qualities: np.ndarray) -> PlacedPoints:

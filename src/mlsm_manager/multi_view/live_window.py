@@ -20,6 +20,7 @@ from mlsm_manager.multi_view.placement import place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
+from mlsm_manager.multi_view.weak_directions import WeakDirections
 from node_support.geometry.planar import composed, inverse
 
 _FORGOTTEN_DELAY = 2.0
@@ -138,8 +139,10 @@ class LiveWindow:
         matching = self._parameters.matching
         rows = self._log.rows(self._recent, self._layout.last)
         recent = place(self._log, self._odometry, self._state, rows, self._comparing.placed)
-        sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         frozen = self._frozen.moved_by_run(self._state.run)
+        weak = WeakDirections.of((frozen, recent), matching)
+        frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
+        sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         if self._lists is None:
             self._lists = tuple(
                 self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
@@ -156,6 +159,7 @@ class LiveWindow:
         summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, matching)
+            known = weak.without(known, sources.scans[to_known.rows])
             to_known = self._islands.within(to_known, sources, known)
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])

@@ -1,49 +1,105 @@
-"""Takes away what comparisons of scans seem to say along a direction that their surfaces do not tell."""
+"""Takes away what surfaces seem to say along a direction that they do not tell.
 
-from typing import Tuple
+The walls of a straight canal tell nothing of the way along it, but seem to. Their normals err; and strong echoes, which
+last longer, make a wall bulge where it is square-on, so that the bulge travels with the vehicle. What both say is that
+nothing moves, since every point is compared with its nearest neighbour.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Sequence
 
 import numpy as np
 
-_NOTHING = 1e-12  # 1/m^2: keeps scans without information from dividing by zero
+from mlsm_manager.multi_view.comparisons import variances
+from mlsm_manager.multi_view.parameters import SurfaceMatching
+from mlsm_manager.multi_view.placement import PlacedPoints
+from mlsm_manager.multi_view.state import BEFORE_THE_RUN
+from mlsm_manager.multi_view.surface_points import ramp
+
+_SCANS = 10
+"""Scans before and after a scan, two minutes each, whose surfaces say with its own which direction is weak. The normals
+of one scan err by some degrees together, and forces across a wall would act along it by as much."""
+_TOLD = (8.0, 4.0)
+"""Times normal_deviation^2: share of what is told across above which all counts that is told along a direction, and
+below which nothing does. Normals alone make up 1; walls with bulges that travel made up to 2.5 in simulated canals."""
+_FACING = (0.2, 0.5)
+"""Length of what is left of a normal: a wall that faces along the weak direction counts for nothing across it below the
+first, one that bulges by up to 60 degrees as any other from the second on."""
+_NOTHING = 1e-12  # keeps scans without information, and normals along a weak direction, from dividing by zero
+_ALIKE = float(np.cos(0.1))  # cosine of the angle up to which directions are alike: half of what normals err by
 
 
-def discounted(
-    information: np.ndarray, gradient: np.ndarray, scans: np.ndarray, places: np.ndarray, normal_deviation: float
-) -> Tuple[np.ndarray, np.ndarray]:
-    """Return `information` (g, c, c) and `gradient` (g, c) of g pairs of scans without what errors of normals say.
+@dataclass(frozen=True)
+class WeakDirections:
+    """The direction that the surfaces around each scan tell least of.
 
-    scans: (g,) the compared scan of each pair. places: (4, 2) columns of x and y of a pair's nodes, first those of the
-    compared scan. normal_deviation: rad, of the surfaces' normals.
-
-    The walls of a straight canal tell nothing of the way along it. Normals that err by some degrees seem to tell it.
-    What they say is that nothing moves, since every point is compared with its nearest neighbour. So the information
-    along the direction that all pairs of a scan tell least of counts only as far as it exceeds normal_deviation^2 of
-    that across it.
+    first: number of the first scan. directions: (s, 2) unit vectors in map of that scan and those after it. lost: (s,)
+    from 0 to 1, how much of what is told along them does not count.
     """
-    if not len(scans):
-        return information, gradient
-    _, own = np.unique(scans, return_inverse=True)
-    values, vectors = np.linalg.eigh(_by_translation(information, places[:2], own))
-    lost = np.minimum(1.0, normal_deviation**2 * values[:, 1] / np.maximum(values[:, 0], _NOTHING))[own, np.newaxis]
-    across = _projections(vectors[own, :, 0], places, information.shape[1])
-    only_across = across @ information @ across
-    gradient_across = np.einsum("gcd,gd->gc", across, gradient)
-    return (
-        information + lost[..., np.newaxis] * (only_across - information),
-        gradient + lost * (gradient_across - gradient),
-    )
+
+    first: int
+    directions: np.ndarray
+    lost: np.ndarray
+
+    @classmethod
+    def of(cls, sets: Sequence[PlacedPoints], matching: SurfaceMatching) -> "WeakDirections":
+        """Return those of scans with points in `sets`; a scan of the run has all of its points in one of them."""
+        scans = np.concatenate([points.scans for points in sets])
+        if not len(scans) or matching.normal_deviation == 0.0:
+            return cls(0, np.zeros((0, 2)), np.zeros(0))
+        first = int(scans.min())
+        told = np.concatenate([_told(points, matching) for points in sets])
+        reach = _SCANS * matching.scan_parts
+        sums = np.stack([_around(np.bincount(scans - first, part), reach) for part in told.T], axis=1).reshape(-1, 2, 2)
+        values, _ = np.linalg.eigh(sums)
+        shares = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
+        all_counts, nothing_counts = (factor * matching.normal_deviation**2 for factor in _TOLD)
+        lost = ramp(shares, all_counts, nothing_counts)
+        return cls(first, _in_common(sums * lost[:, np.newaxis, np.newaxis]), lost)
+
+    def without(self, points: PlacedPoints, scans: np.ndarray) -> PlacedPoints:
+        """Return `points` with normals turned across the weak directions of `scans` (n,), one per point.
+
+        Distances from their surfaces are then those across. Walls that face along a weak direction do not count.
+        """
+        rows = scans - self.first
+        known = (rows >= 0) & (rows < len(self.lost))
+        if not self.lost.any() or not known.any():
+            return points
+        rows = np.where(known, rows, 0)
+        along = np.einsum("na,na->n", points.normals, self.directions[rows])
+        parts = (known * self.lost[rows] * along)[:, np.newaxis] * self.directions[rows]
+        normals = points.normals - parts
+        lengths = np.hypot(*normals.T)
+        normals = normals / np.maximum(lengths, _NOTHING)[:, np.newaxis]
+        return replace(points, normals=normals, qualities=points.qualities * ramp(lengths, *_FACING))
 
 
-def _by_translation(information: np.ndarray, places: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Return the information (s, 2, 2) on translations of s scans; own: (g,) which of them a pair compares."""
-    parts = information[:, places[:, np.newaxis, :, np.newaxis], places[:, np.newaxis]].sum(axis=(1, 2))
-    return np.stack([np.bincount(own, part) for part in parts.reshape(-1, 4).T], axis=1).reshape(-1, 2, 2)
+def _in_common(sums: np.ndarray) -> np.ndarray:
+    """Return the weak directions (s, 2) of scans that tell `sums` (s, 2, 2); those in a row that are alike have one.
 
-
-def _projections(directions: np.ndarray, places: np.ndarray, size: int) -> np.ndarray:
-    """Return matrices (g, size, size) that take the part along `directions` (g, 2) out of all translations."""
-    result = np.tile(np.eye(size), (len(directions), 1, 1))
-    along = directions[:, :, np.newaxis] * directions[:, np.newaxis]
-    for place in places:
-        result[:, place[:, np.newaxis], place] -= along
+    Directions that differ by 0.1 degrees would tell the way along a canal to ten metres.
+    """
+    own = _weakest(sums)
+    result, begin = own.copy(), 0
+    for scan in range(1, len(sums) + 1):
+        common = _weakest(sums[begin:scan].sum(axis=0))
+        if scan == len(sums) or abs(own[scan] @ common) < _ALIKE:
+            result[begin:scan], begin = common, scan
     return result
+
+
+def _weakest(sums: np.ndarray) -> np.ndarray:
+    return np.linalg.eigh(sums)[1][..., 0]
+
+
+def _told(points: PlacedPoints, matching: SurfaceMatching) -> np.ndarray:
+    """Return what each point tells of a translation (n, 4) [1/m^2]: a matrix (2, 2) in one row."""
+    weight = points.qualities / variances(points.slants, points.slants, matching) * (points.scans > BEFORE_THE_RUN)
+    return np.einsum("n,na,nb->nab", weight, points.normals, points.normals).reshape(-1, 4)
+
+
+def _around(values: np.ndarray, reach: int) -> np.ndarray:
+    """Return the sum (s,) of the values (s,) up to `reach` places from each one, near ones counting more."""
+    weights = 1.0 - np.abs(np.arange(-reach, reach + 1)) / (reach + 1.0)
+    return np.convolve(values, weights)[reach : reach + len(values)]

@@ -26,6 +26,22 @@ def heard(turns, posts=POSTS, seed=0):
     return [_scan(turn * _TURN_SECONDS, track, posts, rng) for turn in range(turns)]
 
 
+def cluttered(scans, count=10, seed=0):
+    """Return the scans with `count` strong echoes more each, anywhere in 50 x 26 m around the vehicle."""
+    rng = np.random.RandomState(seed)
+    return [_with_clutter(scan, rng.uniform([-25.0, -13.0], [25.0, 13.0], (count, 2)), rng) for scan in scans]
+
+
+def _with_clutter(scan, places, rng):
+    points = np.column_stack([places, np.zeros(len(places)), np.full(len(places), _STRENGTH)])
+    times = np.append(scan.times, rng.uniform(scan.times[0], scan.times[-1], len(places)))
+    order = np.argsort(times, kind="stable")
+    return Scan(
+        np.vstack([scan.points, points])[order], times[order], np.ones(len(times), dtype=bool), scan.track,
+        scan.reference_time,
+    )  # fmt: skip
+
+
 def _scan(start, track, posts, rng):
     stamps = start + _TURN_SECONDS / _BEAMS * np.arange(_BEAMS)
     bearings = 2.0 * np.pi / _BEAMS * np.arange(_BEAMS)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_posts import SPEED, heard, true_path
+from made_posts import SPEED, cluttered, heard, true_path
 
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.batch_solver import solved
@@ -113,6 +113,16 @@ def test_the_told_deviation_is_smaller_where_posts_tell_the_way(scans):
 
 def test_speed_is_found_from_posts(scans):
     assert solver_of(scans, lone_quality=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
+
+
+def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error():
+    """Nothing tells the way along it, so the deviation is that of a speed which nobody knows."""
+    bare = heard(TURNS, posts=np.array([[-500.0, 0.0]]))
+    clear, disturbed = (solver_of(scans, lone_quality=0.0) for scans in (bare, cluttered(bare)))
+    told = np.sqrt(disturbed.estimates[-1].pose_covariance[0, 0])
+    found, true = gone(disturbed, disturbed.state.nodes)
+    assert abs(found - true) < 3.0 * told
+    assert told > 0.5 * np.sqrt(clear.estimates[-1].pose_covariance[0, 0])
 
 
 def test_a_point_that_no_other_scan_heard_says_nothing():

@@ -1,99 +1,116 @@
-"""What comparisons say along a direction that no surface tells."""
+"""What surfaces say along a direction that they do not tell."""
 
 import numpy as np
 import pytest
 
-from mlsm_manager.multi_view.weak_directions import discounted
+from mlsm_manager.multi_view.parameters import SurfaceMatching
+from mlsm_manager.multi_view.placement import PlacedPoints
+from mlsm_manager.multi_view.state import BEFORE_THE_RUN
+from mlsm_manager.multi_view.weak_directions import WeakDirections
 
-PLACES = np.array([[0, 1], [3, 4], [6, 7], [9, 10]])
-COLUMNS = 14
-NORMAL_DEVIATION = 0.3
+MATCHING = SurfaceMatching(normal_deviation=0.2)
+SCANS = 5
 
 
-def compared(normals, seed=0):
-    """Return information and gradient of one pair of scans with points on surfaces with `normals` (n, 2)."""
-    rng = np.random.RandomState(seed)
-    late, later = rng.rand(2, len(normals), 1)
-    yaw = rng.normal(0.0, 5.0, (4, len(normals), 1))
-    parts = [(1.0 - late) * normals, yaw[0], late * normals, yaw[1]]
-    parts += [-(1.0 - later) * normals, yaw[2], -later * normals, yaw[3], np.zeros((len(normals), 2))]
-    jacobian = np.hstack(parts)
-    return jacobian.T @ jacobian, jacobian.T @ rng.normal(0.0, 0.1, len(normals))
+def points_with(normals, scans):
+    """Return points of `scans` (n,) on surfaces with `normals` (n, 2)."""
+    count = len(normals)
+    return PlacedPoints(
+        scans=np.asarray(scans), places=np.zeros((count, 2)), arms=np.zeros((count, 2)), normals=normals,
+        slants=np.zeros(count), qualities=np.ones(count), shares=np.zeros(count), by_run=np.zeros((count, 2, 2)),
+    )  # fmt: skip
 
 
 def normals_at(angles):
     return np.column_stack([np.cos(angles), np.sin(angles)])
 
 
-def canal(direction, count=200, seed=0):
-    """Return the normals of both walls of a straight canal along `direction` [rad], which err by 0.15 rad."""
+def canal(direction, error=0.15, per_scan=40, first=0, seed=0):
+    """Return points on both walls of a straight canal along `direction` [rad], whose normals err by `error` [rad]."""
     rng = np.random.RandomState(seed)
-    sides = rng.choice([-0.5 * np.pi, 0.5 * np.pi], count)
-    return normals_at(direction + sides + rng.normal(0.0, 0.15, count))
+    scans = np.repeat(first + np.arange(SCANS), per_scan)
+    sides = rng.choice([-0.5 * np.pi, 0.5 * np.pi], len(scans))
+    return points_with(normals_at(direction + sides + rng.normal(0.0, error, len(scans))), scans)
 
 
-def along(direction):
-    """Return by how much each column changes when the compared scan moves by 1 m along `direction` [rad]."""
-    change = np.zeros(COLUMNS)
-    change[PLACES[:2]] = normals_at(np.array([direction]))
-    return change
-
-
-def told(information, direction):
-    return along(direction) @ information @ along(direction)
-
-
-def discounted_once(information, gradient):
-    found = discounted(information[np.newaxis], gradient[np.newaxis], np.zeros(1, int), PLACES, NORMAL_DEVIATION)
-    return found[0][0], found[1][0]
+def told_by(points, matching=MATCHING):
+    return WeakDirections.of([points], matching).without(points, points.scans)
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.6, 2.0])
-def test_straight_walls_say_next_to_nothing_of_the_way_along_them(direction):
-    information, gradient = compared(canal(direction))
-    found, slope = discounted_once(information, gradient)
-    assert told(found, direction) < 0.02 * told(information, direction)
-    assert abs(slope @ along(direction)) < 0.1 * abs(gradient @ along(direction)) + 0.1
+def test_straight_walls_say_nothing_of_the_way_along_them(direction):
+    told = told_by(canal(direction))
+    along = told.normals @ normals_at(np.array([direction]))[0]
+    assert np.abs(along).max() < 0.03
 
 
 def test_straight_walls_say_all_of_the_way_across_them():
-    information, gradient = compared(canal(0.0))
-    found, _ = discounted_once(information, gradient)
-    assert told(found, 0.5 * np.pi) == pytest.approx(told(information, 0.5 * np.pi), rel=0.01)
+    points = canal(0.0)
+    told = told_by(points)
+    np.testing.assert_allclose(told.normals[:, 1], np.sign(points.normals[:, 1]), atol=0.01)
+    np.testing.assert_array_equal(told.qualities, points.qualities)
 
 
-def test_walls_that_face_all_ways_say_nearly_as_much_as_before():
-    information, gradient = compared(normals_at(np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)))
-    found, _ = discounted_once(information, gradient)
-    for direction in np.linspace(0.0, np.pi, 7):
-        assert told(found, direction) > 0.85 * told(information, direction)
+def test_bulges_that_travel_along_a_wall_say_nothing_of_the_way_along_it():
+    points = canal(0.0)
+    points.normals[::20] = normals_at(np.full(len(points.normals[::20]), 0.9))
+    assert np.abs(told_by(points).normals[:, 0]).max() < 0.03
 
 
-def test_all_pairs_of_a_scan_together_tell_which_direction_is_weak():
-    """One wall is all that some pairs see; the scan as a whole is held by both."""
-    pairs = [compared(normals_at(np.full(50, angle))) for angle in (0.0, 0.5 * np.pi)]
-    information, gradient = (np.array(parts) for parts in zip(*pairs))
-    of_one_scan, _ = discounted(information, gradient, np.zeros(2, int), PLACES, NORMAL_DEVIATION)
-    of_two, _ = discounted(information, gradient, np.arange(2), PLACES, NORMAL_DEVIATION)
-    assert told(of_one_scan.sum(axis=0), 0.0) > 0.8 * told(information.sum(axis=0), 0.0)
-    np.testing.assert_allclose(told(of_two[0], 0.0), told(information[0], 0.0))
+def test_a_few_echoes_that_face_along_a_canal_do_not_count():
+    points = canal(0.0)
+    points.normals[::40] = [1.0, 0.0]
+    told = told_by(points)
+    np.testing.assert_array_equal(told.qualities[::40], 0.0)
 
 
-def test_what_is_left_is_never_less_than_nothing():
-    for seed in range(20):
-        normals = normals_at(np.random.RandomState(seed).normal(0.0, 0.05 * seed, 30))
-        found, _ = discounted_once(*compared(normals, seed))
-        assert np.linalg.eigvalsh(found).min() > -1e-9
+def test_a_wall_that_closes_a_canal_tells_the_way_along_it():
+    points = canal(0.0)
+    points.normals[::3] = [1.0, 0.0]
+    np.testing.assert_array_equal(told_by(points).normals, points.normals)
 
 
-def test_normals_without_error_keep_all_information():
-    information, gradient = compared(canal(0.3))
-    found = discounted(information[np.newaxis], gradient[np.newaxis], np.zeros(1, int), PLACES, 0.0)
-    np.testing.assert_array_equal(found[0][0], information)
-    np.testing.assert_array_equal(found[1][0], gradient)
+def test_walls_that_face_all_ways_say_as_much_as_before():
+    angles = np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)
+    points = points_with(normals_at(angles), np.repeat(np.arange(SCANS), 40))
+    np.testing.assert_array_equal(told_by(points).normals, points.normals)
 
 
-def test_no_pairs_give_no_information():
-    nothing = np.empty((0, COLUMNS, COLUMNS)), np.empty((0, COLUMNS))
-    found = discounted(*nothing, np.empty(0, int), PLACES, NORMAL_DEVIATION)
-    assert (found[0].shape, found[1].shape) == (nothing[0].shape, nothing[1].shape)
+def test_scans_around_a_scan_tell_with_it_which_direction_is_weak():
+    """The normals of a single scan may err together."""
+    points = canal(0.0, error=0.0)
+    middle = points.scans == SCANS // 2
+    points.normals[middle] = normals_at(np.arctan2(*points.normals[middle].T[::-1]) + 0.1)
+    found = WeakDirections.of([points], MATCHING)
+    assert abs(found.directions[SCANS // 2, 1]) < 0.03
+
+
+def test_scans_along_one_canal_have_one_direction():
+    """By so much as two scans differ, what is told across the canal would tell the way along it."""
+    found = WeakDirections.of([canal(0.3)], MATCHING)
+    np.testing.assert_allclose(found.directions, found.directions[:1].repeat(SCANS, axis=0), atol=1e-12)
+
+
+def test_scans_far_from_a_scan_do_not_say_what_it_tells():
+    parts = canal(0.0), canal(0.5 * np.pi, first=100)
+    found = WeakDirections.of(parts, MATCHING)
+    for part, axis in zip(parts, (0, 1)):
+        told = found.without(part, part.scans)
+        assert np.abs(told.normals[:, axis]).max() < 0.03
+
+
+def test_surfaces_of_a_map_from_before_the_run_are_told_by_the_scans_compared_with_them():
+    points = canal(0.0)
+    known = points_with(canal(0.0, seed=1).normals, np.full(len(points), BEFORE_THE_RUN))
+    told = WeakDirections.of([points, known], MATCHING).without(known, points.scans)
+    assert np.abs(told.normals[:, 0]).max() < 0.03
+
+
+def test_normals_without_error_stay_as_they_are():
+    points = canal(0.3)
+    assert told_by(points, SurfaceMatching(normal_deviation=0.0)) is points
+
+
+def test_no_points_have_no_weak_direction():
+    nothing = points_with(np.empty((0, 2)), np.empty(0, dtype=np.int64))
+    assert len(told_by(nothing)) == 0
