@@ -55,7 +55,9 @@ class WeakDirections:
         shares = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
         all_counts, nothing_counts = (factor * matching.normal_deviation**2 for factor in _TOLD)
         lost = ramp(shares, all_counts, nothing_counts)
-        return cls(first, _in_common(sums * lost[:, np.newaxis, np.newaxis]), lost)
+        directions, heard = np.zeros((len(lost), 2)), np.unique(scans - first)
+        directions[heard] = _in_common((sums * lost[:, np.newaxis, np.newaxis])[heard])
+        return cls(first, directions, lost)
 
     def without(self, points: PlacedPoints, scans: np.ndarray) -> PlacedPoints:
         """Return `points` with normals turned across the weak directions of `scans` (n,), one per point.
@@ -81,16 +83,19 @@ def _in_common(sums: np.ndarray) -> np.ndarray:
     Directions that differ by 0.1 degrees would tell the way along a canal to ten metres.
     """
     own = _weakest(sums)
-    result, begin = own.copy(), 0
-    for scan in range(1, len(sums) + 1):
-        common = _weakest(sums[begin:scan].sum(axis=0))
-        if scan == len(sums) or abs(own[scan] @ common) < _ALIKE:
-            result[begin:scan], begin = common, scan
+    result, begin, together = own.copy(), 0, np.zeros((2, 2))
+    for scan in range(len(sums)):
+        if scan > begin and abs(own[scan] @ _weakest(together)) < _ALIKE:
+            result[begin:scan], begin, together = _weakest(together), scan, np.zeros((2, 2))
+        together = together + sums[scan]
+    result[begin:] = _weakest(together)
     return result
 
 
 def _weakest(sums: np.ndarray) -> np.ndarray:
-    return np.linalg.eigh(sums)[1][..., 0]
+    """Return the eigenvectors (..., 2) of the smaller eigenvalues of symmetric matrices (..., 2, 2)."""
+    angles = 0.5 * np.arctan2(2.0 * sums[..., 0, 1], sums[..., 0, 0] - sums[..., 1, 1])
+    return np.stack([-np.sin(angles), np.cos(angles)], axis=-1)
 
 
 def _told(points: PlacedPoints, matching: SurfaceMatching) -> np.ndarray:
