@@ -6,11 +6,13 @@ import numpy as np
 
 from mlsm_manager.multi_view.association import Pairs
 from mlsm_manager.multi_view.normal_equations import NormalEquations
+from mlsm_manager.multi_view.normal_errors import discounted
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints
 from mlsm_manager.multi_view.state import BEFORE_THE_RUN, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout
 
 _PAIR_COLUMNS = 4 * POSE_COLUMNS + RUN_COLUMNS
+_PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
 Summation = Callable[[Pairs, PlacedPoints, PlacedPoints, SurfaceMatching, float], Tuple[np.ndarray, ...]]
 """Takes pairs, sources, targets, matching and the cut [m]; returns the scans of sources (g,) and of targets (g,) of all
 pairs of scans that are compared, their information (g, 14, 14) and gradients (g, 14); the columns are those of
@@ -32,6 +34,10 @@ def add_comparisons(
     if not len(pairs.rows):
         return 0
     scans, other_scans, information, gradient = summation(pairs, sources, targets, matching, cut)
+    if matching.normal_deviation > 0.0:
+        # The parts of a turn together hear walls on all sides, each part alone perhaps one.
+        turns = scans // matching.scan_parts
+        information, gradient = discounted(information, gradient, turns, _PLACES, matching.normal_deviation)
     equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
     return len(pairs.rows)
 

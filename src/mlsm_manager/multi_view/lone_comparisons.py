@@ -32,7 +32,7 @@ class LoneComparisons:
         rows = [log.lone.rows(scan, scan + 1) for scan in scans]
         self._rows = np.concatenate([np.empty(0, dtype=np.int64), *rows])
         self._importance = matching.lone_quality * np.repeat(importance, [len(own) for own in rows])
-        self._matching = matching
+        self._matching = replace(matching, normal_deviation=0.0)
         self._lists: Optional[NeighbourLists] = None
 
     def add(self, equations: NormalEquations, layout: Layout, state: State, cut: float) -> int:
