@@ -72,7 +72,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("slip_time", 10.0, "s: as long as it keeps a speed"),
         Setting("scan_parts", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"),
         _NEIGHBOURS,
-        _NORMALS,
+        Setting("normal_deviation", 0.1, "rad: half of heading's, so that the little that parts of a turn hear counts"),
         *_COMPASS,
     ),
     OdometryKind.NONE: (
