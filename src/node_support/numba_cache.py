@@ -36,7 +36,7 @@ def prepare_cache() -> None:
     """
     if has_cache():
         return
-    from numba.core import config
+    from numba import config
 
     try:
         config.CACHE_DIR = tempfile.mkdtemp(prefix="compiled_loops_")

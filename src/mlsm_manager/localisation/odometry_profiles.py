@@ -23,6 +23,7 @@ _COMPASS = (
 _JOINT = Setting("estimator", Estimator.JOINT.value, "the newest scans find their poses together")
 _NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
 _NORMALS = Setting("normal_deviation", 0.2, "rad: of a straight wall's normals, as a beam of 2.5 degrees hears it")
+_POSTS = Setting("lone_quality", 1.0, "posts and buoys tell the way where walls do not")
 _UNREPORTED = (
     Setting("scale_deviation", 0.0, "no distances are reported"),
     Setting("direction_deviation", 0.0, "no directions of motion are reported"),
@@ -34,6 +35,7 @@ _UNREPORTED = (
     Setting("slip_time", 20.0, "s: a turn"),
     _NEIGHBOURS,
     _NORMALS,
+    _POSTS,
 )
 
 PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
@@ -57,6 +59,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("current_walk", 0.002, "m/s per root second: the current may change by 0.05 m/s in ten minutes"),
         _NEIGHBOURS,
         _NORMALS,
+        _POSTS,
         *_COMPASS,
     ),
     OdometryKind.HEADING: (_JOINT, *_UNREPORTED, *_COMPASS),

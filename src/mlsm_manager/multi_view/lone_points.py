@@ -14,6 +14,10 @@ _EXTENDED = 3.0  # times the reach: so far a wall may go on with single echoes
 _BESIDE = (1.0, 2.0)  # m beside the line of a wall: from an echo of the wall to one of something else
 _ASKEW = 0.1  # rad by which the line of a wall may be turned
 _STRONG = 1.5  # times Otsu's threshold of a scan: from there on an echo that stands alone is no speckle
+_MISTAKEN = (3.0, 12.0)  # m: from what is heard together in all scans to how far a vehicle goes in a turn of the head
+_OTHERS = (1.0, 0.3)
+"""Lone points within these distances of each, on average: from too many to few enough. With (1.5, 0.5) clutter in a
+simulated canal was taken for posts in one of three runs; with these in none of six."""
 _NOTHING = 1e-9  # m: keeps points on top of each other, or of the sonar, from dividing by zero
 
 
@@ -31,11 +35,25 @@ def lone_points(scan: Scan, sonar_in_base: np.ndarray, surfaces: SurfacePoints) 
     qualities = ramp(crowds(scan.points[:, :2], reach), *_ALONE) * strong
     candidates = np.flatnonzero((qualities > 0.0) & (ranges > 0.0))
     qualities[candidates] *= 1.0 - on_surfaces(sight[candidates], reach[candidates], surfaces)
+    qualities = qualities * _distinctness(sight, qualities)
     qualities = qualities / np.sqrt(points_per_echo(scan.times, ranges))
     normals = sight / np.maximum(ranges, _NOTHING)[:, np.newaxis]
     known = (qualities > 0.0) & (ranges > 0.0)
     arrays = (scan.times, ranges, bearings, normals, np.zeros(len(ranges)), qualities)
     return SurfacePoints(*(array[known] for array in arrays))
+
+
+def _distinctness(places: np.ndarray, qualities: np.ndarray) -> float:
+    """Return how much a scan's lone points count, 0 to 1: where many stand together, each may be taken for another.
+
+    places: (n, 2) m. Clutter is dense, and in the fit some of it always meets other clutter.
+    """
+    lone = np.flatnonzero(qualities > 0.0)
+    if not len(lone):
+        return 1.0
+    distance = np.hypot(*(places[lone, np.newaxis] - places[lone]).transpose(2, 0, 1))
+    others = ((distance > _MISTAKEN[0]) & (distance < _MISTAKEN[1])) @ qualities[lone]
+    return float(ramp(np.array([others @ qualities[lone] / qualities[lone].sum()]), *_OTHERS)[0])
 
 
 def crowds(points: np.ndarray, reach: np.ndarray) -> np.ndarray:

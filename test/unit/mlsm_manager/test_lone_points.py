@@ -72,6 +72,11 @@ def test_two_posts_side_by_side_are_found():
     assert len(found_in(scan)) == 2
 
 
+def test_posts_that_may_be_taken_for_each_other_are_left_out():
+    row = np.column_stack([np.arange(-10.0, 11.0, 5.0), np.full(5, -7.0)])
+    assert not len(found_in(scan_of(np.vstack([WALL, row]), np.full(len(WALL) + 5, STRONG))))
+
+
 def test_the_last_echo_of_a_wall_does_not_stand_alone():
     """Where the range ends it travels with the vehicle, and would say that nothing moves."""
     scan = heard(1, posts=np.array([[100.0, 0.0]]))[0]
@@ -115,10 +120,11 @@ def test_speed_is_found_from_posts(scans):
     assert solver_of(scans, lone_quality=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
 
 
-def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error():
+@pytest.mark.parametrize("lone_quality", [0.0, 1.0])
+def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(lone_quality):
     """Nothing tells the way along it, so the deviation is that of a speed which nobody knows."""
     bare = heard(TURNS, posts=np.array([[-500.0, 0.0]]))
-    clear, disturbed = (solver_of(scans, lone_quality=0.0) for scans in (bare, cluttered(bare)))
+    clear, disturbed = (solver_of(scans, lone_quality) for scans in (bare, cluttered(bare)))
     told = np.sqrt(disturbed.estimates[-1].pose_covariance[0, 0])
     found, true = gone(disturbed, disturbed.state.nodes)
     assert abs(found - true) < 3.0 * told

@@ -31,8 +31,7 @@ def _output(program, folder, **environment):
 
 def test_without_a_folder_loops_are_compiled_into_a_temporary_one_and_one_line_says_what_to_do(tmp_path):
     program = """
-from numba import njit
-from numba.core import config
+from numba import config, njit
 for _ in range(2):
     prepare_cache()
 def one():
