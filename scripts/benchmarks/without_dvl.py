@@ -2,7 +2,8 @@
 
 PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.without_dvl [--tours basin_ahead_tour ...] [--seeds N]
 
-One line per tour, odometry and seed: a compass alone, and thrusters whose speed is right or 30 % wrong.
+One line per tour, odometry and seed: a compass alone, with and without changes of speed within a turn of the head, and
+thrusters whose speed is right or 30 % wrong.
 """
 
 import argparse
@@ -43,7 +44,7 @@ def drawn(tour: Simulated, kind: OdometryKind, scale: float, seed: int) -> Recor
     """Return the recording with what a compass, and thrusters with an error of `scale`, report."""
     errors = TwinParameters(direction=0.0, scale=scale, speed_deviation=0.02)
     made = reported(tour.truth, errors, np.random.RandomState(seed)).poses
-    if kind is OdometryKind.HEADING:
+    if kind is not OdometryKind.THRUSTERS:
         made = made * [0.0, 0.0, 1.0]
     return recorded(tour, Track(tour.truth.times, made))
 
@@ -65,6 +66,7 @@ def figures(scans: List[Scan], parameters: MultiViewParameters, sonar_in_base: n
 
 def _cases() -> Iterator[Tuple[OdometryKind, float]]:
     yield OdometryKind.HEADING, 0.0
+    yield OdometryKind.HOVERING, 0.0
     for scale in SCALES:
         yield OdometryKind.THRUSTERS, scale
 
