@@ -24,13 +24,19 @@ _JOINT = Setting("estimator", Estimator.JOINT.value, "the newest scans find thei
 _NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
 _NORMALS = Setting("normal_deviation", 0.2, "rad: of a straight wall's normals, as a beam of 2.5 degrees hears it")
 _POSTS = Setting("lone_quality", 1.0, "posts and buoys tell the way where walls do not")
-_UNREPORTED = (
+_NOT_REPORTED = (
     Setting("scale_deviation", 0.0, "no distances are reported"),
     Setting("direction_deviation", 0.0, "no directions of motion are reported"),
-    Setting("speed_deviation", 0.15, "m/s: by as much a small vehicle changes its speed while it works"),
-    Setting("rate_time", 40.0, "s: as long such a change lasts, a turn or a manoeuvre"),
+)
+_TRAVEL = (
     Setting("start_speed_deviation", 0.3, "m/s: the usual speed of a small vehicle; set 0.02 for a standing start"),
     Setting("travel_walk", 0.005, "m/s per root second: the speed of travel may change by 0.1 m/s in 7 minutes"),
+)
+_UNREPORTED = (
+    *_NOT_REPORTED,
+    Setting("speed_deviation", 0.15, "m/s: by as much a small vehicle changes its speed while it works"),
+    Setting("rate_time", 40.0, "s: as long such a change lasts, a turn or a manoeuvre"),
+    *_TRAVEL,
     Setting("slip_deviation", 0.07, "m/s: vehicles go ahead; they slip in turns and in a slow current"),
     Setting("slip_time", 20.0, "s: a turn"),
     _NEIGHBOURS,
@@ -65,12 +71,10 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
     OdometryKind.HEADING: (_JOINT, *_UNREPORTED, *_COMPASS),
     OdometryKind.HOVERING: (
         _JOINT,
-        Setting("scale_deviation", 0.0, "no distances are reported"),
-        Setting("direction_deviation", 0.0, "no directions of motion are reported"),
+        *_NOT_REPORTED,
         Setting("speed_deviation", 0.5, "m/s: such a vehicle goes ahead and back"),
         Setting("rate_time", 10.0, "s: as long as it keeps a speed"),
-        Setting("start_speed_deviation", 0.3, "m/s: the usual speed of a small vehicle; set 0.02 for a standing start"),
-        Setting("travel_walk", 0.005, "m/s per root second: the speed of travel may change by 0.1 m/s in 7 minutes"),
+        *_TRAVEL,
         Setting("slip_deviation", 0.5, "m/s: it strafes as fast as it goes ahead"),
         Setting("slip_time", 10.0, "s: as long as it keeps a speed"),
         Setting("scan_parts", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"),
