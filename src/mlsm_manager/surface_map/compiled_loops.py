@@ -141,6 +141,17 @@ def _write_group(points, order, start, end, row):
 
 
 @njit(cache=True)
+def _stored_count(heads, following):
+    """Return how many rows the cells with first rows `heads` (c,) have."""
+    count = 0
+    for row in heads:
+        while row != NO_BLOCK:
+            count += 1
+            row = following[row]
+    return count
+
+
+@njit(cache=True)
 def merged(groups, group_cell, stored_rows, following, heads, resolution):
     """Return what the cells hold after the groups (g, ROW_WIDTH) went into cells with first rows `heads` (c,).
 
@@ -148,12 +159,7 @@ def merged(groups, group_cell, stored_rows, following, heads, resolution):
     index of their cell (m,), which of them changed (m,), and the row numbers (f,) of stored ones that are part of
     others now.
     """
-    most = len(groups)
-    for cell in range(len(heads)):
-        row = heads[cell]
-        while row != NO_BLOCK:
-            most += 1
-            row = following[row]
+    most = len(groups) + _stored_count(heads, following)
     blocks, numbers, owner = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
     changed, fused = np.empty(most, np.bool_), np.empty(most, np.int64)
     run, run_rows, stored = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
@@ -162,16 +168,10 @@ def merged(groups, group_cell, stored_rows, following, heads, resolution):
         held = _stored_by_bottom(heads[cell], following, stored_rows, stored)
         new_top, old_top, length, next_stored = -np.inf, -np.inf, 0, 0
         while True:
-            has_group = group < len(groups) and group_cell[group] == cell
-            has_stored = next_stored < held
-            if has_group and has_stored:
-                take_group = groups[group, BOTTOM] <= stored_rows[stored[next_stored], BOTTOM]
-            else:
-                take_group = has_group
-            is_end = not has_group and not has_stored
-            bottom = 0.0
-            if not is_end:
-                bottom = groups[group, BOTTOM] if take_group else stored_rows[stored[next_stored], BOTTOM]
+            new_bottom = groups[group, BOTTOM] if group < len(groups) and group_cell[group] == cell else np.inf
+            old_bottom = stored_rows[stored[next_stored], BOTTOM] if next_stored < held else np.inf
+            take_group, bottom = new_bottom <= old_bottom, min(new_bottom, old_bottom)
+            is_end = bottom == np.inf
             if length and (is_end or bottom - max(new_top, old_top) >= resolution):
                 if length > 1:
                     gone = _write_run(run, run_rows, length, blocks[made], numbers, made, fused, gone)
