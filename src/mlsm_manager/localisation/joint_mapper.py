@@ -240,7 +240,7 @@ class JointMapper(ShowsMaps):
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]
         self.correction = correction_of(newest.T_map_base, scan)
-        self.belief = belief_of(newest, self.errors)
+        self.belief = belief_of(newest, self.errors, session.solver.odometry.fading(newest.node))
 
     def _place(self, scan: Scan) -> ScanUpdate:
         self._end_session()
