@@ -66,17 +66,17 @@ def test_a_block_that_beams_go_through_leaves_both_maps(estimator, layer, matchi
 @pytest.mark.parametrize("carve", [False, True])
 def test_without_matching_the_map_does_not_depend_on_whether_clouds_come_before_or_after_their_scans(estimator, carve):
     after, before = (shown_in_order(estimator, cloud_first, carve) for cloud_first in (False, True))
-    assert has_ghost(before.blocks) == has_ghost(after.blocks) == (not carve)
-    np.testing.assert_allclose(before.blocks.mean, after.blocks.mean)
-    np.testing.assert_allclose(before.free.centers, after.free.centers)
-    assert (len(after.free) > 0) == carve
+    assert has_ghost(before.map.blocks) == has_ghost(after.map.blocks) == (not carve)
+    np.testing.assert_allclose(before.map.blocks.mean, after.map.blocks.mean)
+    np.testing.assert_allclose(before.map.free.centers, after.map.free.centers)
+    assert (len(after.map.free) > 0) == carve
 
 
 @pytest.mark.parametrize("estimator", list(Estimator))
 def test_a_cloud_whose_scan_never_comes_is_in_the_map_and_carves_nothing(estimator):
     localiser = shown_in_order(estimator, True, True, scans=0)
-    assert has_ghost(localiser.blocks)
-    assert len(localiser.free) == 0
+    assert has_ghost(localiser.map.blocks)
+    assert len(localiser.map.free) == 0
 
 
 @pytest.mark.parametrize("estimator", list(Estimator))
@@ -86,7 +86,7 @@ def test_clouds_that_came_before_matching_began_carve_nothing_later(estimator):
     localiser.take_scan(scan_of(harbour(), still()))
     localiser.match(False)
     localiser.take_scan(scan_of(harbour(), still(), start=16.0))
-    assert len(localiser.free) == 0
+    assert len(localiser.map.free) == 0
 
 
 def shown_in_order(estimator, cloud_first, carve, scans=9):
