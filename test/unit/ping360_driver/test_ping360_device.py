@@ -1,7 +1,8 @@
 import time
 
 import pytest
-from ping360_line import PATIENCE, SETTINGS, Run, connection_to, emulated, running, served_line
+from ping360_line import SETTINGS, connection_to, emulated, running, scanning, served_line
+from scanning import PATIENCE
 
 from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
 from ping360_driver.line.device import Ping360Device
@@ -85,7 +86,7 @@ def test_the_scan_goes_on_after_the_line_was_away(port, settings):
 def test_a_head_that_appears_after_the_driver_is_found(port):
     with HeadServer(emulated(port), served_line(port)) as server:
         server.disappear()
-        with Run(connection_to(port)) as scan:
+        with scanning(connection_to(port)) as scan:
             assert not scan.stats.connected
             server.reappear()
             assert scan.wait_for_more(1)
