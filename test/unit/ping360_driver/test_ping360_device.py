@@ -35,21 +35,6 @@ def test_older_firmware_is_asked_for_every_ping(port):
     assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
 
 
-class CannotScan(EmulatedPing360):
-    """A head that says that its firmware is new, and does not scan by itself all the same."""
-
-    def _complaint(self, message):
-        return "not today" if message.message_id == MessageId.AUTO_TRANSMIT else ""
-
-
-def test_a_head_that_refuses_to_scan_by_itself_is_asked_for_every_ping(tmp_path):
-    port = str(tmp_path / "sonar")
-    with running(port, head=CannotScan(baud_rate=1152000)) as (scan, _):
-        assert scan.wait_for_more(3)
-    assert (scan.stats.mode, scan.stats.refusals) == ("request", 1)
-    assert "message 2602: not today" in scan.stats.last_error
-
-
 def test_changed_settings_reach_the_head(port):
     with running(port) as (scan, _):
         assert scan.wait_for_more(3)
