@@ -85,6 +85,11 @@ class KeyframeCarving:
         if self._looks:
             self._looks.popleft()
 
+    def keep_oldest(self, count: int) -> None:
+        """Forget what keyframes said after the oldest `count`."""
+        while len(self._looks) > count:
+            self._looks.pop()
+
     def look(
         self,
         surface_map: MultiLevelSurfaceMap,
