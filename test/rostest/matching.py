@@ -71,7 +71,7 @@ class Matching(unittest.TestCase):
         self.assertLess(variances.max(), 0.5**2)
 
     def test_map_to_odom_holds_the_corrections_of_the_thesis(self) -> None:
-        """At the end -1.2 m in x and 0.9 m in y, never twice with one stamp, and 1.2 m in x is not reached by a jump."""
+        """At the end -1.2 m in x and 0.9 m in y, never twice with one stamp, and x is not reached by a jump."""
         self.transforms.wait_for(is_corrected)
         transforms = [t for m in self.transforms.messages for t in m.transforms if t.header.frame_id == "map"]
         in_x = np.array([t.transform.translation.x for t in transforms])

@@ -5,7 +5,7 @@ import pytest
 from made_scans import harbour, scan_of, still, wall
 
 from mlsm_manager.localisation.joint_parameters import Estimator
-from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.surface_map.files.map_file import Layer
 
@@ -38,7 +38,7 @@ def has_ghost(blocks):
 def test_free_space_begins_at_the_sonar_and_not_at_the_vehicles_origin(estimator, matching):
     localiser = localiser_of(estimator, start_matching=matching)
     localiser.take_scan(scan_of(wall((12.0, -2.0), (12.0, 2.0)), still()))
-    cells = localiser.free.centers
+    cells = localiser.map.free.centers
     assert cells[:, 0].min() == pytest.approx(SONAR_IN_BASE[0], abs=0.5)
 
 
@@ -47,7 +47,7 @@ def test_a_sonar_that_is_placed_later_counts_from_then_on(matching):
     localiser = localiser_of(Estimator.SCAN_BY_SCAN, start_matching=matching)
     localiser.mount(np.array([8.0, 0.0]))
     localiser.take_scan(scan_of(wall((12.0, -2.0), (12.0, 2.0)), still()))
-    assert localiser.free.centers[:, 0].min() == pytest.approx(8.0, abs=0.5)
+    assert localiser.map.free.centers[:, 0].min() == pytest.approx(8.0, abs=0.5)
 
 
 @pytest.mark.parametrize("estimator", list(Estimator))
