@@ -6,9 +6,9 @@ from typing import Sequence
 import numpy as np
 
 from mlsm_manager.multi_view.odometry_model import OdometryModel
+from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placement import PlacedPoints, place, place_lone
 from mlsm_manager.multi_view.priors import run_mean
-from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import State
 
