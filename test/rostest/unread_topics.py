@@ -89,6 +89,11 @@ class UnreadTopics(unittest.TestCase):
             message.maxrange_meters, message.range_resolution = 50.0, 1.0
             self.beams.publish(message)
 
+    def comes_by_a_turn(self, inboxes: Iterable[Inbox]) -> bool:
+        """Publish a turn, and tell shortly after whether every inbox has a message."""
+        self.send_turn()
+        return wait_until(lambda: all(inbox.messages for inbox in inboxes), timeout=0.2, required=False)
+
     def number(self, stage: str, counter: str) -> int:
         """Return a counter of a stage; 0 before its first count."""
         health = next(health for health in self.host.healths if health.name == stage)
@@ -110,10 +115,7 @@ class UnreadTopics(unittest.TestCase):
         self.odometry.publish(moving)
         wait_until(lambda: self.number("sonar_to_cloud", "velocities in") == 1)
         inboxes = {topic: Inbox(topic, kind) for topic, kind in TOPICS.items()}
-        for _ in range(50):
-            self.send_turn()
-            if wait_until(lambda: all(inbox.messages for inbox in inboxes.values()), timeout=0.2, required=False):
-                break
+        wait_until(lambda: self.comes_by_a_turn(inboxes.values()))
         received = {topic: inbox.wait_for() for topic, inbox in inboxes.items()}
         moved = inboxes["/sonar/scan/sonarCloud"].wait_for(lambda cloud: min(cloud.timeStamps) > 0.0)
         self.assertGreaterEqual(self.counting.serialised, len(TOPICS))

@@ -5,7 +5,7 @@ from pathlib import Path
 # As the programs do, before anything loads numpy: the matrices are small, and threads would wait for each other.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
-from hypothesis import settings
+from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(ROOT / "scripts"))
@@ -15,10 +15,12 @@ sys.path.append(str(ROOT / "test" / "rostest"))
 sys.path.append(str(Path(__file__).resolve().parent))
 sys.path.append(str(ROOT / "test" / "unit" / "sonar_driver"))
 
+# How fast examples are made says something of the machine, and nothing of the code.
+ANY_SPEED = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow]}
 # The same examples in every run: more of them would find nothing new in the next one.
-settings.register_profile("repeatable", derandomize=True, deadline=None, max_examples=50)
+settings.register_profile("repeatable", derandomize=True, max_examples=50, **ANY_SPEED)
 # Other examples in every run, to look for what nobody thought of: pytest --hypothesis-profile=thorough.
-settings.register_profile("thorough", deadline=None, max_examples=1000)
+settings.register_profile("thorough", max_examples=1000, **ANY_SPEED)
 # For a second run of all tests with other versions, see scripts/oldest.
 settings.register_profile("few", settings.get_profile("repeatable"), max_examples=20)
 settings.load_profile("repeatable")

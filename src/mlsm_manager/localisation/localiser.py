@@ -2,22 +2,21 @@
 
 import threading
 import time as wall
-from dataclasses import dataclass
-from enum import Enum
-from typing import Any, Callable, List, Mapping, Optional, Tuple
+from typing import Any, Callable, List, Mapping, Optional
 
 import numpy as np
 
 from mlsm_manager.localisation.live_correction import LiveCorrection
-from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.localiser_settings import LocaliserSettings, MapInput
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate, Taken
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.scan_mapper import ScanMapper
+from mlsm_manager.localisation.shared_map import SharedMap
+from mlsm_manager.localisation.standing_correction import StandingCorrection
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.running_copy import finished
 from node_support.errors import RefusedInput
@@ -29,34 +28,6 @@ _JUMP_BACK = 30.0
 _LONGEST_SILENCE = 120.0
 
 
-class MapInput(Enum):
-    """Which points make the map that is shown and saved."""
-
-    CLEANED = "CLEANED"
-    MATCHED = "MATCHED"
-
-
-@dataclass(frozen=True)
-class LocaliserSettings:
-    """matcher: for scans near their expected place. anywhere: for a vehicle that is lost.
-
-    blend_time: s, within which the correction goes over to a new one.
-    """
-
-    matcher: Matcher
-    anywhere: Matcher
-    blend_time: float
-    map_input: MapInput
-
-
-@dataclass(frozen=True)
-class Taken:
-    """What was done with a scan, and with the clouds that could be inserted after it."""
-
-    scan: ScanUpdate
-    clouds: List[CloudUpdate]
-
-
 class Localiser:
     """Safe to use from several threads: a correction can be asked for while a scan is being matched."""
 
@@ -65,14 +36,13 @@ class Localiser:
     ) -> None:
         """`clock`: s, tells how long ago the newest scan came where the odometry has no stamps."""
         self.mapper = mapper
-        self._clock = clock
         self._lock = threading.RLock()
+        self.map = SharedMap(mapper, self._lock)
         self._live = LiveCorrection(settings.blend_time)
+        self._standing = StandingCorrection(self._live, clock)
         self._newest: Optional[Scan] = None
-        self._newest_came = 0.0
         self._search = PlaceSearch()
         self._resumed_at: Optional[StoredPlace] = None
-        self._changes = 0
         self.use(settings)
 
     def use(self, settings: LocaliserSettings) -> None:
@@ -93,42 +63,6 @@ class Localiser:
             changed = self.mapper.matching != matching
             self.mapper.matching = matching
         return changed
-
-    @property
-    def blocks(self) -> Blocks:
-        """The map that is shown and saved, as it is now."""
-        return self._copied(Layer.SHOWN)
-
-    @property
-    def block_count(self) -> int:
-        """Number of blocks of the map."""
-        with self._lock:
-            return self.mapper.block_count
-
-    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
-        """Return the blocks of the map that is shown whose mean lies from `low` to `high`, (2,) or (3,) m."""
-        with self._lock:
-            return self.mapper.region(low, high)
-
-    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
-        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
-        with self._lock:
-            return self.mapper.changed_tiles()
-
-    @property
-    def free(self) -> Blocks:
-        """What is known to be free."""
-        return self._copied(Layer.FREE)
-
-    def _copied(self, layer: Layer) -> Blocks:
-        with self._lock:
-            copy = self.mapper.begin_copy(layer)
-        return finished(copy, self._lock)
-
-    @property
-    def changes(self) -> int:
-        """A number that grows whenever the map or the pose in it changes."""
-        return self._changes
 
     @property
     def lookahead(self) -> float:
@@ -155,8 +89,9 @@ class Localiser:
         """Match a scan and put it, and the clouds that waited for it, into the map."""
         with self._lock:
             self.notice_time(scan.reference_time)
-            self._changes += 1
-            self._newest, self._newest_came = scan, self._clock()
+            self.map.change()
+            self._newest = scan
+            self._standing.take_scan_time(scan.reference_time)
             update = self._searched(scan) if self.is_lost else self.mapper.take_echoes(scan)
             self._search.learn(update.accepted)
             if update.belief is not None:
@@ -171,13 +106,13 @@ class Localiser:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)
-            self._changes += 1
+            self.map.change()
             return self.mapper.take_cloud(cloud)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
         with self._lock:
-            self._changes += 1
+            self.map.change()
             return self.mapper.take_placed(points)
 
     def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
@@ -185,15 +120,9 @@ class Localiser:
         return self._live.sample(time, odometry)
 
     def standing_correction(self, odometry: np.ndarray) -> np.ndarray:
-        """Return T_map_odom (3,) to be shown now by an odometry without stamps, as a static transform is.
-
-        Such an odometry says nothing of the time between scans: a new correction is blended in and then holds.
-        """
-        newest = self._newest
-        if newest is None:
-            return self.mapper.correction
-        blended = min(max(self._clock() - self._newest_came, 0.0), self._settings.blend_time)
-        return self._live.sample(newest.reference_time + blended, odometry)
+        """Return T_map_odom (3,) to be shown now by an odometry without stamps; see StandingCorrection."""
+        found = self._standing.sample(odometry)
+        return self.mapper.correction if found is None else found
 
     def notice_time(self, time: float) -> float:
         """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did."""
@@ -202,9 +131,8 @@ class Localiser:
             return 0.0
         with self._lock:
             self.mapper.forget_place()
-            self._live.clear()
+            self._forget_scans()
             self._search.jump()
-            self._newest = self._resumed_at = None
         return until - time
 
     def check_time(self, time: float) -> None:
@@ -282,9 +210,8 @@ class Localiser:
         """
         with self._lock:
             reason = self.mapper.restore(stored.layers, stored.arrays if same_odometry else {})
-            self._changes += 1
-            self._live.clear()
-            self._newest = None
+            self.map.change()
+            self._forget_scans()
             self._search.lose()
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
             self._resumed_at = place
@@ -298,9 +225,13 @@ class Localiser:
         """Forget map and place; return how many blocks the map had."""
         with self._lock:
             count = self.mapper.block_count
-            self._changes += 1
+            self.map.change()
             self.mapper.clear()
-            self._live.clear()
+            self._forget_scans()
             self._search.forget()
-            self._newest = self._resumed_at = None
         return count
+
+    def _forget_scans(self) -> None:
+        self._live.clear()
+        self._standing.forget()
+        self._newest = self._resumed_at = None

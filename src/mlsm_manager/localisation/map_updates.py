@@ -1,7 +1,7 @@
 """What became of a scan or a cloud that a mapper took."""
 
 from dataclasses import dataclass
-from typing import Optional
+from typing import List, Optional
 
 from mlsm_manager.matching.problem.prediction import Belief
 from mlsm_manager.matching.problem.result import MatchResult
@@ -44,3 +44,11 @@ class CloudUpdate:
     waiting: bool
     unplaced: int
     carved: Optional[CarveReport] = None
+
+
+@dataclass(frozen=True)
+class Taken:
+    """What was done with a scan, and with the clouds that could be inserted after it."""
+
+    scan: ScanUpdate
+    clouds: List[CloudUpdate]

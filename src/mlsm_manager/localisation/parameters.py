@@ -8,7 +8,8 @@ import numpy as np
 
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
-from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
+from mlsm_manager.localisation.localiser import Localiser
+from mlsm_manager.localisation.localiser_settings import LocaliserSettings, MapInput
 from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.mapper import Mapper
 from mlsm_manager.localisation.matcher_choice import MatcherChoice

@@ -6,7 +6,7 @@ import numpy as np
 import rospy
 from std_msgs.msg import Bool
 
-from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
@@ -52,7 +52,7 @@ class MlsmCore:
         self._mounted = False
         self._z_down = ZDownSigns()
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
-        self._map = MapPublisher(parameters, self._localiser, self.health)
+        self._map = MapPublisher(parameters, self._localiser.map, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
         self._services = MapServices(
@@ -189,7 +189,7 @@ class MlsmCore:
 
     def _report_cloud(self, update: CloudUpdate, stamp_ns: int) -> None:
         self._map.change(stamp_ns)
-        report_cloud(self.health, update, self._localiser.block_count, self._live.current.map_limit)
+        report_cloud(self.health, update, self._localiser.map.block_count, self._live.current.map_limit)
 
     def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
         if update.result is not None and update.accepted:

@@ -5,7 +5,7 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.localisation.joint_parameters import Estimator
-from mlsm_manager.localisation.localiser import MapInput
+from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
@@ -32,8 +32,8 @@ def test_no_scan_is_rejected_and_those_with_neighbours_give_a_fix():
 
 def test_the_map_has_all_points_of_all_scans():
     localiser, _ = localiser_after(4)
-    assert localiser.blocks.mean[:, 3].min() > 0.0
-    assert localiser.block_count == len(localiser.blocks) > 100
+    assert localiser.map.blocks.mean[:, 3].min() > 0.0
+    assert localiser.map.block_count == len(localiser.map.blocks) > 100
 
 
 def test_matching_off_and_on_again_goes_on_from_the_same_place():
@@ -64,16 +64,16 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
 
 def test_a_jump_in_time_keeps_the_map_and_begins_at_the_odometry():
     localiser, _ = localiser_after(6)
-    count = localiser.block_count
+    count = localiser.map.block_count
     assert localiser.notice_time(0.0) > 0.0
-    assert (localiser.block_count, localiser.believed_until, localiser.mapper.solver) == (count, None, None)
+    assert (localiser.map.block_count, localiser.believed_until, localiser.mapper.solver) == (count, None, None)
     np.testing.assert_array_equal(localiser.mapper.correction, np.zeros(3))
 
 
 def test_clear_forgets_everything():
     localiser, _ = localiser_after(3)
     localiser.clear()
-    assert (localiser.block_count, localiser.believed_until, localiser.verdicts()) == (0, None, [])
+    assert (localiser.map.block_count, localiser.believed_until, localiser.verdicts()) == (0, None, [])
     assert localiser.take_scan(SCANS[3]).scan.result is None
 
 
@@ -91,8 +91,8 @@ def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
     early = TimedPoints.of_scan(SCANS[3])
     assert localiser.take_cloud(early).report.inserted == len(early)
     low, high = early.points[:, :2].min(axis=0), early.points[:, :2].max(axis=0)
-    assert (localiser.blocks.mean[:, :2] >= low - 1e-6).all()
-    assert (localiser.blocks.mean[:, :2] <= high + 1e-6).all()
+    assert (localiser.map.blocks.mean[:, :2] >= low - 1e-6).all()
+    assert (localiser.map.blocks.mean[:, :2] <= high + 1e-6).all()
 
 
 def test_a_long_silence_is_followed_by_the_odometry():
@@ -132,21 +132,21 @@ def test_late_beams_make_it_wait_for_odometry():
 
 def test_free_space_is_known_between_the_vehicle_and_the_walls():
     localiser, _ = localiser_after(6)
-    free = localiser.free
+    free = localiser.map.free
     assert len(free) > 1000
     assert np.hypot(*(free.centers - SCANS[2].reference_pose[:2]).T).min() < 1.0
-    walls = {tuple(cell) for cell in localiser.blocks.cells.tolist()}
+    walls = {tuple(cell) for cell in localiser.map.blocks.cells.tolist()}
     assert len(walls.intersection(map(tuple, free.cells.tolist()))) < 0.2 * len(walls)
 
 
 def test_free_space_is_known_without_matching_too():
     localiser, _ = localiser_after(3, start_matching=False)
-    assert len(localiser.free) > 1000
+    assert len(localiser.map.free) > 1000
 
 
 def test_free_space_is_not_known_where_nobody_wants_it():
     localiser, _ = localiser_after(3, carve=False)
-    assert len(localiser.free) == 0
+    assert len(localiser.map.free) == 0
 
 
 def test_a_stored_map_gives_its_free_space_back():
@@ -154,4 +154,4 @@ def test_a_stored_map_gives_its_free_space_back():
     stored = localiser.stored("map", {}, 0.0, "")
     other, _ = localiser_after(0)
     other.restore(stored, same_odometry=False)
-    assert len(other.free) == len(localiser.free)
+    assert len(other.map.free) == len(localiser.map.free)

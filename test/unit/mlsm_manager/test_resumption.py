@@ -103,19 +103,19 @@ def test_another_odometry_is_found_anywhere_in_the_map(stored):
 
 def test_a_lost_vehicle_does_not_write_into_the_map(stored):
     localiser = restored(stored, same_odometry=False)
-    before = localiser.blocks.rows.copy()
+    before = localiser.map.blocks.rows.copy()
     assert not localiser.take_scan(elsewhere(1)).scan.accepted
-    np.testing.assert_array_equal(localiser.blocks.rows, before)
+    np.testing.assert_array_equal(localiser.map.blocks.rows, before)
     assert localiser.is_lost
 
 
 def test_a_map_of_another_resolution_is_refused_and_the_present_one_stays(stored):
     localiser = PARAMETERS.changed({"resolution": 0.25}).build_localiser()
     localiser.take_scan(drifting(0))
-    count = localiser.block_count
+    count = localiser.map.block_count
     with pytest.raises(ValueError, match=r"resolution 0\.5 m: must be the map's, 0\.25 m"):
         localiser.restore(stored, same_odometry=True)
-    assert (localiser.block_count, localiser.is_lost) == (count, False)
+    assert (localiser.map.block_count, localiser.is_lost) == (count, False)
 
 
 def test_a_map_without_a_matched_layer_is_matched_with_as_it_is_shown(stored):
