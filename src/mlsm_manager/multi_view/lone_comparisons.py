@@ -56,8 +56,8 @@ def lone_pairs(
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
 
-    A point counts if several of the `near_in_time` scans before and after its own heard one there too. Clutter meets clutter by chance, and
-    would say that nothing moves.
+    A point counts if several of the `near_in_time` scans before and after its own heard one there too. Clutter meets
+    clutter by chance, and would say that nothing moves.
     """
     rows, neighbours, distance, shares = lists.within(sources, targets, cut)
     met = shares * ramp(distance, cut, _FADING * cut) * targets.qualities[neighbours]

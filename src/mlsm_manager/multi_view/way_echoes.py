@@ -14,8 +14,8 @@ from mlsm_manager.multi_view.state import State
 
 _SURFACE_NATS = 0.4  # that a point on a surface is worth: neighbours share errors
 _LONE_NATS = 3.0
-"""That an echo which stands alone is worth where an earlier one stood. Of those heard on simulated tours of a basin 85 %
-lie within 1.5 m of an earlier one where the path is true and 1 % where it is not; in a harbour 60 % and 5 %."""
+"""That an echo which stands alone is worth where an earlier one stood. Of those heard on simulated tours of a basin
+85 % lie within 1.5 m of an earlier one where the path is true and 1 % where it is not; in a harbour 60 % and 5 %."""
 _LONE_POWER = 0.5  # of their qualities: weak ones are heard again nearly as often as strong ones
 
 
