@@ -45,7 +45,7 @@ class KeyframeMap:
         The rest as MultiLevelSurfaceMap.
         """
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
-        self._free = KeyframeCarving(resolution, limit, carver, most_followed)
+        self._free = KeyframeCarving(resolution, limit, carver, most_followed, kernel)
         self._kernel = kernel
         self._moving: Deque[TimedPoints] = deque()
         self._overlay = Overlay(self._map)
