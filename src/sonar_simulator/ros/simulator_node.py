@@ -16,6 +16,7 @@ from node_support.package_folder import package_folder
 from node_support.parameters import ParameterError
 from node_support.ros.node import guarded, make_health
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
+from sonar_simulator.simulation.moment_messages import map_origin
 from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
@@ -36,9 +37,9 @@ class Simulator:
         folder = package_folder()
         self._parameters = settings.simulator
         self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
-        self._publisher = SimulatorPublisher(
-            self._setup.sonar.max_range, self._parameters.drive, self._parameters.instruments
-        )
+        instruments = self._parameters.instruments
+        origin = map_origin(self._setup.T_world_start, instruments)
+        self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive, instruments, origin)
         self._publisher.publish_world(self._setup.world)
         self._start_time = START_TIME
         self._now = 0.0

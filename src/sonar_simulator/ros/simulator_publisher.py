@@ -1,5 +1,6 @@
 """Publishes the state at one moment of a simulation."""
 
+import numpy as np
 import rospy
 from rosgraph_msgs.msg import Clock
 from std_msgs.msg import Float32
@@ -8,7 +9,7 @@ from visualization_msgs.msg import Marker
 from node_support import topics
 from sonar_simulator.ros.simulator_messages import CLASSES, MESSAGES
 from sonar_simulator.ros.world_marker import world_marker
-from sonar_simulator.simulation.moment_messages import TOPICS, WORLD_FRAME
+from sonar_simulator.simulation.moment_messages import MAP_FRAME, TOPICS
 from sonar_simulator.simulation.simulation import Drive, Instruments, Moment
 from sonar_simulator.world.world import World
 
@@ -16,14 +17,15 @@ _QUEUE_SIZE = 100  # A second of every topic at the usual rates
 
 
 class SimulatorPublisher:
-    """The simulator's topics. Its world is the frame `map`, from which `odom` drifts away by the odometry's error.
+    """The simulator's topics. Its world is in the frame `map`, from which `odom` drifts away by the odometry's error.
 
     If the vehicle follows a script, nobody sends commands; the velocity is then also published on cmd_vel, where other
     nodes expect it.
     """
 
-    def __init__(self, max_range: float, drive: Drive, instruments: Instruments) -> None:
-        """`max_range`: of the sonar, m."""
+    def __init__(self, max_range: float, drive: Drive, instruments: Instruments, origin: np.ndarray) -> None:
+        """`max_range`: of the sonar, m. origin: (3,) m, where the map begins in the world."""
+        self._origin = origin
         self._max_range = max_range
         self._instruments = instruments
         self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
@@ -53,7 +55,7 @@ class SimulatorPublisher:
 
     def publish_world(self, world: World) -> None:
         """Publish the world once; latched."""
-        self._world.publish(world_marker(world, WORLD_FRAME))
+        self._world.publish(world_marker(world, MAP_FRAME, self._origin))
 
     def publish_progress(self, share: float) -> None:
         """Publish the completed share of the script; 1 at its end."""
@@ -62,7 +64,7 @@ class SimulatorPublisher:
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
         """Publish everything that belongs to a moment."""
         self.publish_clock(stamp)
-        for topic, message in MESSAGES.at(moment, stamp, self._max_range, self._instruments):
+        for topic, message in MESSAGES.at(moment, stamp, self._max_range, self._instruments, self._origin):
             self._publishers[topic].publish(message)
             if topic == topics.VELOCITY and self._commands is not None:
                 self._commands.publish(message)

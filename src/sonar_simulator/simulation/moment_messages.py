@@ -10,7 +10,7 @@ from sonar_simulator.simulation.simulation import Instruments, Moment, Ping
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
 
 ODOM_FRAME = "odom"
-WORLD_FRAME = "map"
+MAP_FRAME = "map"
 SERVO_JOINT = "sonar_servo_joint"
 
 _ALWAYS = {
@@ -28,6 +28,16 @@ TOPICS = {
 _Told = List[Tuple[str, Any]]
 
 
+def map_origin(T_world_start: np.ndarray, instruments: Instruments) -> np.ndarray:
+    """Return where the frame map begins in the world, (3,) m, for a vehicle that starts at a (4, 4) pose.
+
+    A compass knows no position: the vehicle's dead reckoning, and so its map, begins at x = y = 0.
+    """
+    if instruments is Instruments.DVL:
+        return np.zeros(3)
+    return T_world_start[:3, 3] * [1.0, 1.0, 0.0]
+
+
 class MomentMessages:
     """Fills in messages of any library, whose fields are named as in their definitions.
 
@@ -40,15 +50,15 @@ class MomentMessages:
         self._make = make
         self._octets = octets
 
-    def at(self, moment: Moment, stamp: Any, max_range: float, instruments: Instruments) -> _Told:
-        """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's.
+    def at(self, moment: Moment, stamp: Any, max_range: float, instruments: Instruments, origin: np.ndarray) -> _Told:
+        """Return (topic, message) pairs, the transform first; max_range [m] is the sonar's, origin (3,) m the map's.
 
         Transform and joint are part of every moment, so that a beam can be placed at its own stamp; the rest is part of
         ticks only, at the steady rate of an instrument.
         """
         messages = self.placing(moment, stamp, instruments)
         if moment.is_tick:
-            messages += self._measured(moment, stamp, instruments)
+            messages += self._measured(moment, stamp, instruments, origin)
         if moment.ping is not None:
             messages.append((topics.BEAMS, self.scan_line(moment.ping, moment.tilt, stamp, SONAR_FRAME, max_range)))
         return messages
@@ -91,8 +101,10 @@ class MomentMessages:
         message.sensorAngle = tilt
         return message
 
-    def _measured(self, moment: Moment, stamp: Any, instruments: Instruments) -> _Told:
-        truth = self._odometry(moment.truth.T_world_base, moment.truth.twist, stamp, WORLD_FRAME)
+    def _measured(self, moment: Moment, stamp: Any, instruments: Instruments, origin: np.ndarray) -> _Told:
+        T_map_base = moment.truth.T_world_base.copy()
+        T_map_base[..., :3, 3] -= origin
+        truth = self._odometry(T_map_base, moment.truth.twist, stamp, MAP_FRAME)
         messages = [(topics.GROUND_TRUTH, truth)]
         if instruments is Instruments.DVL:
             odometry = self._odometry(moment.odometry.T_odom_base, moment.odometry.twist, stamp, ODOM_FRAME)

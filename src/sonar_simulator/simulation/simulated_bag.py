@@ -9,7 +9,7 @@ import yaml
 from node_support import topics
 from node_support.files import whole_file
 from recordings.bags.bag_writer import BagWriter, PackedMessages
-from sonar_simulator.simulation.moment_messages import MomentMessages
+from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
 from sonar_simulator.simulation.simulation import Moment, stacked
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup
 from sonar_simulator.vehicle.robot_description import RobotDescription
@@ -29,6 +29,7 @@ class SimulatedBag:
         self._setup = setup
         self._settings = settings
         self._messages = MomentMessages(bag.make, np.asarray)
+        self._origin = map_origin(setup.T_world_start, settings.simulator.instruments)
 
     def begin(self, robot: RobotDescription) -> None:
         """Write what applies to the whole bag: the fixed transforms and the parameters."""
@@ -62,7 +63,7 @@ class SimulatedBag:
         stamps_ns = np.array([_stamp_ns(seconds) for seconds in moment.time.tolist()])
         stamp = self._bag.time(stamps_ns)
         instruments = self._settings.simulator.instruments
-        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments)
+        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments, self._origin)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
         messages[0][1].transforms.append(self._mounts(moment.tilt, stamp))

@@ -66,7 +66,7 @@ class Settings:
 
 @dataclass(frozen=True)
 class Setup:
-    """A simulation, and those of its parts that others use."""
+    """A simulation, and those of its parts that others use. T_world_start: (4, 4), of the vehicle."""
 
     simulation: Simulation
     world: World
@@ -74,6 +74,7 @@ class Setup:
     servo: Servo
     commanded: CommandedVehicle
     T_base_sonar: np.ndarray
+    T_world_start: np.ndarray
 
 
 def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: Callable[[str], None]) -> Setup:
@@ -101,7 +102,7 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
         servo,
         script.tilt_commands if is_scripted else (),
     )
-    return Setup(simulation, world, sonar, servo, commanded, T_base_sonar)
+    return Setup(simulation, world, sonar, servo, commanded, T_base_sonar, script.pose(0.0))
 
 
 def _load_world(path: Path, warn: Callable[[str], None]) -> World:

@@ -65,6 +65,14 @@ def test_moments_written_together_are_written_as_one_by_one(tmp_path, script, mo
     assert _records(together) == _records(alone)
 
 
+@pytest.mark.parametrize(("instruments", "begin"), [("DVL", (1.0, -2.0)), ("COMPASS", (0.0, 0.0))])
+def test_the_map_of_a_vehicle_that_knows_no_position_begins_where_it_starts(tmp_path, script, instruments, begin):
+    script.write_text("start: {x: 1.0, y: -2.0, z: -1.5}\nmoves: [{wait: 1.0}]\n")
+    _, out = _write(tmp_path, script, "at.bag", "--set", f"instruments={instruments}")
+    position = _messages(out, "/ground_truth")[0][0].pose.pose.position
+    assert (position.x, position.y, position.z) == pytest.approx((*begin, -1.5))
+
+
 def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):
     _, out = _write(tmp_path, script)
     placed = {
