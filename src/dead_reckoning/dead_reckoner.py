@@ -10,6 +10,7 @@ from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
 from node_support.errors import RefusedInput
 from node_support.geometry.matrices import yaw_of
 from node_support.geometry.planar import rotated, wrapped
+from node_support.usual_interval import UsualInterval
 
 JUMP_BACK = 1.0
 """Headings whose stamps go back by more than this [s] mean that time jumped; then the vehicle starts anew."""
@@ -37,7 +38,9 @@ class Reckoning:
 class DeadReckoner:
     """Takes headings, depths and velocities in the order in which they come.
 
-    The vehicle keeps its newest velocity, which is one along its own axes, until a newer one comes or it times out.
+    The vehicle keeps its newest velocity, which is one along its own axes, until a newer one comes. Once that is
+    overdue, a velocity that was estimated fades: nobody knows whether the vehicle still has it. After a timeout the
+    vehicle counts as still.
     """
 
     def __init__(self, parameters: DeadReckoningParameters) -> None:
@@ -51,6 +54,7 @@ class DeadReckoner:
         self._yaw = 0.0
         self._velocity = np.zeros(3)
         self._velocity_stamp_ns: Optional[int] = None
+        self._velocities = UsualInterval()
 
     def take_velocity(self, stamp_ns: int, velocity: np.ndarray) -> None:
         """Take a velocity (3,) [m/s] in base_link. Raises RefusedInput for one that no vehicle has."""
@@ -58,6 +62,7 @@ class DeadReckoner:
             raise RefusedInput(_REFUSED_VELOCITIES, f"{velocity} m/s, must be finite and at most {_FASTEST:g} m/s")
         self._velocity = np.array(velocity, dtype=np.float64)
         self._velocity_stamp_ns = stamp_ns
+        self._velocities.take(stamp_ns * 1e-9)
 
     def take_depth(self, depth: float) -> None:
         """Take a depth [m] below the surface. Raises RefusedInput for one that no sea has."""
@@ -84,12 +89,15 @@ class DeadReckoner:
         return Reckoning(stamp_ns, self._pose(rotation), velocity, turn / elapsed if elapsed else 0.0, gap)
 
     def _velocity_at(self, stamp_ns: int) -> np.ndarray:
+        own = self.parameters
         if self._velocity_stamp_ns is None:
             return np.zeros(3)
-        commanded = self.parameters.velocity_source is VelocitySource.COMMANDS
-        timeout = self.parameters.command_timeout if commanded else self.parameters.velocity_timeout
+        commanded = own.velocity_source is VelocitySource.COMMANDS
         age = (stamp_ns - self._velocity_stamp_ns) * 1e-9
-        return self._velocity if math.fabs(age) <= timeout else np.zeros(3)
+        if math.fabs(age) > (own.command_timeout if commanded else own.velocity_timeout):
+            return np.zeros(3)
+        overdue = 0.0 if commanded else self._velocities.overdue(stamp_ns * 1e-9)
+        return math.exp(-overdue / own.velocity_fading) * self._velocity
 
     def _pose(self, rotation: np.ndarray) -> np.ndarray:
         pose = np.eye(4)

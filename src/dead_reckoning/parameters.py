@@ -45,6 +45,11 @@ class DeadReckoningParameters(StampParameters):
         120.0, "the vehicle counts as still when its velocity is older: an estimate is of little use after some scans",
         unit="s", low=0.1, high=3600.0,
     )  # fmt: skip
+    velocity_fading: float = parameter(
+        40.0, "an estimate that is not followed by another one in time falls to a third within this time, as long as "
+        "the profile `heading` lets a change of speed last",
+        unit="s", low=0.1, high=3600.0,
+    )  # fmt: skip
     command_timeout: float = parameter(
         1.0, "the same for commands, which drivers of thrusters repeat several times a second",
         unit="s", low=0.05, high=3600.0,

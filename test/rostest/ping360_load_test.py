@@ -1,9 +1,11 @@
 #!/usr/bin/env python3
+import socket
 import unittest
 
 import rospy
 import rostest
 from driver_load import is_once
+from graph import launched
 
 # A turn of a real head at 2 m takes 9 s (manufacturer's specification).
 REAL_RATE = 400 / 9.0
@@ -21,7 +23,15 @@ def is_quick(load):
 
 class TestLoad(unittest.TestCase):
     def test_faster_than_a_real_head_the_driver_is_quick_and_loses_nothing(self):
-        assert is_once(is_quick, "ping360_driver", rospy.get_param("~seconds"), LOSSES)
+        with launched("ping360_load.launch", f"port:=udp://127.0.0.1:{_free_port()}"):
+            assert is_once(is_quick, "ping360_driver", rospy.get_param("~seconds"), LOSSES)
+
+
+def _free_port() -> int:
+    """Return a UDP port of this computer that nobody uses."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return probe.getsockname()[1]
 
 
 if __name__ == "__main__":

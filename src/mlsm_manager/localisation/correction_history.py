@@ -71,6 +71,10 @@ class CorrectionHistory:
         path = np.column_stack([np.interp(chosen, times, corrections[:, axis]) for axis in range(3)])
         return PlacedPoints(transformed(path, cloud.points[keep]), chosen, int(np.count_nonzero(~keep)))
 
+    def reaches(self, times: np.ndarray) -> bool:
+        """Return whether all of `times` (n,) [s], n > 0, are known or from before the history begins."""
+        return bool(times.max() <= self.end + _SLACK)
+
     def origins(self, times: np.ndarray, sonar_in_base: np.ndarray) -> Optional[np.ndarray]:
         """Return where a sonar at (2,) m in base_link was in map at `times` (n,), (n, 2) m.
 
@@ -79,7 +83,7 @@ class CorrectionHistory:
         if not self._stretches or not len(times):
             return None
         known = np.concatenate([stretch.times for stretch in self._stretches])
-        if times.min() < known[0] - _SLACK or times.max() > known[-1] + _SLACK:
+        if times.min() < known[0] - _SLACK or not self.reaches(times):
             return None
         poses = np.concatenate([stretch.poses for stretch in self._stretches])
         places = transformed(poses, np.broadcast_to(sonar_in_base, (len(poses), 2)))

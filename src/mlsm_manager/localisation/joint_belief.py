@@ -1,8 +1,11 @@
 """What the joint solver's estimates mean for the localiser: belief, correction and match."""
 
+from typing import Optional
+
 import numpy as np
 
 from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, Prior, prior_of
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan
@@ -15,8 +18,11 @@ PATH_POINTS = 17
 """Points of the path within a scan: about one per second of a slow head's revolution."""
 
 
-def belief_of(estimate: LiveEstimate, errors: OdometryErrors) -> Belief:
-    """Return pose and odometry errors; of errors that the solver does not estimate, what is known beforehand."""
+def belief_of(estimate: LiveEstimate, errors: OdometryErrors, fading: Optional[Fading]) -> Belief:
+    """Return pose and odometry errors; of errors that the solver does not estimate, what is known beforehand.
+
+    fading: of the rates after the estimate.
+    """
     drift = estimate.drift
     slopes = np.zeros((STATES, estimate.node.size))
     slopes[:POSE_COLUMNS, :POSE_COLUMNS] = np.eye(POSE_COLUMNS)
@@ -25,7 +31,7 @@ def belief_of(estimate: LiveEstimate, errors: OdometryErrors) -> Belief:
     covariance = slopes @ of_node @ slopes.T
     unknown = ~slopes.any(axis=1)
     covariance[unknown, unknown] = np.diag(errors.covariance())[unknown]
-    return Belief(estimate.time, np.append(estimate.T_map_base, drift.values), covariance)
+    return Belief(estimate.time, np.append(estimate.T_map_base, drift.values), covariance, fading)
 
 
 def belief_at(time: float, pose: np.ndarray, errors: OdometryErrors) -> Belief:

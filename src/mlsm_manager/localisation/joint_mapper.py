@@ -20,10 +20,11 @@ from mlsm_manager.localisation.joint_maps import JointMaps
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
-from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.localisation.uncarved_clouds import UncarvedClouds
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.matching.problem.result import MatchResult
@@ -79,6 +80,7 @@ class JointMapper(ShowsMaps):
         self._start: Optional[np.ndarray] = None
         self._history = CorrectionHistory()
         self._clouds = JointClouds(self._maps.shown)
+        self._uncarved = UncarvedClouds()
 
     @property
     def lookahead(self) -> float:
@@ -185,6 +187,8 @@ class JointMapper(ShowsMaps):
         if self.matching:
             return self._clouds.take(cloud, self._session)
         origins = self._history.origins(cloud.times, self._sonar_in_base)
+        if origins is None:
+            self._uncarved.append(transformed(self.correction, cloud.points), cloud.times)
         return self._clouds.place(cloud, self.correction, origins)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
@@ -192,10 +196,20 @@ class JointMapper(ShowsMaps):
         return CloudUpdate(self._maps.shown.insert(points), False, 0)
 
     def take_waiting(self) -> Optional[CloudUpdate]:
-        """Insert the next cloud that waited, if its time is known now; None when there is none."""
+        """Insert or carve the next cloud that waited, if its time is known now; None when there is none."""
         known_until = -np.inf if self._session is None else self._session.known_until
         cloud = self._clouds.next_until(known_until if self.matching else np.inf)
-        return None if cloud is None else self.take_cloud(cloud)
+        return self._carve_waiting() if cloud is None else self.take_cloud(cloud)
+
+    def _carve_waiting(self) -> Optional[CloudUpdate]:
+        """Carve the next cloud that was inserted before the scan of its time came; None when there is none.
+
+        A run does not tell where the vehicle was by the odometry, with which such a cloud was placed.
+        """
+        if self.matching:
+            self._uncarved.clear()
+        beams = self._uncarved.next_known(self._history, self._sonar_in_base)
+        return None if beams is None else CloudUpdate(NOTHING_INSERTED, False, 0, self._maps.shown.carve(*beams))
 
     def follow(self, track: Track, time: float) -> None:
         """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
@@ -226,7 +240,7 @@ class JointMapper(ShowsMaps):
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]
         self.correction = correction_of(newest.T_map_base, scan)
-        self.belief = belief_of(newest, self.errors)
+        self.belief = belief_of(newest, self.errors, session.solver.odometry.fading(newest.node))
 
     def _place(self, scan: Scan) -> ScanUpdate:
         self._end_session()

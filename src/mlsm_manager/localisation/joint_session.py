@@ -81,11 +81,13 @@ class JointSession:
         """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
         parts = self.solver.parameters.matching.scan_parts
         newest = slice(-_CHECKED_SCANS * parts, None)
-        turns = Turns.of(self.solver.estimates[newest], self.solver.islands.apart[newest], parts)
+        estimates, apart = self.solver.estimates, self.solver.islands.apart
+        turns = Turns.of(estimates[newest], apart[newest], parts)
+        heard = Turns.with_echoes(estimates, apart, parts, self.solver.log.point_counts, _CHECKED_SCANS)
         begin = self.start if len(turns.times) else np.nan
         return [
             *self._going_on(turns.times),
-            recent_agreement(turns.times, turns.agreements, _CHECKED_SCANS),
+            recent_agreement(heard.times, heard.agreements, _CHECKED_SCANS),
             *(told_deviation(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[-1:]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
             *in_one_map(turns.times, turns.apart),

@@ -90,10 +90,20 @@ class KeyframeMap:
         """
         self._overlay.take_off()
         report = self._map.insert(points)
-        carved = None if origins is None else self._free.carve(self._map, points, times, origins)
         if self._due is None:
             self._overlay.lay(self._above)
-        return Drawn(report, carved)
+        return Drawn(report, None if origins is None else self.carve(points, times, origins))
+
+    def carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        """Carve for ever along the beams of a cloud that was inserted; see insert_cloud.
+
+        Return None where nothing is to be carved.
+        """
+        self._overlay.take_off()
+        carved = self._free.carve(self._map, points, times, origins)
+        if self._due is None:
+            self._overlay.lay(self._above)
+        return carved
 
     def add(self, cloud: TimedPoints) -> None:
         """Add a keyframe; it is in the map from the next `draw` on."""

@@ -7,10 +7,12 @@ from typing import Deque, Optional, Tuple
 
 import numpy as np
 
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.matching.problem.prediction import Belief, advanced, advanced_path
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.state import POSE
+from mlsm_manager.matching.problem.state import POSE, RATE
 from node_support.geometry.planar import composed, inverse, wrapped
+from node_support.usual_interval import UsualInterval
 
 # Of the odometry: a minute at 60 per second, longer than a scan and its match take.
 _MOST_SAMPLES = 4000
@@ -19,6 +21,8 @@ _IDENTITY = np.zeros(3)
 
 class LiveCorrection:
     """Follows the odometry from the last belief to now. A new belief is approached within `blend_time` seconds.
+
+    Where a belief says how its rates fade, the vehicle is shown to come to rest once the next belief is overdue.
 
     Safe to use from several threads: one gives it beliefs, another asks for samples.
     """
@@ -45,6 +49,8 @@ class LiveCorrection:
         self._jump = _IDENTITY
         self._jump_time: Optional[float] = None
         self._shown: Optional[np.ndarray] = None
+        self._fading: Optional[Fading] = None
+        self._beliefs = UsualInterval()
 
     def believe(self, belief: Belief) -> None:
         """Take what a match found at a time in the past; the samples since then bring it to now."""
@@ -52,16 +58,16 @@ class LiveCorrection:
             self._believe(belief)
 
     def _believe(self, belief: Belief) -> None:
-        self._state = np.array(belief.theta)
+        self._state, self._fading = np.array(belief.theta), belief.fading
         start = belief.time
+        self._beliefs.take(start)
         later = [sample for sample in self._samples if sample[0] > belief.time]
         earlier = [sample for sample in self._samples if sample[0] <= belief.time]
         if later:
             known = earlier[-1:] + later
             times = np.array([time for time, _ in known])
             track = Track(times, np.array([pose for _, pose in known]))
-            since = times[times > start]
-            self._state[POSE] = advanced_path(self._state, start, track, since)[-1]
+            self._bring_on(start, track, times[times > start])
         if self._shown is not None and self._samples:
             self._jump = composed(inverse(self._state[POSE]), self._shown)
             self._jump[2] = wrapped(self._jump[2])
@@ -94,7 +100,28 @@ class LiveCorrection:
         if self._state is None or not self._samples:
             return
         before, pose = self._samples[-1]
+        self._step(before, pose, time, odometry)
+
+    def _bring_on(self, start: float, track: Track, times: np.ndarray) -> None:
+        """Bring the state from `start` [s] to the newest of `times` (n,), n > 0."""
+        if self._fading is None:
+            self._state[POSE] = advanced_path(self._state, start, track, times)[-1]
+            return
+        nodes = np.append(start, times)
+        poses = track.at(nodes)
+        for number in range(len(times)):
+            self._step(nodes[number], poses[number], nodes[number + 1], poses[number + 1])
+
+    def _step(self, before: float, pose: np.ndarray, time: float, odometry: np.ndarray) -> None:
+        """Bring the state from `before` to `time` [s], between which the odometry goes from `pose` to `odometry`."""
+        if self._fading is None:
+            self._state[POSE] = advanced(self._state, time - before, pose, odometry)
+            return
+        fading = self._fading.to_a_stop() if self._beliefs.overdue(time) else self._fading
+        later = fading.after(self._state[RATE], time - before)
+        self._state[RATE] = (self._state[RATE] + later) / 2.0
         self._state[POSE] = advanced(self._state, time - before, pose, odometry)
+        self._state[RATE] = later
 
     def _share_left(self, seconds: float) -> float:
         if self.blend_time <= 0.0:

@@ -9,6 +9,7 @@ from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
 from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.localisation.uncarved_clouds import UncarvedClouds
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
 from mlsm_manager.matching.problem.result import MatchResult, corrected_points
@@ -18,6 +19,7 @@ from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import CarveReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
 
@@ -97,6 +99,7 @@ class Mapper(ShowsMaps):
         self.correction = np.zeros(3)
         self._history = CorrectionHistory()
         self._waiting: Deque[TimedPoints] = deque(maxlen=MOST_WAITING)
+        self._uncarved = UncarvedClouds()
 
     @property
     def lookahead(self) -> float:
@@ -143,10 +146,10 @@ class Mapper(ShowsMaps):
         return CloudUpdate(self.shown.insert(points), False, 0)
 
     def take_waiting(self) -> Optional[CloudUpdate]:
-        """Insert the next cloud that waited, if its time is known now; None when there is none."""
-        if not self._waiting or (self.matching and self._waiting[0].end > self._history.end):
-            return None
-        return self.take_cloud(self._waiting.popleft())
+        """Insert or carve the next cloud that waited, if its time is known now; None when there is none."""
+        if self._waiting and not (self.matching and self._waiting[0].end > self._history.end):
+            return self.take_cloud(self._waiting.popleft())
+        return self._carve_waiting()
 
     def follow(self, track: Track, time: float) -> None:
         """Predict the belief at a later `time` by the odometry, after a long time without scans."""
@@ -155,23 +158,37 @@ class Mapper(ShowsMaps):
 
     def _show(self, points: np.ndarray, times: np.ndarray, unplaced: int) -> CloudUpdate:
         """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is shown, and carve them."""
-        report, beams = self.shown.insert(points), self._beams(points, times)
-        carved = None if beams is None else self.settings.carver.carve(self.shown, self.free, beams, points)
-        return CloudUpdate(report, False, unplaced, carved)
+        report, origins = self.shown.insert(points), self._origins(times)
+        if origins is None:
+            self._uncarved.append(points, times)
+            return CloudUpdate(report, False, unplaced)
+        return CloudUpdate(report, False, unplaced, self._carve(points, times, origins))
+
+    def _carve_waiting(self) -> Optional[CloudUpdate]:
+        """Carve the next cloud that was inserted before the scan of its time came; None when there is none.
+
+        While scans are matched their corrections are not those that such a cloud was placed with.
+        """
+        if self.matching:
+            self._uncarved.clear()
+        beams = self._uncarved.next_known(self._history, self._sonar_in_base)
+        return None if beams is None else CloudUpdate(NOTHING_INSERTED, False, 0, self._carve(*beams))
+
+    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        if self.settings.carver is None:
+            return None
+        beams = FirstEchoes.of_level(points, times, origins)
+        return self.settings.carver.carve(self.shown, self.free, beams, points)
+
+    def _origins(self, times: np.ndarray) -> Optional[np.ndarray]:
+        return self._history.origins(times, self._sonar_in_base)
 
     def _note(self, points: np.ndarray, times: np.ndarray) -> None:
         """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is matched with; clear it."""
         self.matched.insert(points)
-        beams = self._beams(points, times)
-        if beams is not None:
-            self.settings.carver.clear(self.matched, beams, points)
-
-    def _beams(self, points: np.ndarray, times: np.ndarray) -> Optional[FirstEchoes]:
-        """Return the beams of points (n, 4) in map; None where nothing is carved or the sonar's place is not known."""
-        if self.settings.carver is None:
-            return None
-        origins = self._history.origins(times, self._sonar_in_base)
-        return None if origins is None else FirstEchoes.of_level(points, times, origins)
+        origins = self._origins(times)
+        if self.settings.carver is not None and origins is not None:
+            self.settings.carver.clear(self.matched, FirstEchoes.of_level(points, times, origins), points)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)

@@ -91,7 +91,7 @@ class ScanMapper(Protocol):
         """Insert points (n, 4) that are in map already."""
 
     def take_waiting(self) -> Optional[CloudUpdate]:
-        """Insert the next cloud that waited; None when none can be inserted now."""
+        """Insert or carve the next cloud that waited; None when there is none for which that can be done now."""
 
     def follow(self, track: Track, time: float) -> None:
         """Bring the belief to a later `time` by the odometry alone."""

@@ -1,9 +1,10 @@
 """What an odometry of DVL and compass says of the nodes: expected values, residuals and their derivatives."""
 
-from typing import Dict
+from typing import Dict, Optional
 
 import numpy as np
 
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
 from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
@@ -71,6 +72,10 @@ class DvlFactors:
         values[3:] = node[[SCALE, DIRECTION]]
         slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
         return Drift(values, slopes)
+
+    def fading(self, node: np.ndarray) -> Optional[Fading]:
+        """See OdometryModel: there are none, or they are a current."""
+        return None
 
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
         """See OdometryModel."""

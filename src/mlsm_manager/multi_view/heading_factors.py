@@ -4,6 +4,7 @@ from typing import Dict
 
 import numpy as np
 
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, HELD_DEVIATION, MOTION_STATES, Drift
 from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
@@ -73,6 +74,11 @@ class HeadingFactors:
         values[:2], values[3] = node[[AHEAD, ASIDE]], -1.0
         slopes[[0, 1], [AHEAD, ASIDE]] = 1.0
         return Drift(values, slopes)
+
+    def fading(self, node: np.ndarray) -> Fading:
+        """See OdometryModel."""
+        own = self._parameters
+        return Fading(np.array([node[TRAVEL], 0.0, 0.0]), np.array([own.speed_time, own.slip_time, np.inf]))
 
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
         """See OdometryModel."""

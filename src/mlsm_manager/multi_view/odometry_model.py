@@ -1,10 +1,11 @@
 """The interface of odometry models: what is unknown of the motion between nodes, and what ties the nodes together."""
 
 from dataclasses import dataclass
-from typing import Dict, Protocol
+from typing import Dict, Optional, Protocol
 
 import numpy as np
 
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_motion import Motion
 from mlsm_manager.multi_view.state import Layout
@@ -66,6 +67,9 @@ class OdometryModel(Protocol):
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
         """Return how the motion goes on after a node (width,) at which base_link has `heading` [rad] in map."""
+
+    def fading(self, node: np.ndarray) -> Optional[Fading]:
+        """Return how the rates of `drift` change with the time since the node (width,); None where they stay."""
 
 
 def frozen_deviations(deviations: np.ndarray) -> np.ndarray:

@@ -23,6 +23,11 @@ class PointTable:
         """Number of scans so far."""
         return len(self._starts) - 1
 
+    @property
+    def counts(self) -> np.ndarray:
+        """(scan_count,) int, number of points of each scan."""
+        return np.diff(self._starts)
+
     def append(self, points: SurfacePoints) -> None:
         """Append the points of one scan."""
         for name, array in self._points.items():

@@ -39,6 +39,11 @@ class RunLog:
         """(scan_count + 1,) s; a view that the next scan makes invalid."""
         return self._node_times.values
 
+    @property
+    def point_counts(self) -> np.ndarray:
+        """(scan_count,) int, number of points on surfaces of each scan."""
+        return self._surfaces.counts
+
     def append(self, scan: Scan, lookahead: float) -> None:
         """Append a scan and the odometry of its track up to `lookahead` seconds after its end.
 

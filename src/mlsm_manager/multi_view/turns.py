@@ -29,3 +29,12 @@ class Turns(NamedTuple):
             radii=np.sqrt([np.trace(estimate.pose_covariance[:2, :2]) for estimate in ends]),
             apart=apart[parts - 1 :: parts],
         )
+
+    @classmethod
+    def with_echoes(
+        cls, estimates: Sequence[LiveEstimate], apart: np.ndarray, parts: int, point_counts: np.ndarray, most: int
+    ) -> "Turns":
+        """Return the newest `most` turns in which surfaces were heard; point_counts: (n parts,) of the scans."""
+        heard = np.flatnonzero(point_counts.reshape(-1, parts).any(axis=1))[-most:]
+        scans = (heard[:, np.newaxis] * parts + np.arange(parts)).ravel()
+        return cls.of([estimates[scan] for scan in scans], apart[scans], parts)

@@ -1,7 +1,10 @@
 """What is known of the nodes where nothing is reported: velocity and turn rate are unknown."""
 
+from dataclasses import replace
+
 import numpy as np
 
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.multi_view.heading_factors import HeadingFactors
 from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.odometry_model import FIXED_DEVIATION, Drift
@@ -47,6 +50,11 @@ class UnaidedFactors(HeadingFactors):
         values, slopes = known.values, known.slopes
         values[2], slopes[2, TURN_RATE] = node[TURN_RATE], 1.0
         return Drift(values, slopes)
+
+    def fading(self, node: np.ndarray) -> Fading:
+        """See OdometryModel."""
+        known = super().fading(node)
+        return replace(known, times=np.append(known.times[:2], self._own.turn_rate_time))
 
     def _add_yaw(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray

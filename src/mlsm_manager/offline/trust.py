@@ -83,13 +83,15 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
     further: what other checks say.
     """
     solver = replayed.solver
-    turns = Turns.of(solver.estimates, solver.islands.apart, solver.parameters.matching.scan_parts)
+    parts, apart = solver.parameters.matching.scan_parts, solver.islands.apart
+    turns = Turns.of(solver.estimates, apart, parts)
+    heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
     path = replayed.corrected if refined is None else refined.poses
     deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
     verdicts = [
         *_against_odometry(replayed, path, solver.odometry),
         *_going_on(solver, solver.state if refined is None else refined.batch.state, turns.times),
-        recent_agreement(turns.times, turns.agreements),
+        recent_agreement(heard.times, heard.agreements),
         told_deviation(deviations.times, deviations.radii),
         *surfaces_tell(
             float(solver.log.node_times[0]),

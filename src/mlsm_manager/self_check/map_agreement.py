@@ -12,7 +12,8 @@ def recent_agreement(
 ) -> Verdict:
     """Return the share of the last `scans` scans that agree with the map.
 
-    times: (n,) s of the scans' ends. agreements: (n,) share of each scan's points that lie on surfaces of others.
+    times: (n,) s of the ends of scans that heard something. agreements: (n,) share of each scan's points that lie on
+    surfaces of others.
     """
     good = np.asarray(agreements[-scans:]) >= agrees
     value = float(good.mean()) if len(agreements) >= scans else np.nan

@@ -77,6 +77,23 @@ def test_the_vehicle_stops_when_its_velocity_is_too_old(source, timeout):
     assert done.T_odom_base[0, 3] == pytest.approx(timeout, abs=0.11)
 
 
+def test_an_estimate_that_is_not_followed_by_another_fades(reckoner):
+    """With one every 10 s, the next one is overdue after 20 s; 40 s later a third of it is left."""
+    for second in (0, 10, 20):
+        reckoner.take_velocity(START + second * SECOND, np.array([0.5, 0.1, 0.0]))
+    kept = reckoned(reckoner, 40.0, lambda _: 0.0, start=START)
+    np.testing.assert_allclose(kept.velocity, [0.5, 0.1, 0.0])
+    faded = reckoner.take_orientation(START + 80 * SECOND, heading(0.0))
+    np.testing.assert_allclose(faded.velocity, np.exp(-1.0) * np.array([0.5, 0.1, 0.0]))
+
+
+def test_commands_do_not_fade():
+    reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=VelocitySource.COMMANDS, command_timeout=1.0))
+    for tenth in range(3):
+        reckoner.take_velocity(START + tenth * SECOND // 10, np.array([0.5, 0.0, 0.0]))
+    assert reckoner.take_orientation(START + SECOND, heading(0.0)).velocity[0] == 0.5
+
+
 def test_a_gap_longer_than_the_parameter_is_told(reckoner):
     assert reckoner.take_orientation(START, np.eye(3)).gap == 0.0
     assert reckoner.take_orientation(START + SECOND, np.eye(3)).gap == 0.0

@@ -11,6 +11,7 @@ from mlsm_manager.multi_view.islands import MAP
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
+from mlsm_manager.multi_view.turns import Turns
 
 PARAMETERS = MultiViewParameters(
     odometry=HeadingFactors(HeadingOdometry()),
@@ -69,6 +70,21 @@ def test_a_vehicle_is_found_in_its_own_map(harbour):
     session, truth = harbour
     assert not session.solver.islands.is_apart
     assert errors(session, truth)[-3:].max() < 1.5
+
+
+def test_scans_that_heard_nothing_do_not_count_as_beside_the_map(harbour):
+    solver = harbour[0].solver
+    turns = Turns.with_echoes(solver.estimates, solver.islands.apart, 1, solver.log.point_counts, 10)
+    assert len(turns.times) == 10
+    assert turns.times[0] < BEGIN * TURN < END * TURN - TURN < turns.times[-1]
+    assert turns.agreements.min() > 0.9
+
+
+def test_a_turn_counts_as_heard_where_one_of_its_parts_was(canal):
+    """Of eight turns of three parts, in two no part heard anything."""
+    solver = canal[0].solver
+    turns = Turns.with_echoes(solver.estimates, solver.islands.apart, 3, solver.log.point_counts, END)
+    assert len(turns.times) == END // 3 - 2
 
 
 def test_the_map_is_provisional_until_a_second_scan_agrees():

@@ -9,6 +9,7 @@ from made_scans import harbour, scan_of, still, wall
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.files.map_file import Layer
 
 SONAR_IN_BASE = (5.0, 0.0)
@@ -63,3 +64,50 @@ def test_a_block_that_beams_go_through_leaves_both_maps(estimator, layer, matchi
     assert has_ghost(kept)
     assert not has_ghost(carved)
     assert len(carved) > 0.9 * len(kept)
+
+
+@pytest.mark.parametrize("estimator", list(Estimator))
+@pytest.mark.parametrize("carve", [False, True])
+def test_without_matching_the_map_does_not_depend_on_whether_clouds_come_before_or_after_their_scans(estimator, carve):
+    after, before = (shown_in_order(estimator, cloud_first, carve) for cloud_first in (False, True))
+    assert has_ghost(before.map.blocks) == has_ghost(after.map.blocks) == (not carve)
+    np.testing.assert_allclose(before.map.blocks.mean, after.map.blocks.mean)
+    np.testing.assert_allclose(before.map.free.centers, after.map.free.centers)
+    assert (len(after.map.free) > 0) == carve
+
+
+@pytest.mark.parametrize("estimator", list(Estimator))
+def test_a_cloud_whose_scan_never_comes_is_in_the_map_and_carves_nothing(estimator):
+    localiser = shown_in_order(estimator, True, True, scans=0)
+    assert has_ghost(localiser.map.blocks)
+    assert len(localiser.map.free) == 0
+
+
+@pytest.mark.parametrize("estimator", list(Estimator))
+def test_clouds_that_came_before_matching_began_carve_nothing_later(estimator):
+    localiser = shown_in_order(estimator, True, True, scans=0)
+    localiser.match(True)
+    localiser.take_scan(scan_of(harbour(), still()))
+    localiser.match(False)
+    localiser.take_scan(scan_of(harbour(), still(), start=16.0))
+    assert len(localiser.map.free) == 0
+
+
+def shown_in_order(estimator, cloud_first, carve, scans=9):
+    """Return the localiser after nine clouds, the first with a ghost, each before or after its scan of echoes.
+
+    scans: how many of the scans come at all.
+    """
+    parameters = MlsmCoreParameters(
+        estimator=estimator, start_matching=False, carve=carve,
+        crossings_least=2, crossings_per_point=1.0, free_scans=2,
+    )  # fmt: skip
+    localiser = parameters.build_localiser((0.0, 0.0))
+    for turn in range(9):
+        heard = scan_of(np.vstack([harbour(), GHOST]) if turn == 0 else harbour(), still(), start=16.0 * turn)
+        steps = [lambda heard=heard: localiser.take_cloud(TimedPoints.of_scan(heard))]
+        if turn < scans:
+            steps.insert(1 if cloud_first else 0, lambda heard=heard: localiser.take_scan(heard))
+        for step in steps:
+            step()
+    return localiser

@@ -1,5 +1,7 @@
 """The correction map -> odom: between scans without jumps, and for points of the past."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -9,6 +11,7 @@ from made_scans import at_velocity, still
 from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.matching.problem.prediction import Belief
 from mlsm_manager.matching.problem.scan import Track
 
@@ -76,6 +79,43 @@ def test_an_error_of_the_speed_that_was_found_goes_on():
     correction.believe(belief_of(0.0, np.zeros(3), 0.2))
     found = [correction.sample(time, np.zeros(3))[0] for time in TIMES]
     np.testing.assert_allclose(found, 0.2 * TIMES, atol=1e-9)
+
+
+def with_fading(time, pose, speed, usual=0.0, times=20.0):
+    belief = belief_of(time, pose, speed)
+    return replace(belief, fading=Fading(np.array([usual, 0.0, 0.0]), np.full(3, times)))
+
+
+def test_a_speed_that_fades_goes_on_as_it_is_expected():
+    """From 0.4 towards 0.1 m/s within 20 s, and not along with what the odometry says."""
+    correction, times = LiveCorrection(0.0), np.arange(0.0, 14.0, 0.1)
+    correction.believe(with_fading(0.0, np.zeros(3), 0.4, 0.1))
+    found = [correction.sample(time, np.zeros(3))[0] for time in times]
+    np.testing.assert_allclose(found, 0.1 * times + 0.3 * 20.0 * (1.0 - np.exp(-times / 20.0)), atol=1e-4)
+
+
+def test_a_fix_of_the_past_is_brought_to_now_as_its_speed_fades():
+    at_once, later = LiveCorrection(0.0), LiveCorrection(0.0)
+    belief = with_fading(2.0, np.array([1.0, 2.0, 0.5]), 0.4, 0.1)
+    at_once.believe(belief)
+    for time in TIMES[20:]:
+        expected = at_once.sample(time, np.zeros(3))
+    for time in TIMES[:-1]:
+        later.sample(time, np.zeros(3))
+    later.believe(belief)
+    np.testing.assert_allclose(later.sample(TIMES[-1], np.zeros(3)), expected, atol=1e-9)
+
+
+def test_without_a_new_fix_the_vehicle_comes_to_rest():
+    """With a fix every 10 s, one is overdue after 20 s; from then on 0.2 m/s fade within 20 s: 4 m."""
+    correction, times = LiveCorrection(0.0), np.arange(0.0, 300.0, 0.5)
+    found = []
+    for time in times:
+        found.append(correction.sample(time, np.zeros(3))[0])
+        if time in (0.0, 10.0, 20.0):
+            correction.believe(with_fading(time, np.array([0.2 * time, 0.0, 0.0]), 0.2, 0.2))
+    assert found[80] == pytest.approx(8.0)
+    assert found[-1] == pytest.approx(12.0, abs=0.1)
 
 
 def test_a_time_that_does_not_increase_changes_nothing():

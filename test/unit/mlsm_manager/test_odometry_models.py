@@ -71,6 +71,16 @@ def test_a_motion_that_went_as_expected_pulls_at_nothing(kind):
 
 
 @pytest.mark.parametrize("kind", KINDS)
+def test_rates_go_on_live_as_the_nodes_are_expected_to(kind):
+    model = model_of(kind)
+    node, fading = some_nodes(model)[0], model.fading(some_nodes(model)[0])
+    later = model.advanced(node[np.newaxis], MOTION[:1], MOTION[1:2])[0]
+    now, then = (model.drift(one, 0.3).values[:3] for one in (node, later))
+    expected = now if fading is None else fading.after(now, TIMES[1] - TIMES[0])
+    np.testing.assert_allclose(then, expected, atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", KINDS)
 def test_residuals_and_derivatives_agree(kind):
     model = model_of(kind)
     nodes = some_nodes(model)

@@ -2,10 +2,11 @@
 
 import math
 from dataclasses import dataclass
-from typing import Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 
+from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.matching.problem.result import Prior
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.matching.problem.state import (
@@ -86,11 +87,15 @@ class OdometryErrors(ParameterSet):
 
 @dataclass(frozen=True)
 class Belief:
-    """What is known at a time. theta: (8,) [pose, rate, motion] as in scan_path. covariance: (8, 8)."""
+    """What is known at a time. theta: (8,) [pose, rate, motion] as in scan_path. covariance: (8, 8).
+
+    fading: how the rates go on until the next belief; None where they stay.
+    """
 
     time: float
     theta: np.ndarray
     covariance: np.ndarray
+    fading: Optional[Fading] = None
 
 
 def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors) -> Belief:
