@@ -33,13 +33,21 @@ def _ros_folders() -> List[str]:
 
 
 def main(arguments: List[str]) -> int:
-    """Make the environment where it is missing and run pytest in it; return the exit status."""
+    """Make the environment where it is missing and run pytest in it; return the exit status.
+
+    Loops are compiled first: else several processes of pytest would compile the same ones at the same time.
+    """
     status = make()
     if status:
         return status
-    python = [str(ENVIRONMENT / "bin/python")]
     pytest = ["-m", "pytest", "-p", "skip_compiled", "--hypothesis-profile=few", "-m", "not newest_only"]
-    return subprocess.run([*python, *pytest, *arguments], cwd=str(ROOT), env=variables(), check=False).returncode
+    return _run("scripts/compile_loops.py") or _run(*pytest, *arguments)
+
+
+def _run(*arguments: str) -> int:
+    """Run the environment's Python in the checkout; return its exit status."""
+    command = [str(ENVIRONMENT / "bin/python"), *arguments]
+    return subprocess.run(command, cwd=str(ROOT), env=variables(), check=False).returncode
 
 
 if __name__ == "__main__":

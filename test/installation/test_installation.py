@@ -49,7 +49,7 @@ def _shell(prefix, command):
 def _run(prefix, command):
     done = subprocess.run(
         _shell(prefix, command), env=_environment(), cwd=str(prefix), stdout=subprocess.PIPE,
-        stderr=subprocess.STDOUT, text=True, timeout=240,
+        stderr=subprocess.STDOUT, text=True, timeout=720,
     )  # fmt: skip
     assert done.returncode == 0, done.stdout
     return done.stdout
@@ -86,10 +86,10 @@ def test_the_demo_maps_until_it_is_interrupted(prefix):
     reader = threading.Thread(target=lambda: output.extend(demo.stdout), daemon=True)
     reader.start()
     try:
-        listen = 'timeout 200 rostopic echo -n 1 --noarr --filter "m.width > 100" /MLSM/cloud'
+        listen = 'timeout 600 rostopic echo -n 1 --noarr --filter "m.width > 100" /MLSM/cloud'
         told = _run(prefix, f"bash -c 'until rostopic list >/dev/null 2>&1; do sleep 0.2; done; {listen}'")
         width = int(re.search(r"^width: (\d+)$", told, re.MULTILINE)[1])
     finally:
         demo.send_signal(signal.SIGINT)
-        demo.wait(timeout=60)
+        demo.wait(timeout=120)
     assert width > 100, "".join(output)

@@ -14,7 +14,7 @@ from geometry_msgs.msg import Twist
 from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 
-ATTEMPTS = 3
+ATTEMPTS = 5
 
 
 def _command(surge: float = 0.0, sway: float = 0.0) -> Twist:

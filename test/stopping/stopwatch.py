@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import List, Set
 
 PACKAGE = "underwater_map_construction"
-START_TIMEOUT = 120.0
-STOP_TIMEOUT = 60.0
+START_TIMEOUT = 300.0
+STOP_TIMEOUT = 120.0
 ROOT = Path(__file__).resolve().parents[2]
 # Every node has these before it begins to do anything.
 _FIRST = ("/rosout", "/clock", "/get_loggers", "/set_logger_level")

@@ -8,7 +8,7 @@ LIMIT = 2.0
 # What roslaunch takes for its master alone on a machine with nothing else to do.
 QUIET = 0.7
 # Another program may take the processor during one attempt.
-ATTEMPTS = 3
+ATTEMPTS = 5
 
 
 @pytest.mark.parametrize(
@@ -23,10 +23,10 @@ ATTEMPTS = 3
     ],
 )
 def test_ctrl_c_ends_it_within_two_seconds(tmp_path, launch_file, arguments):
-    """On a busy machine the master alone takes longer: only what the nodes add is counted."""
+    """A machine on which the master alone takes three times as long as QUIET may take three times as long."""
     given = [f"link:={tmp_path / 'head'}"] if launch_file.startswith("driver") else []
     for _ in range(ATTEMPTS):
         seconds = seconds_to_stop(launch_file, [*arguments, *given], tmp_path / "log")
-        if seconds < LIMIT or seconds < LIMIT - QUIET + seconds_to_stop_without_nodes(tmp_path / "log"):
+        if seconds < LIMIT or seconds < LIMIT * seconds_to_stop_without_nodes(tmp_path / "log") / QUIET:
             return
     pytest.fail(f"{seconds:.1f} s")

@@ -55,10 +55,9 @@ class MlsmCore:
         self._map = MapPublisher(parameters, self._localiser.map, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
-        self._services = MapServices(
-            namespace, self._localiser, parameters, self._after_replacing,
-            lambda update: self._publish_fix(update, round(update.scan.reference_time * 1e9)),
-        )  # fmt: skip
+        # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
+        found = guarded(self.health, self._publish_found)
+        self._services = MapServices(namespace, self._localiser, parameters, self._after_replacing, found)
         rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
 
     @classmethod
@@ -196,6 +195,9 @@ class MlsmCore:
             T_odom_base = self._odometry.matrix(update.scan.reference_time)
             T_map_base = matrices(update.result.correction(update.scan)) @ T_odom_base
             self._fix.publish(update.result, T_map_base, stamp_ns)
+
+    def _publish_found(self, update: ScanUpdate) -> None:
+        self._publish_fix(update, round(update.scan.reference_time * 1e9))
 
     def _correction(self) -> np.ndarray:
         newest = self._odometry.newest()

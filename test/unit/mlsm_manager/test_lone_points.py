@@ -120,6 +120,7 @@ def test_speed_is_found_from_posts(scans):
     assert solver_of(scans, lone_quality=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
 
 
+@pytest.mark.newest_only("dear; the tests above follow the same canal")
 @pytest.mark.parametrize("lone_quality", [0.0, 1.0])
 def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(lone_quality):
     """Nothing tells the way along it, so the deviation is that of a speed which nobody knows."""

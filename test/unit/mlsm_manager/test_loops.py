@@ -14,6 +14,7 @@ from mlsm_manager.multi_view.parameters import MultiViewParameters
 from node_support.geometry.planar import inverse, transformed
 
 pytestmark = pytest.mark.long
+dear = pytest.mark.newest_only("dear; the first loop is looked for and found with every version")
 
 DEAF = range(15, 25)  # scans that hear nothing, while the odometry goes astray
 RETURNED = slice(26, None)  # nodes of the scans after these
@@ -46,7 +47,7 @@ def errors(solver, batch, track, made):
     return np.hypot(*(found - made.truth.at(times))[:, :2].T)
 
 
-@pytest.mark.parametrize("drift", [(12.0, -6.0), (9.0, 9.0)])
+@pytest.mark.parametrize("drift", [(12.0, -6.0), pytest.param((9.0, 9.0), marks=dear)])
 def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift):
     made = tour(40)
     scans, track = astray(made, np.array(drift))
@@ -59,6 +60,7 @@ def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift
     assert "of its echoes fit there" in found.to_mapping()["found"][0]
 
 
+@dear
 def test_a_run_that_is_not_astray_has_no_loops():
     solver = followed(tour(40).scans)
     batch = solved(solver)
@@ -67,6 +69,7 @@ def test_a_run_that_is_not_astray_has_no_loops():
     assert found.to_mapping() == {"gain": None, "found": []}
 
 
+@dear
 def test_noise_makes_no_loops():
     rng = np.random.RandomState(0)
 
@@ -79,6 +82,7 @@ def test_noise_makes_no_loops():
     assert loops_of(solver.log, solver.odometry, solver.state, solver.parameters) == []
 
 
+@dear
 def test_a_canal_makes_no_loops():
     """Along straight walls every place fits as well as the next."""
     rng, made = np.random.RandomState(1), tour(40)

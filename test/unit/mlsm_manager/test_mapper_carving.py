@@ -1,5 +1,7 @@
 """Where the free space of a map begins, and which of its maps lose what beams go through, with either estimator."""
 
+from functools import lru_cache
+
 import numpy as np
 import pytest
 from made_scans import harbour, scan_of, still, wall
@@ -20,14 +22,16 @@ def localiser_of(estimator, **changes):
     return parameters.build_localiser(SONAR_IN_BASE)
 
 
-def with_a_ghost(estimator, **changes):
-    """Return the localiser after a scan with the ghost and eight without it."""
-    localiser = localiser_of(estimator, crossings_least=2, crossings_per_point=1.0, free_scans=2, **changes)
+@lru_cache(maxsize=None)
+def layers_with_a_ghost(estimator, matching, carve):
+    """Return the maps after a scan with the ghost and eight without it."""
+    changes = {"crossings_least": 2, "crossings_per_point": 1.0, "free_scans": 2}
+    localiser = localiser_of(estimator, start_matching=matching, carve=carve, **changes)
     localiser.mount(np.zeros(2))
     for turn in range(9):
         places = np.vstack([harbour(), GHOST]) if turn == 0 else harbour()
         localiser.take_scan(scan_of(places, still(), start=16.0 * turn))
-    return localiser
+    return localiser.mapper.layers
 
 
 def has_ghost(blocks):
@@ -55,8 +59,8 @@ def test_a_sonar_that_is_placed_later_counts_from_then_on(matching):
 @pytest.mark.parametrize("layer", [Layer.SHOWN, Layer.MATCHED])
 @pytest.mark.parametrize("matching", [False, True])
 def test_a_block_that_beams_go_through_leaves_both_maps(estimator, layer, matching):
-    kept = with_a_ghost(estimator, start_matching=matching, carve=False).mapper.layers[layer]
-    carved = with_a_ghost(estimator, start_matching=matching).mapper.layers[layer]
+    kept = layers_with_a_ghost(estimator, matching, carve=False)[layer]
+    carved = layers_with_a_ghost(estimator, matching, carve=True)[layer]
     assert has_ghost(kept)
     assert not has_ghost(carved)
     assert len(carved) > 0.9 * len(kept)
