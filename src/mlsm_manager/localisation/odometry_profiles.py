@@ -80,6 +80,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("scan_parts", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"),
         _NEIGHBOURS,
         Setting("normal_deviation", 0.1, "rad: half of heading's, so that the little that parts of a turn hear counts"),
+        _POSTS,
         *_COMPASS,
     ),
     OdometryKind.NONE: (

@@ -12,7 +12,6 @@ from mlsm_manager.multi_view.islands import Islands
 from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.live_window import LiveWindow
 from mlsm_manager.multi_view.misfit import misfit_variances
-from mlsm_manager.multi_view.motion_samples import searched_nodes
 from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -22,6 +21,8 @@ from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.scan_parts import parts_of
 from mlsm_manager.multi_view.stacking import stacked, unstacked
 from mlsm_manager.multi_view.state import RUN_COLUMNS, State
+from mlsm_manager.multi_view.way_nodes import nodes_on_ways
+from mlsm_manager.multi_view.way_search import WaySearch, needs_ways
 from node_support.errors import RefusedInput
 
 _ESTIMATE = "estimate."
@@ -60,6 +61,7 @@ class LiveSolver:
         self._start, self._known = start, known
         self.islands = Islands(np.empty(0))
         self.search: Optional[Whereabouts] = None
+        self._ways = WaySearch(parameters) if needs_ways(self.odometry, parameters.matching) else None
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
@@ -72,6 +74,7 @@ class LiveSolver:
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             "islands": self.islands.numbers,
+            **({} if self._ways is None else self._ways.stored()),
             **stacked(self.estimates, _ESTIMATE),
         }
 
@@ -103,6 +106,7 @@ class LiveSolver:
         solver._run[:] = stored["run_unknowns"]
         solver._misfits.replace_from(0, stored["misfits"])
         solver.islands = Islands(stored["islands"])
+        solver._ways = None if solver._ways is None else solver._ways.resumed(solver.log, stored)
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
         if len(solver.estimates) != solver.log.scan_count:
             raise ValueError(f"{len(solver.estimates)} estimates for {len(scans)} scans")
@@ -124,6 +128,7 @@ class LiveSolver:
         the fit has no finite solution.
         """
         scans, nodes, run = self.log.scan_count, self._nodes.values.copy(), self._run.copy()
+        ways = self._ways
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self._append(scan)
@@ -134,6 +139,7 @@ class LiveSolver:
             # numpy and scipy raise a ValueError where they meet what is not finite.
             self._nodes.replace_from(0, nodes)
             self._run[:] = run
+            self._ways = ways
             self._shorten(scans)
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
@@ -180,7 +186,7 @@ class LiveSolver:
         first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
         newest = misfit_variances(self.log, self.odometry, self.state, self.parameters.matching, first)
         self._misfits.replace_from(first, newest)
-        return float(self._misfits.values.sum())
+        return float(self._misfits.values.sum()) + (0.0 if self._ways is None else self._ways.variance)
 
     def _fitted(self) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution."""
@@ -221,11 +227,12 @@ class LiveSolver:
             self._search_beside_scan_before(covariance)
 
     def _search_by_parts(self) -> None:
-        """Put the nodes of the newest turn where its parts fit to the scans before."""
-        if self.estimates:
-            covariance = self.estimates[-1].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
-            found = searched_nodes(self.log, self.odometry, self.state, covariance, self.parameters.matching)
-            self._nodes.values[-self._parts :] = found
+        """Put the newest nodes onto the ways that are believed most."""
+        if self._ways is not None:
+            self._ways = self._ways.followed(self.log)
+            is_told = self._known is not None or self._start is not None
+            nodes = nodes_on_ways(self._ways, self.log, self.state.nodes, self.parameters, is_told)
+            self._nodes.replace_from(self.log.scan_count + 1 - len(nodes), nodes)
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""

@@ -16,7 +16,7 @@ from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import Layout, State
 from mlsm_manager.multi_view.surface_points import ramp
 
-_NEAR_IN_TIME = 5  # scans before and after, a minute, in which a vehicle passes a post
+_NEAR_IN_TIME = 5  # turns before and after, a minute, in which a vehicle passes a post
 _CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by chance, to something that stays
 _FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
 
@@ -43,22 +43,25 @@ class LoneComparisons:
         sources = points.selected(points.scans >= layout.first)
         if self._lists is None:
             self._lists = NeighbourLists(points, self._matching.block_scans)
-        pairs, count = lone_pairs(self._lists, sources, points, cut), 0
+        near = _NEAR_IN_TIME * self._matching.scan_parts
+        pairs, count = lone_pairs(self._lists, sources, points, cut, near), 0
         pairs = replace(pairs, importance=pairs.importance * self._importance[pairs.neighbours])
         for each, heard, met in along_and_across(pairs, sources, points):
             count += add_comparisons(equations, layout, each, heard, met, self._matching, cut, summed)
         return count
 
 
-def lone_pairs(lists: NeighbourLists, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Pairs:
+def lone_pairs(
+    lists: NeighbourLists, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
+) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
 
-    A point counts if several of the scans around its own heard one there too. Clutter meets clutter by chance, and
-    would say that nothing moves.
+    A point counts if several of the `near_in_time` scans before and after its own heard one there too. Clutter meets
+    clutter by chance, and would say that nothing moves.
     """
     rows, neighbours, distance, shares = lists.within(sources, targets, cut)
     met = shares * ramp(distance, cut, _FADING * cut) * targets.qualities[neighbours]
-    near = np.abs(sources.scans[rows] - targets.scans[neighbours]) <= _NEAR_IN_TIME
+    near = np.abs(sources.scans[rows] - targets.scans[neighbours]) <= near_in_time
     confirmed = ramp(np.bincount(rows, met * near, len(sources)), *_CONFIRMED)
     importance = met * sources.qualities[rows] * confirmed[rows]
     kept = importance > 0.0

@@ -26,7 +26,8 @@ class SolverKernel(Enum):
                 return SolverKernel.NUMPY
             prepare_cache()
             import mlsm_manager.multi_view.compiled_comparisons
-            import mlsm_manager.multi_view.compiled_placement  # noqa: F401
+            import mlsm_manager.multi_view.compiled_placement
+            import mlsm_manager.multi_view.compiled_ways  # noqa: F401
         except ImportError:
             if self is SolverKernel.NUMBA:
                 raise

@@ -10,9 +10,10 @@ from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.batch_solver import BatchResult, Closed, closed, solved
+from mlsm_manager.multi_view.batch_solver import BatchResult, Closed, closed
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.path import solved_path
+from mlsm_manager.multi_view.way_batch import solved_best
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 
@@ -36,7 +37,7 @@ class Refined:
 
 def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
     """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
-    closing = closed(solver, solved(solver))
+    closing = closed(solver, solved_best(solver))
     surfaces = KeyframeMap(settings.resolution, settings.limit, kernel=settings.kernel, carver=settings.carver)
     for scan in scans:
         surfaces.add(TimedPoints.of_scan(scan))

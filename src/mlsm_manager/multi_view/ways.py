@@ -1,0 +1,73 @@
+"""Many ways that a vehicle may have gone, drawn at random and weighed by what it heard (a particle filter).
+
+Gordon, Salmond and Smith 1993; each way is a map of its own, as in FastSLAM (Montemerlo et al. 2002).
+"""
+
+from typing import NamedTuple, Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+_ALIKE = 1.0  # m by which the ends of ways may differ that count as one
+_UNEVEN = 0.5  # share of the ways that must still count, or else they are drawn anew
+
+
+class Ways(NamedTuple):
+    """paths: (n, k, 2) m, places in map at the newest k nodes. speeds: (n, 2) m/s in map. nats: (n,) of belief."""
+
+    paths: np.ndarray
+    speeds: np.ndarray
+    nats: np.ndarray
+
+    @property
+    def shares(self) -> np.ndarray:
+        """(n,) of all that is believed."""
+        shares = np.exp(self.nats - self.nats.max())
+        return shares / shares.sum()
+
+    def mean(self) -> np.ndarray:
+        """Return the mean path (k, 2)."""
+        return np.einsum("n,nka->ka", self.shares, self.paths)
+
+    def most_believed(self) -> np.ndarray:
+        """Return the mean path (k, 2) of the ways that end about where most is believed."""
+        ends, shares = self.paths[:, -1], self.shares
+        groups = cKDTree(ends).query_ball_point(ends, _ALIKE)
+        best = groups[int(np.argmax([shares[group].sum() for group in groups]))]
+        return np.einsum("n,nka->ka", shares[best], self.paths[best]) / shares[best].sum()
+
+    def spread(self) -> np.ndarray:
+        """Return the covariance (2, 2) [m^2] of the ends."""
+        ends, shares = self.paths[:, -1], self.shares
+        offset = ends - shares @ ends
+        return (offset * shares[:, np.newaxis]).T @ offset
+
+    def resampled(self, rng: np.random.RandomState) -> "Ways":
+        """Return as many ways, each as often as it is believed, where few of them count; or else the same."""
+        shares, count = self.shares, len(self.nats)
+        if 1.0 / (shares**2).sum() >= _UNEVEN * count:
+            return self
+        chosen = np.searchsorted(np.cumsum(shares), (rng.rand() + np.arange(count)) / count)
+        chosen = np.minimum(chosen, count - 1)
+        return Ways(self.paths[chosen], self.speeds[chosen], np.zeros(count))
+
+    def continued(self, ends: np.ndarray, speeds: np.ndarray, longest: int) -> "Ways":
+        """Return the ways with places (n, 2) at the next node and `speeds` (n, 2) there; no longer than `longest`."""
+        paths = np.concatenate([self.paths[:, -longest + 1 :], ends[:, np.newaxis]], axis=1)
+        return Ways(paths, speeds, self.nats)
+
+    def believed(self, nats: np.ndarray) -> "Ways":
+        """Return the ways after `nats` (n,) speak for them."""
+        total = self.nats + nats
+        return self._replace(nats=total - total.max())
+
+
+def begun(count: int, place: np.ndarray, speed: float, rng: np.random.RandomState) -> Ways:
+    """Return `count` ways that begin at `place` (2,): half of them at rest, half at about `speed` [m/s]."""
+    deviations = np.where(rng.rand(count, 1) < 0.5, _AT_REST, speed)
+    return Ways(np.tile(place, (count, 1, 1)), deviations * rng.normal(size=(count, 2)), np.zeros(count))
+
+
+_AT_REST = 0.02  # m/s: a vehicle that holds its place
+Draw = Tuple[np.ndarray, np.ndarray]
+"""Places (n, 2) [m] at the next node and speeds (n, 2) [m/s] there."""
