@@ -1,11 +1,8 @@
 """Prints what each ingredient of the joint solver buys: the same runs with one of them left out at a time.
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.ablation RUN.bag [--runs RUN ...] [--only VARIANT ...]
-
 The runs are twins of a recording (benchmarks.twins) and simulated tours (benchmarks.heads), whose truth is known.
 """
 
-import argparse
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -13,6 +10,7 @@ from typing import Any, Callable, Dict, List, NamedTuple
 
 import numpy as np
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.heads import recordings, tour_setup
 from benchmarks.matching_scans import KINDS
 from benchmarks.path_figures import figures_of
@@ -116,7 +114,7 @@ def line(run: Run, change: Change) -> str:
 
 def main() -> None:
     """Print one line per run and variant: mean / greatest distance from the truth, NEES per state, computing time."""
-    parser = argparse.ArgumentParser(prog="benchmarks.ablation", description=__doc__)
+    parser = benchmark_parser("ablation", __doc__)
     parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
     parser.add_argument(
         "--runs", nargs="+", default=["as_recorded", "reversed", "graded", *TOURS], choices=[*TWINS, *TOURS]

@@ -1,15 +1,13 @@
 """Prints how honest the joint solver is in straight canals, whose walls do not tell the way along them.
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.canals [--posts N ...] [--seeds N]
-
 A vehicle with a compass alone goes from one basin through a canal, 200 m long and 20 m wide, into another basin.
 """
 
-import argparse
 from typing import NamedTuple, Tuple
 
 import numpy as np
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.solver_input import solver_input
 from benchmarks.twins.odometry import lasting, reported
 from benchmarks.twins.parameters import TwinParameters
@@ -110,7 +108,7 @@ def figures(solver: LiveSolver, truth: Track) -> Figures:
 
 def main() -> None:
     """Print one line per run."""
-    parser = argparse.ArgumentParser(prog="benchmarks.canals", description=__doc__)
+    parser = benchmark_parser("canals", __doc__)
     parser.add_argument("--posts", type=int, nargs="+", default=[0, 12], help="along the canal (default: 0 and 12)")
     parser.add_argument("--seeds", type=int, default=3, help="runs with each number of posts (default: %(default)s)")
     parser.add_argument("--graded", action="store_true", help="echoes with strengths instead of plateaus")

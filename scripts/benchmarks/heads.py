@@ -1,17 +1,15 @@
 """Prints how far the joint solver's paths are from the truth, and how honest it is, with heads of different sharpness.
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.heads [--worlds basin harbour] [--draws N]
-
 Each tour is simulated once per head. Its odometry is then drawn N times, with errors as those of a DVL and a compass.
 Beside what the solver reaches stands how far off any solver must be (benchmarks.information_bound).
 """
 
-import argparse
 from typing import List, NamedTuple, Tuple
 
 import numpy as np
 import yaml
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.information_bound import bounds
 from benchmarks.matching_scans import KINDS, RAYS, SonarKind
 from benchmarks.path_figures import PathFigures, figures_of
@@ -116,7 +114,7 @@ def _head_step(recording: Recording) -> float:
 
 def main() -> None:
     """Print one line per world and head."""
-    parser = argparse.ArgumentParser(prog="benchmarks.heads", description=__doc__)
+    parser = benchmark_parser("heads", __doc__)
     parser.add_argument("--worlds", nargs="+", default=["basin", "harbour"], choices=["basin", "harbour"])
     parser.add_argument("--draws", type=int, default=4, help="odometries per tour (default: %(default)s)")
     arguments = parser.parse_args()

@@ -1,15 +1,12 @@
-"""Prints what a scan costs the joint solver after 100 scans and after many, on a tour that never ends.
+"""Prints what a scan costs the joint solver after 100 scans and after many, on a tour that never ends."""
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.long_run [SCANS]
-"""
-
-import argparse
 import resource
 import time
 from typing import Iterator
 
 import numpy as np
 
+from benchmarks.command_line import benchmark_parser
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
@@ -71,7 +68,7 @@ def _ranges(poses: np.ndarray, bearings: np.ndarray) -> np.ndarray:
 
 def main() -> None:
     """Print time per scan, memory and error each time a number of scans is reached."""
-    parser = argparse.ArgumentParser(prog="benchmarks.long_run", description=__doc__)
+    parser = benchmark_parser("long_run", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
     scans = parser.parse_args().scans
     solver, seconds = LiveSolver(MultiViewParameters(kernel=SolverKernel.AUTO), np.zeros(2)), []

@@ -1,14 +1,11 @@
-"""Water with nothing in it: no scan of noise may lead to a fix.
+"""Water with nothing in it: no scan of noise may lead to a fix."""
 
-PYTHONPATH=src:scripts python3 -m benchmarks.open_water [SCANS]
-"""
-
-import argparse
 from dataclasses import dataclass
 from typing import Callable, Dict, Iterator, List
 
 import numpy as np
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.table import Row, print_table
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.matching.problem.scan import Track
@@ -115,6 +112,6 @@ def rows(scans: int = SCANS) -> List[Row]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python3 -m benchmarks.open_water", description=__doc__)
+    parser = benchmark_parser("open_water", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS)
     print_table(rows(parser.parse_args().scans))

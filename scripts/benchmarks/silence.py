@@ -1,8 +1,5 @@
 """Prints where a vehicle finds itself again after its sonar heard nothing for minutes, while it moved on.
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.silence [--tours basin_ahead_tour ...] [--odometry heading dvl]
-    [--seeds N] [--seconds S] [--marina]
-
 One line per tour, odometry, kind of silence and beginning of it. The error is that of the position against where it
 should be, the marina's against the path by its own DVL without the silence.
 """
@@ -14,6 +11,7 @@ from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.heads import recorded as recording_of
 from benchmarks.heads import simulated, tour_setup
 from benchmarks.recorded import recorded
@@ -153,7 +151,7 @@ def heading_only(recording: Recording) -> Recording:
 
 def main() -> None:
     """Print one line per silence."""
-    parser = argparse.ArgumentParser(prog="benchmarks.silence", description=__doc__)
+    parser = benchmark_parser("silence", __doc__)
     parser.add_argument("--tours", nargs="*", default=TOURS, choices=TOURS, help="which ones; default: all")
     parser.add_argument("--odometry", nargs="+", default=["heading", "dvl"], choices=["heading", "dvl"])
     parser.add_argument("--seeds", type=int, default=1, help="compasses with each tour (default: %(default)s)")

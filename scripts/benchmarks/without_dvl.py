@@ -1,16 +1,14 @@
 """Prints how far paths are from the truth where the vehicle has no DVL, on simulated tours.
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.without_dvl [--tours basin_ahead_tour ...] [--seeds N]
-
 One line per tour, odometry and seed: a compass alone, with and without changes of speed within a turn of the head, and
 thrusters whose speed is right or 30 % wrong.
 """
 
-import argparse
 from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.heads import Simulated, recorded, simulated, tour_setup
 from benchmarks.matching_scans import SonarKind
 from benchmarks.solver_input import solver_input
@@ -73,7 +71,7 @@ def _cases() -> Iterator[Tuple[OdometryKind, float]]:
 
 def main() -> None:
     """Print one line per tour, odometry and seed."""
-    parser = argparse.ArgumentParser(prog="benchmarks.without_dvl", description=__doc__)
+    parser = benchmark_parser("without_dvl", __doc__)
     parser.add_argument("--tours", nargs="+", default=TOURS, choices=TOURS, help="which ones; default: all")
     parser.add_argument("--seeds", type=int, default=1, help="compasses with each tour (default: %(default)s)")
     arguments = parser.parse_args()

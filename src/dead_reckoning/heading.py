@@ -11,8 +11,9 @@ _MOST_TURNS = 2.0  # a compass counts to one turn; a driver that unwraps it coun
 
 
 def rotation_of_heading(heading: float, kind: HeadingType) -> np.ndarray:
-    """Return R_odom_base (3, 3), x east and z up, of a level vehicle; `heading` counts clockwise from north.
+    """Return R_odom_base (3, 3), x east and z up, of a level vehicle.
 
+    heading: clockwise from north, in degrees or radians as `kind` says.
     Raises RefusedInput for a heading that is not finite, or of more than two turns.
     """
     radians = math.radians(heading) if kind is HeadingType.COMPASS_DEGREES else heading

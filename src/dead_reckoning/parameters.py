@@ -73,7 +73,7 @@ class DeadReckoningParameters(StampParameters):
         101325.0, "pressure at the surface, which depends on weather and altitude", unit="Pa", low=3e4, high=2e5
     )
     water_density: float = parameter(
-        1025.0, "of the water: 1025 in the sea, 1000 in a lake", unit="kg/m^3", low=900.0, high=1300.0
+        1025.0, "density of the water: 1025 in the sea, 1000 in a lake", unit="kg/m^3", low=900.0, high=1300.0
     )
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
     base_frame: str = parameter("base_link", "frame of the vehicle", tunable=False)

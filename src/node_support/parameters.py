@@ -72,7 +72,7 @@ def parameter(
 
 
 def describe(field: dataclasses.Field) -> Description:
-    """Return the description that `parameter` left in a dataclass field."""
+    """Return the description that `parameter` left in a dataclass field. Raises KeyError for any other field."""
     return field.metadata[_METADATA_KEY]
 
 

@@ -1,12 +1,9 @@
-"""Prints how far live and batch paths are from the truth on twins of a recorded run.
+"""Prints how far live and batch paths are from the truth on twins of a recorded run."""
 
-PYTHONPATH=scripts:$PYTHONPATH python3 -m benchmarks.twins RUN.bag [TWIN ...]
-"""
-
-import argparse
 from pathlib import Path
 from typing import Tuple
 
+from benchmarks.command_line import benchmark_parser
 from benchmarks.path_figures import PathFigures, figures_of
 from benchmarks.solver_input import solver_input
 from benchmarks.twins.parameters import TWINS
@@ -23,7 +20,7 @@ from recordings.reading.reader import Request
 
 def main() -> None:
     """Print one line per twin."""
-    parser = argparse.ArgumentParser(prog="benchmarks.twins", description=__doc__)
+    parser = benchmark_parser("twins", __doc__)
     parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
     parser.add_argument("twins", nargs="*", default=list(TWINS), help="which ones; default: " + ", ".join(TWINS))
     arguments = parser.parse_args()

@@ -75,7 +75,7 @@ class KeyframeMap:
 
     @property
     def covered(self) -> Covered:
-        """What the map holds without them, in the cells that they changed."""
+        """What the map holds without the keyframes, in the cells that they changed."""
         self._draw_what_is_due()
         return self._overlay.covered
 

@@ -9,6 +9,7 @@ from mlsm_manager.surface_map.export.formats import ENDINGS
 from node_support.command_line import CommandLine
 
 _MAPS = "a map (.mlsm, or a .ply of this package)"
+_OUT = f"file to write, ending with one of {' '.join(ENDINGS)}"
 
 
 def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
@@ -21,32 +22,40 @@ def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     view = commands.add_parser("view", help="show a map in a window; without a screen write a picture")
     _add_map(view)
     _add_colors(view)
-    export = commands.add_parser("export", help="write a map in another format")
-    _add_map(export)
-    export.add_argument("out", type=Path, metavar="OUT", help=f"file ending with one of {' '.join(ENDINGS)}")
-    export.add_argument(
+    _add_export(commands.add_parser("export", help="write a map in another format"))
+    _add_crop(commands.add_parser("crop", help="keep what lies in a box"))
+    _add_merge(commands.add_parser("merge", help="make one map of two"))
+    _add_two_maps(commands.add_parser("diff", help="say what only one of two maps has"))
+    return parser.parse_args(arguments)
+
+
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    _add_map(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    parser.add_argument(
         "--slice", type=float, nargs=2, default=(float("-inf"), float("inf")), metavar=("LOW", "HIGH"),
         help="heights between which a .pgm shows what is occupied [m] (default: all)",
     )  # fmt: skip
-    _add_colors(export)
-    crop = commands.add_parser("crop", help="keep what lies in a box")
-    _add_map(crop)
-    crop.add_argument("out", type=Path, metavar="OUT")
-    crop.add_argument(
-        "--low", type=float, nargs="+", required=True, metavar=("X", "Y"), help="its lower corner, X Y or X Y Z [m]"
-    )
-    crop.add_argument(
-        "--high", type=float, nargs="+", required=True, metavar=("X", "Y"), help="its upper corner, X Y or X Y Z [m]"
-    )
-    merge = commands.add_parser("merge", help="make one map of two")
-    _add_two_maps(merge)
-    merge.add_argument("out", type=Path, metavar="OUT")
-    merge.add_argument(
+    _add_colors(parser)
+
+
+def _add_crop(parser: argparse.ArgumentParser) -> None:
+    _add_map(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    for option, corner in (("--low", "lower"), ("--high", "upper")):
+        parser.add_argument(
+            option, type=float, nargs="+", required=True, metavar=("X", "Y"),
+            help=f"the box's {corner} corner, X Y or X Y Z [m]",
+        )  # fmt: skip
+
+
+def _add_merge(parser: argparse.ArgumentParser) -> None:
+    _add_two_maps(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    parser.add_argument(
         "--transform", type=float, nargs=4, default=(0.0, 0.0, 0.0, 0.0), metavar=("X", "Y", "Z", "YAW"),
         help="where the second map's origin lies in the first [m, deg] (default: at its origin)",
     )  # fmt: skip
-    _add_two_maps(commands.add_parser("diff", help="say what only one of two maps has"))
-    return parser.parse_args(arguments)
 
 
 def _add_map(parser: argparse.ArgumentParser) -> None:

@@ -89,7 +89,10 @@ class LiveEstimate:
 
 
 def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:
-    """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map."""
+    """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map.
+
+    deviation: of the scale, as a share of 1.
+    """
     lengths = poses * np.array([1.0, 1.0, 0.0])
     return deviation**2 * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]
 

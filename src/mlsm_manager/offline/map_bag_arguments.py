@@ -16,6 +16,8 @@ from recordings.reading.arguments import add_reading_arguments, request_of
 from recordings.reading.parameters import ReadingParameters
 from recordings.vehicle.motion import MotionSource
 
+_EPILOG = "docs/map_bag.md describes the options, what is written, and how a vehicle is calibrated by it."
+
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return bags, out, inspect, scheduler, refine, frames, parameters and request; exits on a bad command line.
@@ -40,50 +42,54 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
 
 
 def _parser() -> CommandLine:
-    parser = CommandLine("map_bag", description="Map a recording without a ROS master.")
+    parser = CommandLine("map_bag", description="Map a recording without a ROS master.", epilog=_EPILOG)
     parser.add_argument(
         "bags", type=Path, nargs="+", metavar="bag",
         help="recording: a bag of ROS 1 or ROS 2, or the log of a sonar's maker; each further one starts in the map of "
         "those before",
     )  # fmt: skip
-    parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
-    )
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to; created if missing")
     parser.add_argument("--inspect", action="store_true", help="say what a bag holds, and write nothing")
-    parser.add_argument(
-        "--matcher", choices=[name.value for name in MatcherName], help="match scan by scan, with this matcher"
-    )
-    parser.add_argument("--refine", action="store_true", help="smooth the whole run afterwards")
-    parser.add_argument(
-        "--check", action="store_true",
-        help="with --refine: smooth five times more, with other settings and from another start, and say how far the "
-        "paths lie apart",
-    )  # fmt: skip
-    parser.add_argument(
-        "--no-calibrate",
-        dest="calibrate",
-        action="store_false",
-        help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
-    )
-    parser.add_argument(
-        "--odometry", choices=[kind.value.lower() for kind in OdometryKind],
-        help="what the vehicle knows of its motion; default: as the recording looks",
-    )  # fmt: skip
+    _add_solving_arguments(parser)
     parser.add_argument(
         "--parameters", type=Path, metavar="FILE", help="yaml file, such as a live.yaml; --set overrides it"
     )
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
+    parser.add_argument(
+        "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
+    )
     return parser
+
+
+def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what says how the poses of scans are found."""
+    parser.add_argument(
+        "--odometry", choices=[kind.value.lower() for kind in OdometryKind],
+        help="what the vehicle knows of its motion (default: as the recording looks)",
+    )  # fmt: skip
+    parser.add_argument("--refine", action="store_true", help="fit the whole run at once afterwards")
+    parser.add_argument(
+        "--check", action="store_true",
+        help="with --refine: fit the whole run five times more, with other settings and from another start, and say "
+        "how far the paths lie apart",
+    )  # fmt: skip
+    parser.add_argument(
+        "--no-calibrate", dest="calibrate", action="store_false",
+        help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
+    )  # fmt: skip
+    parser.add_argument(
+        "--matcher", choices=[name.value for name in MatcherName],
+        help="match each scan alone instead of jointly, by this matcher",
+    )  # fmt: skip
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
     """Refuse options that contradict each other, and a command without a folder to write to."""
     if options.refine and len(options.bags) > 1:
-        parser.error("--refine smooths one recording, not several")
+        parser.error("--refine fits one recording, not several")
     if options.check and not options.refine:
-        parser.error("--check repeats the smoothing of --refine; give both")
+        parser.error("--check repeats the fit of --refine; give both")
     if options.out is None and not options.inspect:
         parser.error("the following arguments are required: --out")
     if options.vehicle and len(options.bags) > 1:

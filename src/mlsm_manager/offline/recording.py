@@ -96,7 +96,7 @@ def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[
 
 
 def track_between(track: Track, start: float, end: float) -> Track:
-    """Return the part of a track that covers `start` to `end`, as far as it reaches."""
+    """Return the part of a track that covers the times `start` to `end` [s], as far as it reaches."""
     first = max(int(np.searchsorted(track.times, start, side="right")) - 1, 0)
     last = min(int(np.searchsorted(track.times, end)) + 1, len(track.times))
     return Track(track.times[first:last], track.poses[first:last])

@@ -7,6 +7,7 @@ import plotly.graph_objects as go
 
 from mlsm_manager.report.map_image import map_image
 from mlsm_manager.report.mission import Mission, Path, Uncertainty
+from mlsm_manager.surface_map.blocks import Blocks
 
 SCAN_TRACE = "scan at the chosen time"
 VEHICLE_TRACE = "vehicle at the chosen time"
@@ -50,22 +51,11 @@ def map_from_above(mission: Mission) -> go.Figure:
 
 
 def map_in_3d(mission: Mission) -> go.Figure:
-    """Return the blocks as points at their means, and the best path.
-
-    Their colour is their height or, in a flat map, the number of their points.
-    """
+    """Return the blocks as points at their means, and the best path at their median height."""
     step = max(1, -(-len(mission.blocks) // _MOST_BLOCKS))
     blocks = mission.blocks.take(np.arange(0, len(mission.blocks), step))
     mean = blocks.mean.astype(np.float32)
-    flat = not len(mean) or np.ptp(mean[:, 2]) < blocks.resolution
-    shade, told = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
-    name = "map" if step == 1 else f"map, one block of {step}"
-    figure = go.Figure(
-        go.Scatter3d(
-            x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
-            marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": told}},
-        )
-    )  # fmt: skip
+    figure = go.Figure(_blocks_in_3d(blocks, mean, "map" if step == 1 else f"map, one block of {step}"))
     path = thinned(mission.best)
     height = np.full(len(path.times), float(np.median(mean[:, 2])) if len(mean) else 0.0, dtype=np.float32)
     figure.add_trace(
@@ -82,6 +72,16 @@ def map_in_3d(mission: Mission) -> go.Figure:
         xaxis_title="x [m]", yaxis_title="y [m]", zaxis_title="z [m]",
     )  # fmt: skip
     return _laid_out(figure, 600)
+
+
+def _blocks_in_3d(blocks: Blocks, mean: np.ndarray, name: str) -> go.Scatter3d:
+    """Return blocks at their means (n, 4), in the colour of their height or, in a flat map, of their points' number."""
+    flat = not len(mean) or np.ptp(mean[:, 2]) < blocks.resolution
+    shade, told = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
+    return go.Scatter3d(
+        x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
+        marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": told}},
+    )  # fmt: skip
 
 
 def correction_over_time(mission: Mission) -> go.Figure:

@@ -29,11 +29,7 @@ def against_odometry(
     times: (m,) s. odometry, corrected: (m, >= 2) positions. window: s, about 25 scans. scale_deviation and
     position_walk [m/sqrt(s)]: of the odometry.
     """
-    starts = np.arange(times[0], times[-1] - window, _STEP)
-    by_odometry, by_map = (_moves(times, path, starts, window) for path in (odometry, corrected))
-    far = np.abs(by_odometry) > _SHORTEST
-    starts, by_odometry, by_map = starts[far], by_odometry[far], by_map[far]
-    ratio = by_map / by_odometry
+    starts, by_odometry, ratio = _ratios(times, odometry, corrected, window)
     walk = position_walk**2 * window / np.abs(by_odometry) ** 2
     along = (np.abs(ratio) - 1.0) / np.sqrt(scale_deviation**2 + walk)
     direction = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
@@ -50,6 +46,18 @@ def against_odometry(
             question="Does the corrected path turn as the odometry does, all along the run?",
         ),
     )  # fmt: skip
+
+
+def _ratios(
+    times: np.ndarray, odometry: np.ndarray, corrected: np.ndarray, window: float
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return of windows (n,) in which the vehicle goes far enough: starts [s], moves by the odometry as complex
+    numbers [m], and the corrected moves over these.
+    """
+    starts = np.arange(times[0], times[-1] - window, _STEP)
+    by_odometry, by_map = (_moves(times, path, starts, window) for path in (odometry, corrected))
+    far = np.abs(by_odometry) > _SHORTEST
+    return starts[far], by_odometry[far], by_map[far] / by_odometry[far]
 
 
 def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray, window: float) -> np.ndarray:

@@ -10,7 +10,8 @@ import numpy as np
 
 from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.block_store import BlockStore
-from mlsm_manager.surface_map.compiled_loops import groups_of, merged, write_blocks
+from mlsm_manager.surface_map.compiled_grouping import groups_of
+from mlsm_manager.surface_map.compiled_merging import merged, write_blocks
 from mlsm_manager.surface_map.insertion import Insertion
 from node_support.kernels import Kernel
 

@@ -22,5 +22,8 @@ def sending_time(pulse: PulseSettings, baud_rate: float) -> float:
 
 
 def beam_time(step: int, pulse: PulseSettings, baud_rate: float) -> float:
-    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds."""
+    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds.
+
+    baud_rate: bits per second.
+    """
     return turning_time(step) + pulse.listening_time + sending_time(pulse, baud_rate)

@@ -116,7 +116,7 @@ def _told(path: Path) -> Iterator[None]:
         if "not indexed" in str(error):
             told = f"{path}: not indexed, the recording was cut off; run: rosbag reindex {path}"
             raise RecordingError(told) from None
-        raise RecordingError(f"{path}: no bag, or a broken one: {_one_line(error)}") from None
+        raise RecordingError(f"{path}: not a bag, or damaged: {_one_line(error)}") from None
 
 
 def _one_line(error: Exception) -> str:

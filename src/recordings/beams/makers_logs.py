@@ -20,7 +20,7 @@ def makers_beams(path: Path) -> FoundBeams:
     """Return the beams of a log, in the frame "sonar". Raises RecordingError."""
     reader = _reader(path)
     if reader is None:
-        raise RecordingError(f"{path}: neither a .852 log nor one of Ping Viewer")
+        raise RecordingError(f"{path}: not a log of a known sonar: neither a .852 file nor a log of Ping Viewer")
     return reader(path)
 
 

@@ -42,7 +42,7 @@ def ping_viewer_beams(path: Path) -> FoundBeams:
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from None
     except NoLogError as error:
-        raise RecordingError(f"{path}: no log of Ping Viewer: {error}") from None
+        raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
     stream = MessageStream()
     beams, inconsistent = [], 0
     for time, found in _messages(log, stream):

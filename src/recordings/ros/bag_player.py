@@ -114,7 +114,7 @@ def read_messages(options: Namespace) -> List[Played]:
     except OSError as error:
         raise StartError(f"{options.bag}: {error.strerror or error}") from None
     except (rosbag.ROSBagException, EOFError, ValueError) as error:
-        raise StartError(f"{options.bag}: no bag, or a broken one: {error}") from None
+        raise StartError(f"{options.bag}: not a bag, or damaged: {error}") from None
     if not played:
         raise StartError(f"{options.bag}: no message on {' '.join(options.topics or ['any topic'])}")
     if options.ned:

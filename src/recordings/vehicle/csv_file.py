@@ -41,8 +41,8 @@ def motion_of_csv(path: Path, names: MotionNames) -> Motion:
     headings = [name for name in _HEADINGS if name in table]
     if "time" not in table or len(headings) != 1 or ("x" in table) != ("y" in table):
         raise RecordingError(
-            f"{path}: columns {', '.join(table) or 'unknown'}; needs time, one of {', '.join(_HEADINGS)}, and x and y "
-            "or none of both"
+            f"{path}: columns {', '.join(table) or 'unknown'}; needs time, one of {', '.join(_HEADINGS)}, and "
+            "both x and y or neither"
         )
     times = table["time"]
     zeros = np.zeros(len(times))
@@ -66,7 +66,7 @@ def _read(path: Path) -> Dict[str, np.ndarray]:
         with path.open(encoding="utf-8-sig", newline="") as file:
             rows = list(csv.reader(file, delimiter=_delimiter(file.readline(), file)))
     except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: no table: {error}") from None
+        raise RecordingError(f"{path}: not a table: {error}") from None
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from None
     names = [name.strip().lower() for name in rows[0]] if rows else []

@@ -42,7 +42,8 @@ class Beam:
             reach = f"{bins} bins of {self.range_resolution:g} m reach {bins * self.range_resolution:g} m"
             raise RefusedInput("beams refused", f"{reach}, must be at most {FARTHEST_RANGE:g} m; check the driver")
         if not (math.isfinite(self.angle) and math.isfinite(self.sensor_angle)):
-            raise RefusedInput("beams refused", f"head at {self.angle} rad, servo at {self.sensor_angle} rad")
+            angles = f"head at {self.angle} rad, servo at {self.sensor_angle} rad"
+            raise RefusedInput("beams refused", f"{angles}, must be finite")
         if not self.frame_id:
             raise RefusedInput("beams refused", "frame_id is empty; set the driver's frame")
 

@@ -35,7 +35,7 @@ class OutlierRemoverParameters(ParameterSet):
         1.0, "RADIUS: neighbourhood of a point", unit="m", low=0.001, high=1000.0, thesis_name="minRadius"
     )
     min_neighbors: int = parameter(
-        20, "RADIUS: a point with fewer neighbours goes", low=1, high=10000, thesis_name="minNeighbors"
+        20, "RADIUS: a point with fewer neighbours is removed", low=1, high=10000, thesis_name="minNeighbors"
     )
     kernel: Kernel = parameter(
         Kernel.NUMPY, "what runs the loops: NUMBA is two to five times faster and needs python3-numba", tunable=False

@@ -119,7 +119,7 @@ class TiltScan:
             self._go_on(time)
 
     def tick(self, time: float) -> None:
-        """Act on what has not happened in time; call it a few times a second."""
+        """Act on what has not happened by `time` [s]; call it a few times a second."""
         self._see_time(time)
         if time - self._joint_time > self.parameters.joint_timeout:
             self._miss_joint(time)

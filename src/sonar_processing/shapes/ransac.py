@@ -44,7 +44,7 @@ class RansacParameters(StampParameters):
         0.15, "echoes of fewer bins than this share of the usual echo's are noise", low=0.0, high=1.0
     )
     sonar_frame: str = parameter("sonar", "frame of the sonar, whose place tf knows", tunable=False)
-    seed: int = parameter(1, "of the random hypotheses: same seed and scan, same shapes", low=0, high=2**31 - 1)
+    seed: int = parameter(1, "seed of the random hypotheses: same seed and scan, same shapes", low=0, high=2**31 - 1)
 
 
 class Model(Protocol):

@@ -52,12 +52,12 @@ def test_an_unknown_parameter_is_named(tmp_path):
 
 def test_several_recordings_are_not_refined(tmp_path):
     done = run(BASIN, BASIN, "--out", tmp_path, "--refine")
-    assert (done.returncode, "--refine smooths one recording" in done.stderr) == (2, True)
+    assert (done.returncode, "--refine fits one recording" in done.stderr) == (2, True)
 
 
 def test_further_fits_need_the_first_one(tmp_path):
     done = run(BASIN, "--out", tmp_path, "--check")
-    assert (done.returncode, "--check repeats the smoothing of --refine" in done.stderr) == (2, True)
+    assert (done.returncode, "--check repeats the fit of --refine" in done.stderr) == (2, True)
 
 
 def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):

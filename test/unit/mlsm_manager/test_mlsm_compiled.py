@@ -8,8 +8,10 @@ from hypothesis import strategies as st
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
 
-compiled_loops = pytest.importorskip("mlsm_manager.surface_map.compiled_loops", reason="numba is not installed")
-compiled_index = pytest.importorskip("mlsm_manager.surface_map.compiled_index", reason="numba is not installed")
+MODULES = [
+    pytest.importorskip(f"mlsm_manager.surface_map.compiled_{name}", reason="numba is not installed")
+    for name in ("grouping", "merging", "index")
+]
 # One byte each for x, y, height and strength: hypothesis draws and shrinks them ten times as fast as floats.
 BATCHES = st.lists(st.binary(min_size=4, max_size=240), min_size=1, max_size=4)
 
@@ -104,7 +106,7 @@ def test_a_map_of_many_segments_makes_the_same_rows():
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_no_loop_is_compiled_after_the_map_was_made(dtype, writeable):
     _, surface_map = _maps(0.5)
-    loops = [loop for module in (compiled_loops, compiled_index) for loop in vars(module).values()]
+    loops = [loop for module in MODULES for loop in vars(module).values()]
     loops = [loop for loop in loops if hasattr(loop, "signatures")]
     compiled = [len(loop.signatures) for loop in loops]
     points = np.zeros((3, 4), dtype)

@@ -82,5 +82,5 @@ def test_a_bag_that_cannot_be_played_is_refused_in_one_line(bag, arguments, reas
 def test_a_file_that_is_no_bag_is_refused_in_one_line(tmp_path):
     path = tmp_path / "no.bag"
     path.write_text("no bag")
-    with pytest.raises(StartError, match="no bag, or a broken one"):
+    with pytest.raises(StartError, match="not a bag, or damaged"):
         _read(path)

@@ -116,7 +116,7 @@ def test_a_recording_that_was_cut_off_names_the_remedy(tmp_path):
 @pytest.mark.parametrize("name", ["empty.bag", "empty.mcap", "empty.db3"])
 def test_an_empty_file_is_refused(name, tmp_path):
     (tmp_path / name).write_bytes(b"")
-    with pytest.raises(RecordingError, match="no bag, or a broken one"):
+    with pytest.raises(RecordingError, match="not a bag, or damaged"):
         Bag(tmp_path / name)
 
 

@@ -66,16 +66,16 @@ class DistributionMatcherParameters(FixLimits):
 class SegmentsMatcherParameters(ParameterSet):
     """Parameters of the thesis's matcher."""
 
-    max_iterations: int = parameter(20, "segments: iterations at most", low=1, high=1000, thesis_name="maxIterations")
+    max_iterations: int = parameter(20, "SEGMENTS: iterations at most", low=1, high=1000, thesis_name="maxIterations")
     error_threshold: float = parameter(
-        0.3, "segments: greatest error of a match that is accepted", unit="m", low=0.0, high=100.0,
+        0.3, "SEGMENTS: greatest error of a match that is accepted", unit="m", low=0.0, high=100.0,
         thesis_name="errorThreshold",
     )  # fmt: skip
     n_samples: int = parameter(
-        5, "segments: places searched in the direction of movement", low=0, high=100, thesis_name="nSamples"
+        5, "SEGMENTS: places searched in the direction of movement", low=0, high=100, thesis_name="nSamples"
     )
     sample_step: float = parameter(
-        0.1, "segments: distance of these places, as a share of the estimated movement", low=0.0, high=10.0,
+        0.1, "SEGMENTS: distance of these places, as a share of the estimated movement", low=0.0, high=10.0,
         thesis_name="sampleStep",
     )  # fmt: skip
 

@@ -48,7 +48,7 @@ class OdometryErrors(ParameterSet):
     )
     direction_deviation: float = parameter(
         0.05,
-        "standard deviation of the error of their direction, as from a sensor's mounting angle",
+        "standard deviation of the error of the direction of the reported motion, as from a sensor's mounting angle",
         unit="rad",
         low=0.0,
         high=1.0,

@@ -49,7 +49,7 @@ def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -
 
 
 def color_limits(blocks: Blocks, by: ColorBy) -> Limits:
-    """Return the values between which nearly all of the blocks lie."""
+    """Return the values between which nearly all of the blocks lie; 0 and 0 without blocks, or for types."""
     if by is ColorBy.TYPE or not len(blocks):
         return 0.0, 0.0
     low, high = np.percentile(_values(blocks, by), _INNER_SHARE)

@@ -84,7 +84,7 @@ def _checked(data: bytes) -> Tuple[Dict[str, Any], memoryview]:
     except (ValueError, RecursionError):
         raise ArrayFileError("its header is not JSON") from None
     if not isinstance(header, dict):
-        raise ArrayFileError("its header holds no words")
+        raise ArrayFileError("its header is not an object of JSON")
     return header, content[_FIXED.size + length :]
 
 

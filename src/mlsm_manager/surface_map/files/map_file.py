@@ -173,7 +173,7 @@ def _blocks(columns: Mapping[str, np.ndarray], resolution: float, greatest_devia
     rows[:, SQUARES] = np.column_stack([deviations, columns["strength_deviation"]]) ** 2 * count[:, np.newaxis]
     rows[:, COUNT], rows[:, BOTTOM], rows[:, TOP] = count, bottom, top
     if not np.isfinite(rows).all() or (count < 1.0).any() or (bottom > top).any():
-        raise ValueError("blocks that no points make")
+        raise ValueError("blocks that are not finite, without points, or with bottom above top")
     return Blocks(rows, resolution, columns["crossed"])
 
 

@@ -40,10 +40,12 @@ class CarvingParameters(ParameterSet):
         0.19, "vertical angle of the inner part of the fan, in which a beam surely hears what is there", unit="rad",
         low=0.0, high=3.0, tunable=False,
     )  # fmt: skip
-    crossings_least: int = parameter(10, "so many beams in a row must cross a block before it goes", low=1, high=10000)
+    crossings_least: int = parameter(
+        10, "a block is removed once so many beams in a row have crossed it", low=1, high=10000
+    )
     crossings_per_point: float = parameter(
         2.0,
-        f"and so many more for each point that fell into it, up to {_MOST_POINTS}",
+        f"added to crossings_least for each point of the block, at most {_MOST_POINTS} points",
         low=0.0,
         high=1000.0,
         tunable=False,
