@@ -80,7 +80,6 @@ class Watch:
 
     def __init__(self) -> None:
         self.progress = 0.0
-        self.simulated_seconds = 0.0
         self.path: List[List[float]] = []
         self.stages: Dict[str, Dict[str, str]] = {}
         rospy.Subscriber("/sonar_simulator/progress", Float32, self._take_progress, queue_size=10)

@@ -185,9 +185,12 @@ def _skip_reason(element: ET.Element) -> str:
 
 def main(words: List[str], run: Callable[[Step], Outcome] = run_step) -> int:
     """Run the steps whose names contain one of `words` (all without words); return the exit status."""
+    chosen = [step for step in steps() if not words or any(word in step.name for word in words)]
+    if not chosen:
+        print(f"usage: scripts/test [NAME ...], parts of these names: {', '.join(step.name for step in steps())}")
+        return 2
     subprocess.run(["rm", "-rf", str(RESULTS)], check=True)
     RESULTS.mkdir(parents=True)
-    chosen = [step for step in steps() if not words or any(word in step.name for word in words)]
     outcomes = [run(step) for step in chosen if step.load is Load.WHOLE]
     with ThreadPoolExecutor(TOGETHER) as shared, ThreadPoolExecutor(TOGETHER) as spare:
         pools = {Load.SHARED: shared, Load.SPARE: spare}

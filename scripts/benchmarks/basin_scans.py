@@ -21,7 +21,6 @@ HALF_LENGTH, HALF_WIDTH = 60.0, 25.0
 WALLS = ((1.0, 0.0, HALF_LENGTH), (-1.0, 0.0, HALF_LENGTH), (0.0, 1.0, HALF_WIDTH), (0.0, -1.0, HALF_WIDTH))
 """Inner faces: normal x, normal y, distance from the basin's centre [m]."""
 BUOYS = ((42.0, 17.0), (-50.0, -16.0))
-BUOY_RADIUS = 0.5
 SONAR_DEPTH = 1.8
 
 

@@ -1,7 +1,4 @@
-"""Sends damaged messages of other packages' sonars through the adapters, the scans and the laser scan: none may crash.
-
-scripts/fuzz_beams [MESSAGES [SEED]]
-"""
+"""Sends damaged messages of other packages' sonars through adapters, scans and the laser scan: none may crash."""
 
 import argparse
 import math

@@ -13,7 +13,7 @@ PAGES_BY_NAME = {path.relative_to(ROOT).as_posix(): path for path in PAGES}
 CODE_BLOCK = re.compile(r"^(?: {4}[^\n]*|```.*?^```)$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
-MOST_README_LINES = 250
+MOST_README_LINES = 170
 
 
 def _paths_in(text):

@@ -33,7 +33,7 @@ from mlsm_manager.matching.problem.state import POSE
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
@@ -99,6 +99,13 @@ class JointMapper(ShowsMaps):
     def solver(self) -> Optional[LiveSolver]:
         """The solver of the current run; None where none runs."""
         return self._session.solver if self._session is not None else None
+
+    @property
+    def target(self) -> BlockSource:
+        """The map in which a lost vehicle is searched: without scans that lie apart, where it would find itself."""
+        if self._session is None or np.isinf(self._session.apart_from):
+            return super().target
+        return self._maps.matched.drawn_until(self._session.apart_from, self._session)
 
     @property
     def _shown_map(self) -> MultiLevelSurfaceMap:
@@ -173,8 +180,8 @@ class JointMapper(ShowsMaps):
         return self._solve(scan)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
-        """Begin a new run at a pose that was found elsewhere, in the map as it is."""
-        self._end_session()
+        """Begin a new run at a pose that was found elsewhere, in the map as it is, but without scans that lie apart."""
+        self._end_session(np.inf if self._session is None else self._session.apart_from)
         self._expected = None
         self._clouds.found(scan.start)
         self.correction = result.correction(scan)
@@ -256,8 +263,9 @@ class JointMapper(ShowsMaps):
         known = self._matched_map.blocks.mean[:, :2]
         return JointSession.begun(self.parameters, self._sonar_in_base, self.correction.copy(), self._start, known)
 
-    def _end_session(self) -> None:
+    def _end_session(self, until: float = np.inf) -> None:
+        """End the run; what it heard after `until` [s] is forgotten."""
         if self._session is not None:
-            self._maps.settle(self._session)
+            self._maps.settle(self._session, until)
         self._session = None
         self._start = None

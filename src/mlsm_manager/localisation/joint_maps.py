@@ -70,7 +70,7 @@ class JointMaps:
         self.matched.draw(session, session.settled_until)
         return session
 
-    def settle(self, session: JointSession) -> None:
-        """Draw all keyframes of a run for the last time."""
-        self.shown.settle(session)
-        self.matched.settle(session)
+    def settle(self, session: JointSession, until: float = np.inf) -> None:
+        """Draw all keyframes of a run that end by `until` [s] for the last time; those after it are forgotten."""
+        self.shown.settle(session, until)
+        self.matched.settle(session, until)

@@ -27,6 +27,10 @@ _AGREES = 0.5  # share of a scan's points on surfaces of others from which on it
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
 
+_MOST_APART = 200
+"""Scans whose place in the map is not known that may still be moved: an hour's, since drawing takes as long as there
+are many."""
+
 
 @dataclass
 class JointSession:
@@ -153,9 +157,17 @@ class JointSession:
 
     @property
     def settled_until(self) -> float:
-        """Time [s] of the oldest node that may still move."""
+        """Time [s] of the oldest node that may still move: scans that lie apart move when their place is found."""
         times = self.solver.log.node_times
-        return float(times[max(0, len(times) - 1 - self.solver.parameters.window.free_nodes)])
+        newest = len(times) - 1
+        still = times[max(0, newest - self.solver.parameters.window.free_nodes)]
+        return float(min(still, max(self.apart_from, times[max(0, newest - _MOST_APART)])))
+
+    @property
+    def apart_from(self) -> float:
+        """Time [s] from which on nobody knows how the scans lie to the map; infinity where it is known of all."""
+        islands = self.solver.islands
+        return float(self.solver.log.node_times[islands.start]) if islands.is_apart else np.inf
 
 
 def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:

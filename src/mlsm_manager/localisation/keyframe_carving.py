@@ -17,6 +17,7 @@ from mlsm_manager.surface_map.free_space.pairing import pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Overlay
 from mlsm_manager.surface_map.running_copy import RunningCopy, finished
+from node_support.kernels import Kernel
 
 _STRAYED = 0.5
 """Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
@@ -39,13 +40,15 @@ class KeyframeCarving:
     Keyframes that are settled carve for ever, in the order of time. What the others say is kept beside the map.
     """
 
-    def __init__(self, resolution: float, limit: float, carver: Optional[Carver], most_followed: int) -> None:
+    def __init__(
+        self, resolution: float, limit: float, carver: Optional[Carver], most_followed: int, kernel: Kernel
+    ) -> None:
         """`carver`: None where nothing is to be carved. most_followed: keyframes that may still move and whose beams
-        are followed with each scan; with 0 only those that settle carve.
+        are followed with each scan; with 0 only those that settle carve. kernel: see MultiLevelSurfaceMap.
         """
         self._carver = carver
         self._most_followed = most_followed
-        self._free = MultiLevelSurfaceMap(resolution, limit)
+        self._free = MultiLevelSurfaceMap(resolution, limit, kernel=kernel)
         self._looks: Deque[Optional[_Look]] = deque()
         self._hit_cells, self._hit_by = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
@@ -84,6 +87,11 @@ class KeyframeCarving:
         """Forget what the oldest keyframe said, because it is settled."""
         if self._looks:
             self._looks.popleft()
+
+    def keep_oldest(self, count: int) -> None:
+        """Forget what keyframes said after the oldest `count`."""
+        while len(self._looks) > count:
+            self._looks.pop()
 
     def look(
         self,

@@ -45,7 +45,7 @@ class KeyframeMap:
         The rest as MultiLevelSurfaceMap.
         """
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
-        self._free = KeyframeCarving(resolution, limit, carver, most_followed)
+        self._free = KeyframeCarving(resolution, limit, carver, most_followed, kernel)
         self._kernel = kernel
         self._moving: Deque[TimedPoints] = deque()
         self._overlay = Overlay(self._map)
@@ -125,10 +125,24 @@ class KeyframeMap:
         self._left_out += 1
         return Drawn(self._map.admitted(placement.points(self._moving[-1])).report, drawn.carved)
 
-    def settle(self, placement: Placement) -> None:
-        """Draw all keyframes for the last time."""
-        if self._moving:
-            self.draw(placement, np.inf)
+    def settle(self, placement: Placement, until: float = np.inf) -> None:
+        """Draw all keyframes that end by `until` [s] for the last time, and forget those after it."""
+        self._overlay.take_off()
+        while self._moving and self._moving[-1].end > until:
+            self._moving.pop()
+        self._free.keep_oldest(len(self._moving))
+        self.draw(placement, np.inf)
+
+    def drawn_until(self, time: float, placement: Placement) -> MultiLevelSurfaceMap:
+        """Return a map of its own without the keyframes that end after `time` [s]."""
+        self._overlay.take_off()
+        self._due = placement if self._moving else None
+        copy = self._new()
+        copy.insert_blocks(self._map.blocks)
+        for cloud in self._moving:
+            if cloud.end <= time:
+                copy.insert(placement.points(cloud))
+        return copy
 
     def _settled(self, cloud: TimedPoints, placement: Placement, before: Optional[CarveReport]) -> Drawn:
         """Draw the oldest keyframe for ever; `before`: what older ones carved."""

@@ -45,6 +45,19 @@ class BatchResult:
 
 
 @dataclass(frozen=True)
+class PartResult:
+    """What a part of a run says of sonar and odometry. node: (width,) the newest one's unknowns. run: (2,).
+
+    covariance: (width + 2, width + 2) of both. steps: how many were taken.
+    """
+
+    node: np.ndarray
+    run: np.ndarray
+    covariance: np.ndarray
+    steps: int
+
+
+@dataclass(frozen=True)
 class Closed:
     """batch: the fit that the run speaks for. loops: places visited again that it goes back to; none where it does not.
 
@@ -92,14 +105,23 @@ def solved(
     """
     parameters, start = parameters or live.parameters, start or live.state
     problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy())
-    window = parameters.window
-    steps, converged = 0, False
-    while steps < window.batch_iterations and not converged:
-        converged = problem.step() < window.tolerance or problem.step_deviations < window.settled
-        steps += 1
+    steps, converged = problem.converge()
     poses, run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(live, problem.state))
     return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
+
+
+def solved_part(live: LiveSolver, first: int) -> PartResult:
+    """Return the fit of the scan `first` of `live` and all later ones alone, as if the run had begun with it.
+
+    What `live` found is where the fit begins, but no belief of it.
+    """
+    state = State(live.state.nodes[first:].copy(), live.state.run.copy())
+    state.nodes[:, :2] -= state.nodes[0, :2]
+    islands = Islands(live.islands.numbers[first:])
+    problem = _Batch(live.log.since(first), islands, live.odometry, live.parameters, state)
+    steps, _ = problem.converge()
+    return PartResult(state.nodes[-1].copy(), state.run.copy(), problem.newest_covariance(), steps)
 
 
 def _misfit(live: LiveSolver, state: State) -> np.ndarray:
@@ -130,6 +152,14 @@ class _Batch:
         self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
         self._lone = LoneComparisons(log, odometry, parameters.matching, scans, np.ones(len(scans)))
+
+    def converge(self) -> Tuple[int, bool]:
+        """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
+        window = self._parameters.window
+        for taken in range(1, window.batch_iterations + 1):
+            if self.step() < window.tolerance or self.step_deviations < window.settled:
+                return taken, True
+        return window.batch_iterations, False
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
@@ -187,6 +217,11 @@ class _Batch:
         places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
         by_scale = scale_covariance(places, self._parameters.sonar.world_scale_deviation)
         return np.concatenate(poses) + by_scale, self._columns_of_inverse(run)[run]
+
+    def newest_covariance(self) -> np.ndarray:
+        """Return that of the newest node's and the run's unknowns (width + 2, width + 2)."""
+        columns = np.arange(self._layout.node_start(self._layout.last), self._layout.size)
+        return self._columns_of_inverse(columns)[columns]
 
     def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
         columns = self._layout.pose_columns(nodes)

@@ -58,6 +58,12 @@ class KnownSurfaces:
         self._low, self._high = first * _SQUARE + LEAST_REACH, (last + 1) * _SQUARE - LEAST_REACH
         self._look_at(np.concatenate(parts))
 
+    def around(self, low: np.ndarray, high: np.ndarray) -> PlacedPoints:
+        """Return the blocks from `low` to `high`, (2,) m each, whose surfaces are known."""
+        self._reach(np.stack([low, high]), 0.0)
+        points = self._points
+        return points.selected(((points.places >= low) & (points.places <= high)).all(axis=1))
+
     def compared(self, sources: PlacedPoints, cut: float, matching: SurfaceMatching) -> tuple:
         """Return m Pairs of `sources` with their nearest blocks within `cut` [m], and these as m PlacedPoints.
 

@@ -216,7 +216,9 @@ class LiveSolver:
         covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         matching = self.parameters.matching
         if silent:
-            self.search = whereabouts(self.log, self.odometry, self.state, self.islands, covariance, silent, matching)
+            self.search = whereabouts(
+                self.log, self.odometry, self.state, self.islands, covariance, silent, matching, self._known
+            )
         if self.search is not None and self.search.is_certain and not self.islands.is_apart:
             self._move(self.search.moves)
         elif self.search is not None and self.search.reach > matching.wide_cut:
@@ -242,7 +244,7 @@ class LiveSolver:
     def _join(self, estimate: LiveEstimate) -> bool:
         """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""
         covariance, matching = estimate.covariance[:2, :2], self.parameters.matching
-        self.search = island_place(self.log, self.odometry, self.state, self.islands, covariance, matching)
+        self.search = island_place(self.log, self.odometry, self.state, self.islands, covariance, matching, self._known)
         if self.search.is_certain:
             self._move(self.search.moves)
             self.islands.join()

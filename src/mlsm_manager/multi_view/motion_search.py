@@ -7,7 +7,7 @@ from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints, place, place_lone
 from mlsm_manager.multi_view.run_log import RunLog
-from mlsm_manager.multi_view.state import State
+from mlsm_manager.multi_view.state import BEFORE_THE_RUN, State
 from mlsm_manager.multi_view.transition import Transition
 
 _REACH = 3.0  # standard deviations of the step within which is searched
@@ -102,10 +102,14 @@ def cells(covariance: np.ndarray, most: int) -> np.ndarray:
 
 
 def fits(sources: PlacedPoints, targets: PlacedPoints, moved: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
-    """Return how many points (k,) lie on surfaces when they are `moved` to places (k, n, 2); nearly counts in part."""
+    """Return how many points (k,) lie on surfaces when they are `moved` to places (k, n, 2); nearly counts in part.
+
+    Surfaces from before the run do not say from which side they were heard.
+    """
     distance, index = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=matching.cut)
     found = np.isfinite(distance)
     index = np.where(found, index, 0).reshape(moved.shape[:2])
     cosine = np.einsum("na,kna->kn", sources.normals, targets.normals[index])
+    cosine = np.where((targets.scans == BEFORE_THE_RUN)[index], np.abs(cosine), cosine)
     near = np.exp(-0.5 * np.where(found, distance / _CELL, np.inf) ** 2).reshape(cosine.shape)
     return (near * sources.qualities * (cosine > matching.min_cosine)).sum(axis=1)

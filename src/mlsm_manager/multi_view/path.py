@@ -1,16 +1,15 @@
 """The vehicle's path at any time: as it was known then, or as it is known from the whole run."""
 
-from typing import Sequence, Tuple
+from typing import Tuple
 
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.odometry_model import OdometryModel
 from mlsm_manager.multi_view.odometry_motion import Motion, as_complex, product
 from mlsm_manager.multi_view.odometry_terms import turned
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
-from mlsm_manager.multi_view.state import POSE, YAW
+from mlsm_manager.multi_view.state import YAW
 
 
 class NodePath:
@@ -79,24 +78,6 @@ class NodePath:
         bow = product(product(self._gain[legs], turned(yaw)), bow)
         place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1] + bow
         return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw]), bow
-
-
-def live_path(
-    track: Track, estimates: Sequence[LiveEstimate], odometry: OdometryModel, latency: float, times: np.ndarray
-) -> np.ndarray:
-    """Return T_map_base (m, 3) at `times` (m,) as it was known at each: the newest estimate, continued by odometry.
-
-    An estimate is known `latency` seconds after its scan; before the first one the odometry is all there is.
-    """
-    motion = OdometryTimeline.of(track).motion(times)
-    if not estimates:
-        return motion.poses
-    known_from = np.array([estimate.time for estimate in estimates]) + latency
-    newest = np.searchsorted(known_from, times, side="right") - 1
-    nodes = np.array([estimate.node for estimate in estimates])[newest]
-    before = OdometryTimeline.of(track).motion(np.array([estimate.time for estimate in estimates])[newest])
-    continued = motion.poses + odometry.advanced(nodes, before, motion)[:, POSE]
-    return np.where((newest >= 0)[:, np.newaxis], continued, motion.poses)
 
 
 def solved_path(

@@ -10,6 +10,7 @@ from typing import List, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.multi_view.islands import MAP, Islands
+from mlsm_manager.multi_view.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.motion_search import cells, fits
 from mlsm_manager.multi_view.motion_since import MotionSince, grid
 from mlsm_manager.multi_view.odometry_model import OdometryModel
@@ -78,11 +79,12 @@ def whereabouts(
     covariance: np.ndarray,
     silent: int,
     matching: SurfaceMatching,
+    known: Optional[KnownSurfaces] = None,
 ) -> Optional[Whereabouts]:
     """Return where the newest scan was taken, after `silent` scans before it that heard nothing.
 
-    covariance: (width, width) of the node before these. None where the motion since is known well enough, or the scan
-    hears too little itself.
+    covariance: (width, width) of the node before these. known: what was in the map before the run. None where the
+    motion since is known well enough, or the scan hears too little itself.
     """
     last = log.scan_count
     motion = MotionSince(log, odometry, state, covariance, silent)
@@ -90,7 +92,7 @@ def whereabouts(
     if motion.reach * _KNOWN < matching.cut or len(own) < FEWEST_POINTS:
         return None
     sources = place(log, odometry, state, own[:: max(1, len(own) // _FINE_POINTS)])
-    targets = _map_around(log, odometry, state, islands, sources, _REACH * motion.reach + matching.cut)
+    targets = _map_around(log, odometry, state, islands, sources, _REACH * motion.reach + matching.cut, known)
     if not len(targets):
         return Whereabouts(np.zeros((0, odometry.width)), 0.0, 0.0, 0.0, motion.reach)
     shifts = cells(motion.of_end, _MOST_CELLS)
@@ -110,16 +112,18 @@ def island_place(
     islands: Islands,
     covariance: np.ndarray,
     matching: SurfaceMatching,
+    known: Optional[KnownSurfaces] = None,
 ) -> Whereabouts:
     """Return where the newest scans, which lie apart from the map, are in it; covariance: (2, 2) m^2 of the place.
 
-    They are moved together, with the nodes of the silence before them in part.
+    They are moved together, with the nodes of the silence before them in part. known: what was in the map before the
+    run.
     """
     last, first = log.scan_count, islands.start
     reach = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     rows = log.rows(max(first, last - _ISLAND_SCANS), last)
     sources = place(log, odometry, state, rows[:: max(1, len(rows) // _ISLAND_POINTS)])
-    targets = _map_around(log, odometry, state, islands, sources, _REACH * reach + matching.cut)
+    targets = _map_around(log, odometry, state, islands, sources, _REACH * reach + matching.cut, known)
     if not len(sources) or not len(targets):
         return Whereabouts(np.zeros((0, odometry.width)), 0.0, 0.0, 0.0, reach)
     shifts = cells(covariance, _MOST_CELLS)
@@ -152,8 +156,9 @@ def _island_moves(log: RunLog, first: int, shift: np.ndarray, width: int) -> np.
 
 
 def _map_around(
-    log: RunLog, odometry: OdometryModel, state: State, islands: Islands, sources: PlacedPoints, reach: float
-) -> PlacedPoints:
+    log: RunLog, odometry: OdometryModel, state: State, islands: Islands, sources: PlacedPoints, reach: float,
+    known: Optional[KnownSurfaces],
+) -> PlacedPoints:  # fmt: skip
     """Return the points of the map that `sources` can meet if they are moved by up to `reach` [m]."""
     if not len(sources):
         return sources
@@ -161,7 +166,8 @@ def _map_around(
     rows = [log.rows(scan, scan + 1) for scan in scans if scan != sources.scans[-1]]
     targets = place(log, odometry, state, np.concatenate([np.empty(0, dtype=np.int64), *rows]))
     low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
-    return targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
+    targets = targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
+    return targets if known is None else targets.joined_with(known.around(low, high))
 
 
 def _moved(sources: PlacedPoints, ends: np.ndarray) -> np.ndarray:

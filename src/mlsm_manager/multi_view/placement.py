@@ -47,6 +47,11 @@ class PlacedPoints:
         """Return the points in `rows`: indices, (n,) bool, or a slice, which copies nothing."""
         return PlacedPoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
+    def joined_with(self, others: "PlacedPoints") -> "PlacedPoints":
+        """Return these points and then the others."""
+        names = [field.name for field in fields(self)]
+        return PlacedPoints(*(np.concatenate([getattr(self, name), getattr(others, name)]) for name in names))
+
 
 Placing = Callable[[RunLog, OdometryModel, State, SurfacePoints, np.ndarray], PlacedPoints]
 """Takes the log, the odometry, the state, points and the scans (n,) that heard them."""

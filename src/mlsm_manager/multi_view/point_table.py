@@ -35,6 +35,13 @@ class PointTable:
         self._scans.extend(np.full(len(points), self.scan_count))
         self._starts.append(self._starts[-1] + len(points))
 
+    def since(self, scan: int) -> "PointTable":
+        """Return a table of `scan` and all later ones, the first of which is number 0 there."""
+        later = PointTable()
+        for number in range(scan, self.scan_count):
+            later.append(self.points(self.rows(number, number + 1)))
+        return later
+
     def remove_newest(self) -> None:
         """Take back the last `append`."""
         self._starts.pop()

@@ -71,6 +71,14 @@ class RunLog:
         # Without scans no node is known: the next scan begins the run.
         self._node_times.shorten(self.scan_count + 1 if self.scan_count else 0)
 
+    def since(self, scan: int) -> "RunLog":
+        """Return a log of `scan` and all later ones, the first of which is number 0 there. It shares the odometry."""
+        later = RunLog(self.sonar_in_base)
+        later.odometry = self.odometry
+        later._node_times.extend(self.node_times[scan:])
+        later._surfaces, later.lone = self._surfaces.since(scan), self.lone.since(scan)
+        return later
+
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
         return self._surfaces.rows(first, last)

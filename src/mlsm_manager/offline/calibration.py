@@ -5,12 +5,12 @@ from typing import Any, Dict, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.batch_solver import BatchResult
+from mlsm_manager.multi_view.batch_solver import BatchResult, PartResult
 from mlsm_manager.multi_view.estimate import LiveEstimate
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_model import HELD_DEVIATION
 from mlsm_manager.multi_view.priors import run_deviations, run_mean
-from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE
+from mlsm_manager.multi_view.state import DELAY, RANGE_SCALE, RUN_COLUMNS
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.parameters import describe
 from sonar_processing.beams.beam_correction import BeamCorrection
@@ -61,6 +61,14 @@ class Calibration:
         deviations = _of_run(np.sqrt(np.diag(batch.run_covariance)), solver)
         values = np.append(batch.state.run[of_run], batch.state.nodes[-1, list(solver.odometry.calibrated.values())])
         return cls(live.names, values, np.append(deviations, live.deviations[len(of_run) :]))
+
+    @classmethod
+    def of_part(cls, solver: LiveSolver, part: PartResult) -> "Calibration":
+        """Return what the fit of a part of a run found; scale and direction are those of the last node."""
+        columns, of_run = solver.odometry.calibrated, list(_OF_RUN.values())
+        deviations, of_node = np.sqrt(np.diag(part.covariance)), list(columns.values())
+        known = np.append(_of_run(deviations[-RUN_COLUMNS:], solver), deviations[of_node])
+        return cls((*_OF_RUN, *columns), np.append(part.run[of_run], part.node[of_node]), known)
 
     @property
     def by_name(self) -> Dict[str, Tuple[float, float]]:

@@ -4,16 +4,15 @@ import argparse
 from pathlib import Path
 from typing import Any, Dict, List
 
-import yaml
-
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.command_line import CommandLine
+from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import ParameterError
-from recordings.reading.arguments import add_reading_arguments, request_of, set_values
+from recordings.reading.arguments import add_reading_arguments, request_of
 from recordings.reading.parameters import ReadingParameters
 from recordings.vehicle.motion import MotionSource
 
@@ -27,7 +26,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     options = parser.parse_args(arguments)
     _check(parser, options)
     _check_motion(parser, options)
-    values = _values(parser, options)
+    values = _values(options)
     options.fixed = frozenset(values)
     if options.odometry is not None:
         options.odometry = OdometryKind(options.odometry.upper())
@@ -50,7 +49,7 @@ def _parser() -> CommandLine:
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
     )
-    parser.add_argument("--out", type=Path, help="folder to write to; created if missing")
+    parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to; created if missing")
     parser.add_argument("--inspect", action="store_true", help="say what a bag holds, and write nothing")
     parser.add_argument(
         "--matcher", choices=[name.value for name in MatcherName], help="match scan by scan, with this matcher"
@@ -71,7 +70,9 @@ def _parser() -> CommandLine:
         "--odometry", choices=[kind.value.lower() for kind in OdometryKind],
         help="what the vehicle knows of its motion; default: as the recording looks",
     )  # fmt: skip
-    parser.add_argument("--parameters", type=Path, help="yaml file, such as a live.yaml; --set overrides it")
+    parser.add_argument(
+        "--parameters", type=Path, metavar="FILE", help="yaml file, such as a live.yaml; --set overrides it"
+    )
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
     return parser
@@ -89,10 +90,10 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
         parser.error("--vehicle belongs to one recording, not to several")
 
 
-def _values(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Dict[str, Any]:
+def _values(options: argparse.Namespace) -> Dict[str, Any]:
     """Return the parameters that were set, by their keys."""
-    values = _from_file(options.parameters) if options.parameters else {}
-    values.update(set_values(parser, options.set))
+    values = replay_values(read_values(options.parameters)) if options.parameters else {}
+    values.update(assigned_values(options.set))
     if options.matcher:
         values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
     if not options.calibrate:
@@ -104,19 +105,8 @@ def _check_motion(parser: argparse.ArgumentParser, options: argparse.Namespace) 
     """Refuse what is said of the motion where it contradicts itself; nothing known means odometry none."""
     none, declared = OdometryKind.NONE.value.lower(), options.declared
     if declared is MotionSource.STANDING and options.odometry == none:
-        parser.error(f"--standing says that the vehicle did not move; --odometry {none} of one that moved is now "
-                     "--unknown-motion")  # fmt: skip
+        parser.error("--standing says that the vehicle did not move; of one that moved give --unknown-motion instead")
     if declared is MotionSource.UNKNOWN:
         if options.odometry not in (None, none):
             parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")
         options.odometry = none
-
-
-def _from_file(path: Path) -> Dict[str, Any]:
-    try:
-        values = yaml.safe_load(path.read_text())
-    except (OSError, UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ParameterError(f"{path}: {getattr(error, 'strerror', None) or 'no yaml'}") from None
-    if not isinstance(values, dict):
-        raise ParameterError(f"{path}: must hold lines of KEY: VALUE")
-    return replay_values(values)

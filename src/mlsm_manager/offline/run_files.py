@@ -88,8 +88,9 @@ def trajectory_csv(times: np.ndarray, poses: Mapping[str, np.ndarray]) -> str:
     for path in poses.values():
         columns += [path[:, :2], wrapped(path[:, 2:])]
     rows = np.concatenate(columns, axis=1)
-    lines = [",".join([f"{row[0]:.6f}", *(f"{value:.4f}" for value in row[1:])]) for row in rows]
-    return "\n".join([",".join(header), *lines]) + "\n"
+    line = ",".join(["%.6f"] + ["%.4f"] * (rows.shape[1] - 1)) + "\n"
+    # All lines at once: that takes half the time of one after the other.
+    return ",".join(header) + "\n" + line * len(rows) % tuple(rows.ravel().tolist())
 
 
 def _doubts(run: Run) -> Optional[Doubts]:

@@ -5,11 +5,10 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.multi_view.batch_solver import solved_part
 from mlsm_manager.multi_view.continuity import shares_heard_before
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_model import OdometryModel
-from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.state import State
 from mlsm_manager.multi_view.turns import Turns
 from mlsm_manager.offline.calibration import Calibration
@@ -104,7 +103,7 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
     found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
     before = Calibration.expected(solver)
     verdicts.append(as_expected(before.names, before.values, before.deviations, found.values))
-    halves = _halves(replayed.scans, solver)
+    halves = _halves(solver)
     verdicts += [] if halves is None else [halves]
     return Trust([*verdicts, *further], deviations)
 
@@ -136,21 +135,15 @@ def _batch_deviations(refined: Refined) -> Deviations:
     return Deviations(refined.batch.node_times, refined.batch.pose_covariances[:, :2, :2])
 
 
-def _halves(scans: List[Scan], solver: LiveSolver) -> Optional[Verdict]:
+def _halves(solver: LiveSolver) -> Optional[Verdict]:
     """Compare the calibration of each half of the run, made without the other one.
 
-    What was known after the first half came from that half alone; the second is solved anew.
+    What was known after the first half came from that half alone; the second is fitted anew.
     """
-    middle = len(scans) // 2
+    parts = solver.parameters.matching.scan_parts
+    middle = solver.log.scan_count // parts // 2
     if middle < _FEWEST_SCANS:
         return None
-    first = Calibration.of_estimate(solver, solver.estimates[middle * solver.parameters.matching.scan_parts - 1])
-    second = _calibrated(scans[middle:], solver.parameters, solver.log.sonar_in_base)
+    first = Calibration.of_estimate(solver, solver.estimates[middle * parts - 1])
+    second = Calibration.of_part(solver, solved_part(solver, middle * parts))
     return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
-
-
-def _calibrated(scans: List[Scan], parameters: MultiViewParameters, sonar_in_base: np.ndarray) -> Calibration:
-    solver = LiveSolver(parameters, sonar_in_base)
-    for scan in scans:
-        solver.add(scan)
-    return Calibration.of_live(solver)

@@ -22,5 +22,6 @@ def tum_files(times: np.ndarray, poses: Mapping[str, np.ndarray], truth: Optiona
 def tum_text(times: np.ndarray, poses: np.ndarray) -> str:
     """Return one line for each pose (m, 3), x y [m] and yaw [rad]: time, x y z, quaternion x y z w."""
     half = poses[:, 2] / 2.0
-    rows = zip(times, poses[:, 0], poses[:, 1], np.sin(half), np.cos(half))
-    return "".join(f"{time:.9f} {x:.6f} {y:.6f} 0 0 0 {sine:.9f} {cosine:.9f}\n" for time, x, y, sine, cosine in rows)
+    rows = np.column_stack([times, poses[:, :2], np.sin(half), np.cos(half)])
+    # All lines at once: that takes half the time of one after the other.
+    return "%.9f %.6f %.6f 0 0 0 %.9f %.9f\n" * len(rows) % tuple(rows.ravel().tolist())

@@ -22,13 +22,16 @@ _LOW, _LAST_PLACE = np.int64(0xFFFFFFFF), np.uint64(_PLACES - 1)
 
 
 class CompiledCellIndex(CellIndex):
-    """A CellIndex whose `slots` are found in one pass over the keys, unless segments must be split first."""
+    """A CellIndex that looks for each key in one pass over the keys, unless segments must be split first."""
 
     def slots(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int64 places in `heads`; see CellIndex."""
         if not _has_room(keys, self._directory, self._bits, self._used):
             self._make_room(keys)
         return _placed(keys, self._directory, self._bits, self._keys.values, self._used)
+
+    def _found(self, keys: np.ndarray) -> np.ndarray:
+        return _found(np.ascontiguousarray(keys), self._directory, self._bits, self._keys.values)
 
 
 @njit(cache=True)
@@ -51,6 +54,19 @@ def _has_room(keys, directory, bits, used):
         if used[segment] + more[segment] > load * _PLACES:
             return False
     return True
+
+
+@njit(cache=True)
+def _found(keys, directory, bits, held_keys):
+    """Return (n,) the places of `keys` (n,), -1 of those that are not there."""
+    places = np.empty(len(keys), np.int64)
+    for number in range(len(keys)):
+        key = keys[number]
+        place = _first_place(key, directory, bits)
+        while held_keys[place] != key and held_keys[place] != EMPTY:
+            place = (place & ~(_PLACES - 1)) | ((place + 1) & (_PLACES - 1))
+        places[number] = place if held_keys[place] == key else -1
+    return places
 
 
 @njit(cache=True)

@@ -39,3 +39,4 @@ def compile_loops() -> None:
             points = np.zeros((2, 4), dtype)
             points.flags.writeable = writeable
             insert_points_compiled(store, points, 1.0, 1.0)
+    store.find(np.zeros(1, dtype=np.int64))

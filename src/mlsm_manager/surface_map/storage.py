@@ -26,13 +26,6 @@ _HEADER = re.compile(
 _ROUNDING = 1e-6
 
 
-def map_path(folder: str, name: str) -> Path:
-    """Return where the map `name` is kept in `folder`; raises ValueError for a name that would leave the folder."""
-    if not name or name.startswith(".") or Path(name).name != name or "\0" in name:
-        raise ValueError(f"name {name!r}: must be a plain file name without a path and not start with a dot")
-    return Path(folder).expanduser() / (name if name.endswith(".ply") else f"{name}.ply")
-
-
 def write_ply(path: Path, blocks: Blocks) -> None:
     """Write the blocks whole or not at all; raises OSError when the folder cannot be written."""
     write_whole(path, _header(blocks).encode("ascii") + _vertices(blocks).tobytes())

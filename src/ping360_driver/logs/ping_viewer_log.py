@@ -8,12 +8,10 @@ Ping Viewer was started; older versions wrote the time of day.
 import re
 import struct
 from dataclasses import dataclass
-from typing import IO, Iterator, List, Optional, Tuple
+from typing import Iterator, Optional, Tuple
 
 TITLE = "PingViewer sensor log file"
 
-_VERSION = 1
-_PING360 = (1, 2)  # Family and type of the sensor, as Ping Viewer counts them
 _BUILD_TEXTS = 5  # Commit, date, release, name and version of the operating system
 _NULL_TEXT = 0xFFFFFFFF
 _LONGEST_PART = 10240  # Bytes, the buffer of Ping Viewer's parser
@@ -84,23 +82,6 @@ class PingViewerLog:
         return None, following.start() if following else len(self._data)
 
 
-class PingViewerLogWriter:
-    """Writes a log of a Ping360 as Ping Viewer does."""
-
-    def __init__(self, file: IO[bytes]) -> None:
-        self._file = file
-        header: List[bytes] = [_packed_text(TITLE), struct.pack(">i", _VERSION)]
-        header += [_packed_text("")] * _BUILD_TEXTS
-        self._file.write(b"".join(header) + struct.pack(">ii", *_PING360))
-
-    def write(self, time: float, data: bytes) -> None:
-        """Append what came at `time`, s since the start."""
-        milliseconds = round(time * 1e3)
-        minutes, rest = divmod(milliseconds, 60_000)
-        text = f"{minutes // 60 % 24:02d}:{minutes % 60:02d}:{rest // 1000:02d}.{rest % 1000:03d}"
-        self._file.write(_packed_text(text) + struct.pack(">I", len(data)) + data)
-
-
 def _seconds(text: str) -> Optional[float]:
     found = _TIME.fullmatch(text)
     if found is None:
@@ -120,8 +101,3 @@ def _text(data: bytes, position: int) -> Tuple[str, int]:
         return "", position + 4
     (raw,) = struct.unpack_from(f">{min(length, len(data))}s", data, position + 4)
     return raw.decode("utf-16-be"), position + 4 + length
-
-
-def _packed_text(text: str) -> bytes:
-    raw = text.encode("utf-16-be")
-    return struct.pack(">I", len(raw)) + raw

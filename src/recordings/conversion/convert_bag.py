@@ -6,10 +6,11 @@ from pathlib import Path
 from typing import List
 
 from node_support.command_line import CommandLine
+from node_support.parameter_files import assigned_values
 from node_support.parameters import ParameterError
 from recordings.conversion.converted_bag import write_converted
 from recordings.errors import RecordingError
-from recordings.reading.arguments import add_reading_arguments, request_of, set_values
+from recordings.reading.arguments import add_reading_arguments, request_of
 from recordings.reading.parameters import ReadingParameters
 from recordings.reading.reader import read
 
@@ -33,7 +34,7 @@ def convert_bag(arguments: List[str]) -> str:
     """
     parser = _parser()
     options = parser.parse_args(arguments)
-    parameters = ReadingParameters.from_mapping(set_values(parser, options.set))
+    parameters = ReadingParameters.from_mapping(assigned_values(options.set))
     request = request_of(options, parameters)
     held = read(options.recording, request)
     for note in held.notes:

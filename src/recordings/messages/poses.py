@@ -10,7 +10,6 @@ from recordings.transforms.pose_track import PoseTrack
 from sonar_processing.messages.fields import stamp_ns
 
 _MOVING, _FIXED = "/tf", "/tf_static"
-TRANSFORM_TOPICS = (_MOVING, _FIXED)
 
 _Sample = Tuple[int, Tuple[float, float, float], Tuple[float, float, float, float]]
 

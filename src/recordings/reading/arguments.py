@@ -2,9 +2,6 @@
 
 import argparse
 from pathlib import Path
-from typing import Any, Dict, Sequence, Tuple
-
-import yaml
 
 from recordings.reading.parameters import ReadingParameters
 from recordings.reading.reader import Request
@@ -46,18 +43,3 @@ def request_of(options: argparse.Namespace, parameters: ReadingParameters) -> Re
     """Return what the arguments ask for."""
     motion = MotionNames(options.odom_frame, options.base_frame, options.odometry_topic, options.declared, options.ned)
     return Request(options.beams, options.truth, motion, options.vehicle, options.offset, parameters)
-
-
-def set_values(parser: argparse.ArgumentParser, texts: Sequence[str]) -> Dict[str, Any]:
-    """Return the parameters of KEY=VALUE texts, values in yaml; exits on a text without =."""
-    return dict(_pair(text, parser) for text in texts)
-
-
-def _pair(text: str, parser: argparse.ArgumentParser) -> Tuple[str, Any]:
-    key, separator, value = text.partition("=")
-    if not (key and separator):
-        parser.error(f"--set {text}: must be KEY=VALUE")
-    try:
-        return key, yaml.safe_load(value)
-    except yaml.YAMLError:
-        return key, value

@@ -7,21 +7,14 @@ import numpy as np
 from sonar_processing.beams.beam import Beam
 
 
-def project_beam(beam: Beam, T_target_sonar: np.ndarray, dispersed_points: int, beam_width: float) -> np.ndarray:
-    """Return (dispersed_points * bins, 4) float32: x y z [m] in the target frame and echo strength.
-
-    Every bin is drawn as `dispersed_points` points side by side across the horizontal `beam_width` [rad]; one point
-    lies on the beam's axis. Points come ordered by side, then by range. T_target_sonar is (4, 4).
-    """
-    return project_beams([beam], T_target_sonar[np.newaxis], dispersed_points, beam_width)[0]
-
-
 def project_beams(
     beams: Sequence[Beam], T_target_sonar: np.ndarray, dispersed_points: int, beam_width: float
 ) -> np.ndarray:
-    """Return (n, dispersed_points * bins, 4) float32: each beam as `project_beam` does, all of them at once.
+    """Return (n, dispersed_points * bins, 4) float32: x y z [m] in the target frame and echo strength, of n beams.
 
-    The n beams have the same ranges; T_target_sonar is (n, 4, 4).
+    Every bin is drawn as `dispersed_points` points side by side across the horizontal `beam_width` [rad]; one point
+    lies on the beam's axis. The points of a beam come ordered by side, then by range. The beams have the same ranges;
+    T_target_sonar is (n, 4, 4).
     """
     headings = bin_headings(beams, dispersed_points, beam_width)
     poses, strengths = (

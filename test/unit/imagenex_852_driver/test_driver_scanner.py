@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from driver_line import Run, served
+from driver_line import scanning, served
 from fault_experiment import run
 from virtual_line import VirtualLine, VirtualStopAt, VirtualTime
 
@@ -28,13 +28,13 @@ def virtual_scanner(stop, faults, on_ping):
 
 
 def test_pings_are_delivered_one_after_the_other(tmp_path):
-    with served(tmp_path) as (_, connection), Run(connection) as scan:
+    with served(tmp_path) as (_, connection), scanning(connection) as scan:
         assert scan.wait_for_more(5)
     assert positions(scan.pings)[:5] == [1400, 1420, 1440, 1460, 1480]
 
 
 def test_new_settings_take_effect_at_the_next_ping(tmp_path):
-    with served(tmp_path) as (_, connection), Run(connection) as scan:
+    with served(tmp_path) as (_, connection), scanning(connection) as scan:
         assert scan.wait_for_more(2)
         scan.scanner.command = HeadSettings(max_range=20, direction=Direction.COUNTERCLOCKWISE).command()
         before = len(scan.pings)
@@ -45,7 +45,7 @@ def test_new_settings_take_effect_at_the_next_ping(tmp_path):
 
 def test_the_scan_goes_on_in_its_sector_after_the_port_was_away(tmp_path):
     sector = HeadSettings(max_range=50, train_angle_deg=0, sector_width_deg=12)
-    with served(tmp_path) as (server, connection), Run(connection, sector) as scan:
+    with served(tmp_path) as (server, connection), scanning(connection, sector) as scan:
         assert scan.wait_for_more(3)
         server.disappear()
         server.reappear()
@@ -58,7 +58,7 @@ def test_the_scan_goes_on_after_the_head_rebooted(tmp_path):
     sector = HeadSettings(max_range=50, train_angle_deg=30, sector_width_deg=6)
     with served(tmp_path) as (server, connection):
         head = server.head = Emulated852(timing=connection.timing())
-        with Run(connection, sector) as scan:
+        with scanning(connection, sector) as scan:
             assert scan.wait_for_more(15)
             before = len(scan.pings)
             head.reboot()
@@ -82,7 +82,7 @@ def test_scanning_resumes_within_two_seconds_however_long_the_port_was_away(abse
 def test_a_port_that_appears_after_the_driver_is_found(tmp_path):
     with served(tmp_path) as (server, connection):
         server.disappear()
-        with Run(connection) as scan:
+        with scanning(connection) as scan:
             assert "cannot be opened" in scan.device.stats.last_error
             server.reappear()
             assert scan.wait_for_more(1)
@@ -92,7 +92,7 @@ def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(tmp_path):
     faults = FaultInjector(FaultRates852(silence_duration=0.5))
     with served(tmp_path, reopen_after=0.2) as (server, connection):
         server.head = Emulated852(faults=faults, timing=connection.timing())
-        with Run(connection) as scan:
+        with scanning(connection) as scan:
             assert scan.wait_for_more(1)
             faults.order(Fault.SILENCE)
             assert scan.wait_for_more(3)
@@ -100,7 +100,7 @@ def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(tmp_path):
 
 
 def test_a_second_scanner_on_the_port_does_not_start(tmp_path):
-    with served(tmp_path) as (_, connection), Run(connection):
+    with served(tmp_path) as (_, connection), scanning(connection):
         second = Scanner(SonarDevice(connection), HeadSettings().command(), print)
         with pytest.raises(PortBusyError):
             second.connect()
@@ -108,7 +108,7 @@ def test_a_second_scanner_on_the_port_does_not_start(tmp_path):
 
 @pytest.mark.parametrize("gone", [False, True])
 def test_a_stop_ends_the_scan(tmp_path, gone):
-    with served(tmp_path) as (server, connection), Run(connection) as scan:
+    with served(tmp_path) as (server, connection), scanning(connection) as scan:
         assert scan.wait_for_more(1)
         if gone:
             server.disappear()

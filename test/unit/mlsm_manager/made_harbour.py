@@ -1,11 +1,12 @@
 """A vehicle tours a walled harbour; its odometry errs in direction and its beams are late. The truth is known."""
 
 from dataclasses import dataclass
-from typing import Callable, List, Optional
+from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
 from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.run_log import RunLog
 from node_support.geometry.planar import inverse, rotated, transformed
 
 TURN = 14.0  # s per turn of the head
@@ -46,6 +47,14 @@ def tour(
     odometry = Track(times, np.column_stack([positions, truth.poses[:, 2]]))
     scans = [_scan(truth, odometry, number, delay, noise, rng, corners) for number in range(count)]
     return Tour(scans, truth, odometry)
+
+
+def logged(scans: Sequence[Scan]) -> RunLog:
+    """Return the log of a run with these scans, as the joint solver keeps it."""
+    log = RunLog(SONAR_IN_BASE)
+    for scan in scans:
+        log.append(scan, 1.0)
+    return log
 
 
 def ahead(times: np.ndarray) -> np.ndarray:

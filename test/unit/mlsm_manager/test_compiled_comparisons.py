@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_harbour import SONAR_IN_BASE, tour
+from made_harbour import SONAR_IN_BASE, logged, tour
 
 from mlsm_manager.multi_view.association import Pairs
 from mlsm_manager.multi_view.batch_solver import solved
@@ -18,7 +18,6 @@ from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry, HeadingOdometry, ThrusterOdometry, UnaidedOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
 from mlsm_manager.multi_view.placement import PlacedPoints, place
-from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from mlsm_manager.multi_view.state import State
 from mlsm_manager.multi_view.thruster_factors import ThrusterFactors
@@ -66,10 +65,7 @@ def test_sums_of_any_comparisons_are_the_same(seed, count, scans):
 
 @pytest.fixture(scope="module")
 def log():
-    made = RunLog(SONAR_IN_BASE)
-    for scan in tour(3, direction=0.1, delay=0.3).scans:
-        made.append(scan, 1.0)
-    return made
+    return logged(tour(3, direction=0.1, delay=0.3).scans)
 
 
 @pytest.mark.parametrize("odometry", MODELS, ids=lambda model: type(model).__name__)

@@ -2,22 +2,14 @@
 
 import numpy as np
 import pytest
+from made_compass import PARAMETERS, with_heading_only
 from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, tour
 
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.heading_factors import HeadingFactors
 from mlsm_manager.multi_view.islands import MAP
 from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
 from mlsm_manager.multi_view.turns import Turns
 
-PARAMETERS = MultiViewParameters(
-    odometry=HeadingFactors(HeadingOdometry()),
-    matching=SurfaceMatching(block_scans=1, normal_deviation=0.2),
-    window=SolverWindow(free_nodes=12),
-)
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
 
 
@@ -32,14 +24,6 @@ def run(path, corners, without):
     for scan in scans[:BEGIN] + without(scans[BEGIN : BEGIN + SILENT]) + scans[BEGIN + SILENT :]:
         session.add(scan)
     return session, made.truth
-
-
-def with_heading_only(scan):
-    """Return a scan of an odometry whose position stays at 0."""
-    poses = scan.track.poses * [0.0, 0.0, 1.0]
-    points = scan.points.copy()
-    points[:, :2] -= scan.track.at(scan.times)[:, :2]
-    return Scan(points, scan.times, scan.moving, Track(scan.track.times, poses), scan.reference_time)
 
 
 def no_scans(scans):

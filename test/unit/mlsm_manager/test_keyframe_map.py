@@ -93,3 +93,27 @@ def test_the_report_is_that_of_the_newest_keyframe(settled_until):
     for number in (1, 2):
         shown.add(cloud(number))
     assert shown.draw(MovedBy(2.0 * LIMIT), settled_until).report.outside == len(cloud(2))
+
+
+def with_three_keyframes():
+    """Return a map of keyframes 0 to 2, of which the oldest is settled."""
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    for number in range(3):
+        shown.add(cloud(number))
+        shown.draw(MovedBy(0.0), 0.0)
+    return shown
+
+
+def test_a_copy_ends_at_a_time_and_leaves_the_map_as_it_was():
+    shown, placement = with_three_keyframes(), MovedBy(2.0)
+    older = shown.drawn_until(1.0, placement)
+    assert_same(older.blocks, made_at_once(cloud(0).points, placement.points(cloud(1))))
+    everything = [cloud(0).points, placement.points(cloud(1)), placement.points(cloud(2))]
+    assert_same(shown.map.blocks, made_at_once(*everything))
+
+
+def test_what_is_settled_until_a_time_forgets_the_keyframes_after_it():
+    shown = with_three_keyframes()
+    shown.settle(MovedBy(2.0), 1.0)
+    assert_same(shown.map.blocks, made_at_once(cloud(0).points, MovedBy(2.0).points(cloud(1))))
+    assert not shown.moving

@@ -31,10 +31,10 @@ def test_standing_leaves_the_odometry_to_the_recording():
     assert options.request.motion.declared is MotionSource.STANDING
 
 
-def test_a_moving_vehicle_is_no_longer_said_to_stand(capsys):
+def test_a_moving_vehicle_is_not_said_to_stand(capsys):
     line = refusal(capsys, "--standing", "--odometry", "none")
     assert "--standing says that the vehicle did not move" in line
-    assert line.endswith("is now --unknown-motion")
+    assert line.endswith("give --unknown-motion instead")
 
 
 def test_an_unknown_motion_has_no_other_odometry(capsys):

@@ -68,7 +68,9 @@ def test_a_disk_that_fails_leaves_the_old_map(folder, monkeypatch, call):
     assert _files(folder) == ["basin.mlsm"]
 
 
-@pytest.mark.parametrize("name", ["", ".", "..", "../basin", "a/b", "/etc/passwd", "a/..", "basin/", ".hidden", "a\0b"])
+@pytest.mark.parametrize(
+    "name", ["", ".", "..", "../basin", "a/b", "/etc/passwd", "a/..", "basin/", ".hidden", "a\0b", "~/../x"]
+)
 def test_a_name_that_would_leave_the_folder_is_refused(folder, name):
     with pytest.raises(MapFileError, match="must be a plain file name"):
         folder.path(name)

@@ -3,13 +3,12 @@
 import os
 import re
 import stat
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.storage import map_path, read_ply, write_ply
+from mlsm_manager.surface_map.storage import read_ply, write_ply
 
 _NUMPY_TYPES = {"double": "<f8", "uint": "<u4", "uchar": "u1"}
 
@@ -97,25 +96,6 @@ def test_a_folder_that_is_a_file_is_an_error_of_the_system(tmp_path, blocks):
     (tmp_path / "file").write_text("")
     with pytest.raises(OSError, match="file"):
         write_ply(tmp_path / "file" / "basin.ply", blocks)
-
-
-@pytest.mark.parametrize(
-    "name", ["", ".", "..", "../basin", "a/b", "/etc/passwd", "a/..", "basin/", ".hidden", "a\0b", "~/../x"]
-)
-def test_a_name_that_would_leave_the_folder_is_refused(tmp_path, name):
-    with pytest.raises(ValueError, match="must be a plain file name"):
-        map_path(str(tmp_path), name)
-
-
-@pytest.mark.parametrize(
-    ("name", "file"), [("basin", "basin.ply"), ("basin.ply", "basin.ply"), ("a b", "a b.ply"), ("~", "~.ply")]
-)
-def test_a_plain_name_is_a_file_in_the_folder(tmp_path, name, file):
-    assert map_path(str(tmp_path), name) == tmp_path / file
-
-
-def test_a_tilde_in_the_folder_is_the_home():
-    assert map_path("~/maps", "basin") == Path.home() / "maps" / "basin.ply"
 
 
 def test_a_map_comes_back_as_it_was_saved(tmp_path, blocks):

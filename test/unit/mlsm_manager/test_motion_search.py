@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, ahead, tour
+from made_harbour import ahead, logged, tour
 
 from mlsm_manager.multi_view.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.heading_factors import HeadingFactors
@@ -10,7 +10,6 @@ from mlsm_manager.multi_view.motion_search import searched_node
 from mlsm_manager.multi_view.odometry_parameters import DvlOdometry, HeadingOdometry
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.path import NodePath
-from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import State
 from mlsm_manager.multi_view.transition import Transition
 
@@ -20,10 +19,7 @@ HEADING = HeadingFactors(HeadingOdometry())
 
 @pytest.fixture(scope="module")
 def log():
-    made = RunLog(SONAR_IN_BASE)
-    for scan in tour(6, path=ahead).scans:
-        made.append(scan, 1.0)
-    return made
+    return logged(tour(6, path=ahead).scans)
 
 
 def state_with(log, model, shift):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_harbour import SONAR_IN_BASE, tour
+from made_harbour import logged, tour
 
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.multi_view.association import Pairs, pairs_of
@@ -21,7 +21,6 @@ from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
 from mlsm_manager.multi_view.placement import place
-from mlsm_manager.multi_view.run_log import RunLog
 from mlsm_manager.multi_view.state import RANGE_SCALE, Layout, State
 from mlsm_manager.multi_view.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 
@@ -34,10 +33,7 @@ MOTION = Motion(TIMES, POSES, np.column_stack([TIMES, 0.3 * TIMES]))
 
 @pytest.fixture(scope="module")
 def log():
-    made = RunLog(SONAR_IN_BASE)
-    for scan in tour(3, direction=0.1, delay=0.3).scans:
-        made.append(scan, 1.0)
-    return made
+    return logged(tour(3, direction=0.1, delay=0.3).scans)
 
 
 def some_state(log):

@@ -1,7 +1,8 @@
 import time
 
 import pytest
-from ping360_line import PATIENCE, SETTINGS, Run, connection_to, emulated, running, served_line
+from ping360_line import SETTINGS, connection_to, emulated, running, scanning, served_line
+from scanning import PATIENCE
 
 from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
 from ping360_driver.line.device import Ping360Device
@@ -32,21 +33,6 @@ def test_older_firmware_is_asked_for_every_ping(port):
     with running(port, head=emulated(port, auto_transmit=False)) as (scan, _):
         assert scan.wait_for_more(3)
     assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
-
-
-class CannotScan(EmulatedPing360):
-    """A head that says that its firmware is new, and does not scan by itself all the same."""
-
-    def _complaint(self, message):
-        return "not today" if message.message_id == MessageId.AUTO_TRANSMIT else ""
-
-
-def test_a_head_that_refuses_to_scan_by_itself_is_asked_for_every_ping(tmp_path):
-    port = str(tmp_path / "sonar")
-    with running(port, head=CannotScan(baud_rate=1152000)) as (scan, _):
-        assert scan.wait_for_more(3)
-    assert (scan.stats.mode, scan.stats.refusals) == ("request", 1)
-    assert "message 2602: not today" in scan.stats.last_error
 
 
 def test_changed_settings_reach_the_head(port):
@@ -85,7 +71,7 @@ def test_the_scan_goes_on_after_the_line_was_away(port, settings):
 def test_a_head_that_appears_after_the_driver_is_found(port):
     with HeadServer(emulated(port), served_line(port)) as server:
         server.disappear()
-        with Run(connection_to(port)) as scan:
+        with scanning(connection_to(port)) as scan:
             assert not scan.stats.connected
             server.reappear()
             assert scan.wait_for_more(1)

@@ -4,7 +4,8 @@ from ping360_line import SETTINGS
 from virtual_line import VirtualStopAt, VirtualTime
 from virtual_scan import VirtualScan
 
-from ping360_driver.emulator import Ping360FaultRates
+from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
+from ping360_driver.protocol.messages import MessageId
 from sonar_driver.emulator import Fault, FaultInjector
 
 REQUESTS = SETTINGS.changed({"scan_mode": "request"})
@@ -34,6 +35,20 @@ def test_a_sector_is_scanned_to_and_fro(port, settings):
     scan = VirtualScan(port, settings.changed({"sector_width_deg": 18.0}))
     scan.beams(30)
     assert scan.angles == [*range(190, 211), *range(209, 200, -1)]
+
+
+class CannotScan(EmulatedPing360):
+    """A head that says that its firmware is new, and does not scan by itself all the same."""
+
+    def _complaint(self, message):
+        return "not today" if message.message_id == MessageId.AUTO_TRANSMIT else ""
+
+
+def test_a_head_that_refuses_to_scan_by_itself_is_asked_for_every_ping():
+    scan = VirtualScan(head=CannotScan)
+    scan.beams(3)
+    assert (scan.stats.mode, scan.stats.refusals) == ("request", 1)
+    assert "message 2602: not today" in scan.stats.last_error
 
 
 def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):

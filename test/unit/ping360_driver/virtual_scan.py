@@ -25,15 +25,17 @@ class TimedEchoes(NumberedEchoes):
 
 
 class VirtualScan:
-    """Pings on request of a test; `pings` are those that brought a beam."""
+    """Pings on request of a test; `pings` are those that brought a beam. head: the class of the head."""
 
-    def __init__(self, port="virtual", settings=SETTINGS, faults=None, baud_rate=BAUD_RATE, stop=None):
+    def __init__(
+        self, port="virtual", settings=SETTINGS, faults=None, baud_rate=BAUD_RATE, stop=None, head=EmulatedPing360
+    ):
         self.settings = settings
         self.pings = []
         self.echoes = TimedEchoes()
         stop = stop or VirtualStop(VirtualTime())
         head_rate = float("inf") if is_datagram_port(port) else baud_rate
-        self.head = EmulatedPing360(self.echoes, faults, head_rate)
+        self.head = head(self.echoes, faults, head_rate)
         line = VirtualLine(self.head, head_rate, stop.time)
         connection = connection_to(port, baud_rate=baud_rate, reply_margin=0.15)
         clock = stop.time.elapsed

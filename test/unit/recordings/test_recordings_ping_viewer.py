@@ -1,13 +1,13 @@
 """Logs of Ping Viewer: written as it writes them, read back, also damaged."""
 
-from io import BytesIO
+import struct
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ping360_driver.logs.ping_viewer_log import NoLogError, PingViewerLog, PingViewerLogWriter
+from ping360_driver.logs.ping_viewer_log import TITLE, NoLogError, PingViewerLog
 from ping360_driver.protocol.messages import MessageId, packed
 from recordings.beams.makers_logs import is_makers_log, makers_beams
 from recordings.errors import RecordingError
@@ -27,12 +27,19 @@ def beam_bytes(gradians, kind=MessageId.DEVICE_DATA):
     )  # fmt: skip
 
 
+def text_bytes(text):
+    return struct.pack(">I", 2 * len(text)) + text.encode("utf-16-be")
+
+
 def log_bytes(parts):
-    file = BytesIO()
-    writer = PingViewerLogWriter(file)
-    for time, data in parts:
-        writer.write(time, data)
-    return file.getvalue()
+    """Return a log of a Ping360 (family 1, type 2) as Ping Viewer writes it, of parts (time [s], data)."""
+    header = text_bytes(TITLE) + struct.pack(">i", 1) + 5 * text_bytes("") + struct.pack(">ii", 1, 2)
+    return header + b"".join(text_bytes(clock(time)) + struct.pack(">I", len(data)) + data for time, data in parts)
+
+
+def clock(time):
+    minutes, milliseconds = divmod(round(time * 1e3), 60_000)
+    return f"{minutes // 60 % 24:02d}:{minutes % 60:02d}:{milliseconds // 1000:02d}.{milliseconds % 1000:03d}"
 
 
 @pytest.fixture
@@ -42,12 +49,14 @@ def turn(tmp_path):
     return path
 
 
-def test_the_bytes_are_those_of_ping_viewer():
-    """As its documentation describes them: title, version, five texts, family and type, then time and data."""
-    expected = b"\0\0\0\x34" + "PingViewer sensor log file".encode("utf-16-be") + b"\0\0\0\x01"
-    expected += b"\0\0\0\0" * 5 + b"\0\0\0\x01" + b"\0\0\0\x02"
-    expected += b"\0\0\0\x18" + "01:02:03.456".encode("utf-16-be") + b"\0\0\0\x02" + b"BR"
-    assert log_bytes([(3723.456, b"BR")]) == expected
+def test_a_part_is_read_as_ping_viewer_s_documentation_describes_it():
+    """Title, version, five texts, family and type, then time and data."""
+    data = b"\0\0\0\x34" + "PingViewer sensor log file".encode("utf-16-be") + b"\0\0\0\x01"
+    data += b"\0\0\0\0" * 5 + b"\0\0\0\x01" + b"\0\0\0\x02"
+    data += b"\0\0\0\x18" + "01:02:03.456".encode("utf-16-be") + b"\0\0\0\x02" + b"BR"
+    (part,) = PingViewerLog(data)
+    assert (part.time, part.data) == (pytest.approx(3723.456), b"BR")
+    assert log_bytes([(3723.456, b"BR")]) == data
 
 
 def test_every_beam_is_read_at_the_time_of_its_ping(turn):

@@ -8,12 +8,13 @@ from clouds import beam_of
 
 from node_support.parameters import ParameterError
 from sonar_processing.beams.mounting import MountingParameters
-from sonar_processing.beams.projection import project_beam
+from sonar_processing.beams.projection import project_beams
 
 
 def _first_bin(angle, **mounting):
     """Return x y z of the first bin, at 0.5 m, of a beam at a head angle, in the vehicle's frame."""
-    return project_beam(beam_of(angle=angle), MountingParameters(**mounting).matrix(), 1, 0.0)[0, :3]
+    T_base_sonar = MountingParameters(**mounting).matrix()
+    return project_beams([beam_of(angle=angle)], T_base_sonar[np.newaxis], 1, 0.0)[0, 0, :3]
 
 
 @pytest.mark.parametrize(

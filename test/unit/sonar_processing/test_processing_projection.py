@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from node_support.geometry.matrices import pose_matrix
 from node_support.geometry.planar import wrapped
-from sonar_processing.beams.projection import project_beam
+from sonar_processing.beams.projection import project_beams
 
 ANGLES = st.floats(-7.0, 7.0)
 SHIFTS = st.tuples(*[st.floats(-100.0, 100.0)] * 3)
@@ -21,7 +21,8 @@ def _pose(shift=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)):
 
 
 def _projected(beam, pose=None, sides=1, width=0.0436):
-    return project_beam(beam, _pose() if pose is None else pose, sides, width)
+    T_target_sonar = _pose() if pose is None else pose
+    return project_beams([beam], T_target_sonar[np.newaxis], sides, width)[0]
 
 
 def test_a_bin_lies_at_its_centre():

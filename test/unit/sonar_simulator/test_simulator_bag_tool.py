@@ -117,7 +117,7 @@ def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):
     ("arguments", "line"),
     [
         (["--set", "odometry.scale_eror=1"], "odometry: scale_eror = 1: no such parameter"),
-        (["--set", "seed"], "--set seed: must be key=value or group.key=value"),
+        (["--set", "seed"], "--set seed: must be KEY=VALUE"),
         (["--set", "drive=CMD_VEL"], "drive = 'CMD_VEL': nobody sends commands while a bag is written"),
         (["--world", "none.sdf"], "none.sdf"),
         (["--robot", "none.urdf"], "none.urdf: No such file or directory"),

@@ -72,11 +72,6 @@ class OdometryErrors(ParameterSet):
         unit="rad", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
 
-    def wandering(self, seconds: float) -> float:
-        """Return the variance [m^2], in each direction, of what errors of the speed add up to within `seconds`."""
-        ratio = seconds / self.rate_time
-        return 2.0 * (self.speed_deviation * self.rate_time) ** 2 * (ratio - 1.0 + float(np.exp(-ratio)))
-
     def covariance(self) -> np.ndarray:
         """Return (8, 8) of [pose, rate, motion] where the pose is known and nothing of the odometry's errors."""
         deviations = np.zeros(STATES)

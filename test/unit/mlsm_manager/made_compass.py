@@ -1,0 +1,20 @@
+"""Scans of a vehicle that has a compass and nothing else, and a solver for them that is quick."""
+
+from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.multi_view.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.odometry_parameters import HeadingOdometry
+from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
+
+PARAMETERS = MultiViewParameters(
+    odometry=HeadingFactors(HeadingOdometry()),
+    matching=SurfaceMatching(block_scans=1, normal_deviation=0.2),
+    window=SolverWindow(free_nodes=12),
+)
+
+
+def with_heading_only(scan):
+    """Return a scan of an odometry whose position stays at 0."""
+    poses = scan.track.poses * [0.0, 0.0, 1.0]
+    points = scan.points.copy()
+    points[:, :2] -= scan.track.at(scan.times)[:, :2]
+    return Scan(points, scan.times, scan.moving, Track(scan.track.times, poses), scan.reference_time)
