@@ -16,9 +16,9 @@ from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.batch_solver import solved
 from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.way_batch import solved_best
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 
@@ -52,7 +52,7 @@ def figures(scans: List[Scan], parameters: MultiViewParameters, sonar_in_base: n
     solver = LiveSolver(parameters, sonar_in_base)
     for scan in scans:
         solver.add(scan)
-    batch, times = solved(solver), solver.log.node_times[1:]
+    batch, times = solved_best(solver), solver.log.node_times[1:]
     true = (truth.at(times) - truth.at(solver.log.node_times[0]))[:, :2]
     live = np.array([estimate.T_map_base[:2] for estimate in solver.estimates])
     told = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])

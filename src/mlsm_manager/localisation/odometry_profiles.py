@@ -6,6 +6,7 @@ import yaml
 
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
 
 
 class Setting(NamedTuple):
@@ -81,6 +82,9 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         _NEIGHBOURS,
         Setting("normal_deviation", 0.1, "rad: half of heading's, so that the little that parts of a turn hear counts"),
         _POSTS,
+        Setting(
+            "solver_kernel", SolverKernel.AUTO.value, "thousands of ways are compared, which compiled loops do faster"
+        ),
         *_COMPASS,
     ),
     OdometryKind.NONE: (

@@ -7,22 +7,28 @@ ImportError without numba.
 import numpy as np
 from numba import njit
 
+_NEVER = 1e300  # squared deviations: no echo lies so far away
 
-@njit(cache=True)
-def _least_squared(x, y, lone, path, rows, nodes, arms, shares, normals, weights, farthest):
-    """Return the least of `farthest` and the squared deviations of x, y from the targets in `rows` of one way."""
-    least = farthest
+
+@njit(cache=True, fastmath=True)
+def _least_around(x, y, rows, places_x, places_y, weight):
+    """Return the least squared deviation of x, y from the targets in `rows`, in all directions alike."""
+    least = _NEVER
     for row in rows:
-        node, share = nodes[row], shares[row]
-        across_x = x - arms[row, 0] - (1.0 - share) * path[node, 0] - share * path[node + 1, 0]
-        across_y = y - arms[row, 1] - (1.0 - share) * path[node, 1] - share * path[node + 1, 1]
-        if lone:
-            squared = (across_x * across_x + across_y * across_y) * weights[2]
-        else:
-            across = across_x * normals[row, 0] + across_y * normals[row, 1]
-            along = across_y * normals[row, 0] - across_x * normals[row, 1]
-            squared = across * across * weights[0] + along * along * weights[1]
-        least = min(least, squared)
+        offset_x, offset_y = x - places_x[row], y - places_y[row]
+        least = min(least, (offset_x * offset_x + offset_y * offset_y) * weight)
+    return least
+
+
+@njit(cache=True, fastmath=True)
+def _least_beside(x, y, rows, places_x, places_y, normals, across_weight, along_weight):
+    """Return the least squared deviation of x, y from the surfaces in `rows`, across them and along them."""
+    least = _NEVER
+    for row in rows:
+        offset_x, offset_y = x - places_x[row], y - places_y[row]
+        across = offset_x * normals[row, 0] + offset_y * normals[row, 1]
+        along = offset_y * normals[row, 0] - offset_x * normals[row, 1]
+        least = min(least, across * across * across_weight + along * along * along_weight)
     return least
 
 
@@ -43,17 +49,22 @@ def way_nats(
     and around. farthest: squared deviations.
     """
     result, last = np.zeros(len(paths)), paths.shape[1] - 2
+    places_x, places_y = np.empty(len(target_nodes)), np.empty(len(target_nodes))
     for way in range(len(paths)):
         path = paths[way]
+        for row in range(len(target_nodes)):
+            node, share = target_nodes[row], target_shares[row]
+            places_x[row] = target_arms[row, 0] + (1.0 - share) * path[node, 0] + share * path[node + 1, 0]
+            places_y[row] = target_arms[row, 1] + (1.0 - share) * path[node, 1] + share * path[node + 1, 1]
         for source in range(len(shares)):
             share = shares[source]
             x = arms[source, 0] + (1.0 - share) * path[last, 0] + share * path[last + 1, 0]
             y = arms[source, 1] + (1.0 - share) * path[last, 1] + share * path[last + 1, 1]
             rows = candidates[starts[source] : starts[source + 1]]
-            squared = _least_squared(
-                x, y, lone[source], path, rows, target_nodes, target_arms, target_shares, target_normals, weights,
-                farthest,
-            )  # fmt: skip
+            if lone[source]:
+                squared = _least_around(x, y, rows, places_x, places_y, weights[2])
+            else:
+                squared = _least_beside(x, y, rows, places_x, places_y, target_normals, weights[0], weights[1])
             if squared < farthest:
                 result[way] += nats[source] * np.exp(-0.5 * squared)
     return result

@@ -17,7 +17,7 @@ from mlsm_manager.multi_view.way_echoes import WayEchoes
 from mlsm_manager.multi_view.way_motion import drawn, led
 from mlsm_manager.multi_view.ways import Ways, begun
 
-_COUNT = 3000  # ways: with 1000 one simulated tour of two is lost
+_COUNT = 6000  # ways: with 1000 one simulated tour of two is lost
 _START_SPEED = 0.3  # m/s: the usual speed of a small vehicle
 _WAYS = "ways."  # begins the names of what is stored
 REMEMBERED_TURNS = 40  # about ten minutes, as long as the newest nodes of the solver stay free

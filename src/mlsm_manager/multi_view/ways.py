@@ -6,9 +6,9 @@ Gordon, Salmond and Smith 1993; each way is a map of its own, as in FastSLAM (Mo
 from typing import NamedTuple, Tuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 _ALIKE = 1.0  # m by which the ends of ways may differ that count as one
+_CENTRES = 100  # ways around whose ends the others are counted: enough that one is near the middle of each group
 _UNEVEN = 0.5  # share of the ways that must still count, or else they are drawn anew
 
 
@@ -32,8 +32,9 @@ class Ways(NamedTuple):
     def most_believed(self) -> np.ndarray:
         """Return the mean path (k, 2) of the ways that end about where most is believed."""
         ends, shares = self.paths[:, -1], self.shares
-        groups = cKDTree(ends).query_ball_point(ends, _ALIKE)
-        best = groups[int(np.argmax([shares[group].sum() for group in groups]))]
+        some = np.argsort(-shares, kind="stable")[:: max(1, len(ends) // _CENTRES)]
+        alike = ((ends[some, np.newaxis] - ends) ** 2).sum(axis=2) < _ALIKE**2
+        best = alike[np.argmax(alike @ shares)]
         return np.einsum("n,nka->ka", shares[best], self.paths[best]) / shares[best].sum()
 
     def spread(self) -> np.ndarray:

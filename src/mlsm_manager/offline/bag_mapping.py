@@ -10,6 +10,7 @@ from typing import Dict, List, Optional
 import numpy as np
 from tqdm import tqdm
 
+from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_length import echo_sigma
@@ -23,6 +24,7 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED, FURTHER_COLORS, ODOMETRY, REFINED, Run
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
+from mlsm_manager.offline.strafing import may_strafe, strafes
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import StoredMap
@@ -61,6 +63,12 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)
     replayed = _replayed(recording, scans, parameters)
+    if options.odometry is None and odometry.kind is OdometryKind.HEADING and may_strafe(replayed.solver):
+        other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
+        changed = _suited_parameters(recording, other, options)
+        again = _replayed(recording, scans, changed)
+        if again.solver is not None and strafes(replayed.solver, again.solver):
+            odometry, parameters, replayed = other, changed, again
     _tell_of_refused(replayed, options)
     refined = _refined(recording, replayed, parameters) if options.refine else None
     refitted = _refitted(replayed, refined) if options.check else []

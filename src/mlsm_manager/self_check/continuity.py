@@ -23,7 +23,8 @@ def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> V
     known = np.isfinite(shares)
     times, shares = np.asarray(times)[known], np.asarray(shares)[known]
     name = "scans go on"
-    text = f"share of its echoes that each of {_SCANS} scans but the worst fifth has on what was heard before it"
+    text = f"share of its echoes that each of {_SCANS} scans but the worst fifth has on what was heard before it; "
+    text += "a vehicle that strafes needs --odometry hovering"
     question = "Do scans lie on what was heard just before them, or has the vehicle moved as it was not expected to?"
     if len(shares) < _SCANS:
         return Verdict(name, np.nan, limit, text, True, question=question)

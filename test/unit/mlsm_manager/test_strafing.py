@@ -10,6 +10,8 @@ from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.way_batch import solved_best
+from mlsm_manager.offline.strafing import may_strafe, strafes
 from node_support.errors import RefusedInput
 
 pytestmark = pytest.mark.long
@@ -49,6 +51,11 @@ def hovering():
     return followed(OdometryKind.HOVERING)
 
 
+@pytest.fixture(scope="module")
+def ahead():
+    return followed(OdometryKind.HEADING)
+
+
 def errors_of(solver):
     ends = np.array([estimate.time for estimate in solver.estimates])
     path = np.array([estimate.T_map_base[:2] for estimate in solver.estimates])
@@ -60,8 +67,24 @@ def test_it_is_found_where_it_is(hovering):
     assert np.median(errors_of(hovering)) < 1.0
 
 
-def test_the_profile_for_vehicles_that_go_ahead_loses_it():
-    assert np.median(errors_of(followed(OdometryKind.HEADING))) > 3.0
+def test_the_profile_for_vehicles_that_go_ahead_loses_it(ahead):
+    assert np.median(errors_of(ahead)) > 3.0
+
+
+def test_echoes_tell_that_it_strafes(ahead, hovering):
+    assert strafes(ahead, hovering)
+
+
+def test_a_short_run_does_not_tell(ahead):
+    assert not may_strafe(ahead)
+
+
+def test_refined_it_is_as_near_as_echoes_tell():
+    solver = followed(OdometryKind.HOVERING, MADE.scans[:5])
+    fit = solved_best(solver)
+    places = solver.log.node_poses(np.arange(len(fit.node_times)))[:, :2] + fit.state.nodes[:, :2]
+    true = MADE.truth.at(fit.node_times)[:, :2]
+    assert np.hypot(*(places - places[0] - true + true[0]).T).mean() < 0.7
 
 
 def test_each_part_of_a_turn_has_an_estimate(hovering):
