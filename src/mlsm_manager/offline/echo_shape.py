@@ -11,6 +11,7 @@ from sonar_processing.filters.echo_extraction import ExtractionMode
 
 # Share of non-zero strengths that equal the strongest.
 _BINARY = 0.9
+_AT_ONCE = 1000  # beams that are counted together: bounds the memory
 
 
 class EchoShape(Enum):
@@ -44,7 +45,11 @@ _SUITED = {
 
 def echo_shape_of(beams: Sequence[Beam]) -> EchoShape:
     """Return PLATEAU where nearly all echoes are as strong as any, else PEAK."""
-    counts = np.sum([np.bincount(beam.intensities, minlength=256) for beam in beams], axis=0)[1:]
+    counts = np.zeros(256, dtype=np.int64)
+    for start in range(0, len(beams), _AT_ONCE):
+        strengths = np.concatenate([beam.intensities for beam in beams[start : start + _AT_ONCE]])
+        counts += np.bincount(strengths, minlength=256)
+    counts = counts[1:]
     if not counts.any():
         return EchoShape.PEAK
     strongest = counts[np.flatnonzero(counts)[-1]]
