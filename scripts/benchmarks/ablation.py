@@ -19,11 +19,11 @@ from benchmarks.twins.parameters import TWINS
 from benchmarks.twins.recording import twin_of
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.multi_view.batch_solver import solved
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.solve.batch_solver import solved
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
 from mlsm_manager.offline.evaluation import positions_at

@@ -8,8 +8,8 @@ import numpy as np
 
 from benchmarks.command_line import benchmark_parser
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.geometry.planar import inverse, rotated, transformed
 

@@ -10,8 +10,8 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, Pri
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
-from mlsm_manager.multi_view.estimate import LiveEstimate
-from mlsm_manager.multi_view.state import POSE_COLUMNS, RUN_COLUMNS
+from mlsm_manager.multi_view.placing.estimate import LiveEstimate
+from mlsm_manager.multi_view.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from node_support.geometry.planar import composed, inverse, wrapped
 
 PATH_POINTS = 17

@@ -30,8 +30,8 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, pre
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import POSE
-from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer

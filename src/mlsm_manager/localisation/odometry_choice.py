@@ -7,17 +7,17 @@ from typing import Any, Callable, Dict
 import numpy as np
 
 from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.odometry_model import OdometryModel
-from mlsm_manager.multi_view.odometry_parameters import (
+from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
+from mlsm_manager.multi_view.motion.odometry_parameters import (
     DvlOdometry,
     HeadingOdometry,
     ThrusterOdometry,
     UnaidedOdometry,
 )
-from mlsm_manager.multi_view.thruster_factors import ThrusterFactors
-from mlsm_manager.multi_view.unaided_factors import UnaidedFactors
+from mlsm_manager.multi_view.motion.thruster_factors import ThrusterFactors
+from mlsm_manager.multi_view.motion.unaided_factors import UnaidedFactors
 from node_support.parameters import ParameterSet, parameter
 
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass, field
 
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.odometry_model import OdometryModel
-from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
+from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.parameters import ParameterSet, parameter
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from mlsm_manager.multi_view.normal_equations import NormalEquations
 from mlsm_manager.multi_view.parameters import SonarCalibration
+from mlsm_manager.multi_view.unknowns.normal_equations import NormalEquations
 
 _HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 

@@ -25,9 +25,12 @@ class SolverKernel(Enum):
             if self is SolverKernel.AUTO and not has_cache():
                 return SolverKernel.NUMPY
             prepare_cache()
-            import mlsm_manager.multi_view.compiled_comparisons
-            import mlsm_manager.multi_view.compiled_placement
-            import mlsm_manager.multi_view.compiled_ways  # noqa: F401
+            import mlsm_manager.multi_view.compiled.compiled_cells
+            import mlsm_manager.multi_view.compiled.compiled_places
+            import mlsm_manager.multi_view.compiled.compiled_search
+            import mlsm_manager.multi_view.compiled.compiled_sums
+            import mlsm_manager.multi_view.compiled.compiled_ways
+            import mlsm_manager.multi_view.compiled.compiled_weights  # noqa: F401
         except ImportError:
             if self is SolverKernel.NUMBA:
                 raise

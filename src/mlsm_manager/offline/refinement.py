@@ -10,10 +10,10 @@ from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.batch_solver import BatchResult, Closed, closed
-from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.path import solved_path
-from mlsm_manager.multi_view.way_batch import solved_best
+from mlsm_manager.multi_view.placing.path import solved_path
+from mlsm_manager.multi_view.solve.batch_solver import BatchResult, Closed, closed
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.multi_view.solve.way_batch import solved_best
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 

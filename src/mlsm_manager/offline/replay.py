@@ -11,7 +11,7 @@ from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.live_solver import LiveSolver
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.files.map_file import StoredMap

@@ -4,10 +4,10 @@ from typing import Optional
 
 import numpy as np
 
-from mlsm_manager.multi_view.continuity import shares_heard_before
-from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.path import NodePath
-from mlsm_manager.multi_view.way_search import agreement_of
+from mlsm_manager.multi_view.judge.continuity import shares_heard_before
+from mlsm_manager.multi_view.placing.path import NodePath
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.multi_view.ways.way_search import agreement_of
 from mlsm_manager.self_check.continuity import scans_go_on
 
 _WORTH_TRYING = 0.75

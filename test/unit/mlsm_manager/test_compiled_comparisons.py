@@ -9,19 +9,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
 
-from mlsm_manager.multi_view.association import Pairs
-from mlsm_manager.multi_view.batch_solver import solved
-from mlsm_manager.multi_view.comparing import Comparing
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.odometry_parameters import DvlOdometry, HeadingOdometry, ThrusterOdometry, UnaidedOdometry
+from mlsm_manager.multi_view.compare.association import Pairs
+from mlsm_manager.multi_view.compare.comparing import Comparing
+from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.motion.odometry_parameters import (
+    DvlOdometry,
+    HeadingOdometry,
+    ThrusterOdometry,
+    UnaidedOdometry,
+)
+from mlsm_manager.multi_view.motion.thruster_factors import ThrusterFactors
+from mlsm_manager.multi_view.motion.unaided_factors import UnaidedFactors
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
-from mlsm_manager.multi_view.placement import PlacedPoints, place
+from mlsm_manager.multi_view.placing.placement import PlacedPoints, place
+from mlsm_manager.multi_view.solve.batch_solver import solved
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.multi_view.state import State
-from mlsm_manager.multi_view.thruster_factors import ThrusterFactors
-from mlsm_manager.multi_view.unaided_factors import UnaidedFactors
+from mlsm_manager.multi_view.unknowns.state import State
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 
 pytest.importorskip("numba")
@@ -138,7 +143,7 @@ def test_points_without_a_finite_place_are_refused():
 
 @pytest.mark.parametrize("kernel", ["AUTO", "NUMBA"])
 def test_the_loops_are_compiled_before_the_first_scan(kernel, monkeypatch):
-    module = "mlsm_manager.multi_view.compiled_comparisons"
+    module = "mlsm_manager.multi_view.compiled.compiled_search"
     monkeypatch.delitem(sys.modules, module, raising=False)
     ReplayParameters(solver_kernel=kernel).build_localiser()
     assert module in sys.modules

@@ -35,5 +35,5 @@ def test_compiled_loops_without_numba_are_refused_in_one_line(monkeypatch, key):
 
 
 def test_without_numba_numpy_compares(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mlsm_manager.multi_view.compiled_comparisons", None)
+    monkeypatch.setitem(sys.modules, "mlsm_manager.multi_view.compiled.compiled_search", None)
     assert SolverKernel.AUTO.resolved is SolverKernel.NUMPY

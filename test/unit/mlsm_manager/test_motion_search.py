@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from made_harbour import ahead, logged, tour
 
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion_search import searched_node
-from mlsm_manager.multi_view.odometry_parameters import DvlOdometry, HeadingOdometry
+from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
+from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry, HeadingOdometry
+from mlsm_manager.multi_view.motion.transition import Transition
 from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.path import NodePath
-from mlsm_manager.multi_view.state import State
-from mlsm_manager.multi_view.transition import Transition
+from mlsm_manager.multi_view.placing.path import NodePath
+from mlsm_manager.multi_view.search.motion_search import searched_node
+from mlsm_manager.multi_view.unknowns.state import State
 
 FAR = np.array([3.0, -5.0])
 HEADING = HeadingFactors(HeadingOdometry())

@@ -9,20 +9,20 @@ from hypothesis import strategies as st
 from made_harbour import logged, tour
 
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.association import Pairs, pairs_of
-from mlsm_manager.multi_view.comparisons import linearised, weights
-from mlsm_manager.multi_view.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.frozen_map import fading, joint_covariance, nearest_blocks
-from mlsm_manager.multi_view.growing import GrowingArray
-from mlsm_manager.multi_view.neighbours import NeighbourLists
-from mlsm_manager.multi_view.normal_equations import DenseSolution, NormalEquations, SparseSolution
-from mlsm_manager.multi_view.odometry_motion import Motion
-from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
-from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.compare.association import Pairs, pairs_of
+from mlsm_manager.multi_view.compare.comparisons import linearised, weights
+from mlsm_manager.multi_view.compare.neighbours import NeighbourLists
+from mlsm_manager.multi_view.measured.growing import GrowingArray
+from mlsm_manager.multi_view.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.measured.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
+from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
+from mlsm_manager.multi_view.motion.odometry_motion import Motion
+from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
-from mlsm_manager.multi_view.placement import place
-from mlsm_manager.multi_view.state import RANGE_SCALE, Layout, State
-from mlsm_manager.multi_view.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
+from mlsm_manager.multi_view.placing.placement import place
+from mlsm_manager.multi_view.solve.frozen_map import fading, joint_covariance, nearest_blocks
+from mlsm_manager.multi_view.unknowns.normal_equations import DenseSolution, NormalEquations, SparseSolution
+from mlsm_manager.multi_view.unknowns.state import RANGE_SCALE, Layout, State
 
 STEP = 1e-6
 DVL = DvlFactors(DvlOdometry())

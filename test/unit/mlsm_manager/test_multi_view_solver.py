@@ -7,13 +7,13 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.batch_solver import solved
-from mlsm_manager.multi_view.dvl_factors import DIRECTION, DvlFactors
-from mlsm_manager.multi_view.live_solver import LiveSolver
-from mlsm_manager.multi_view.odometry_parameters import DvlOdometry
+from mlsm_manager.multi_view.motion.dvl_factors import DIRECTION, DvlFactors
+from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration
-from mlsm_manager.multi_view.path import solved_path
-from mlsm_manager.multi_view.state import DELAY
+from mlsm_manager.multi_view.placing.path import solved_path
+from mlsm_manager.multi_view.solve.batch_solver import solved
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.multi_view.unknowns.state import DELAY
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mlsm_manager.multi_view.stacking import stacked, unstacked
+from mlsm_manager.multi_view.solve.stacking import stacked, unstacked
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlsm_manager.multi_view.comparing import Comparing
-from mlsm_manager.multi_view.neighbours import TIE
-from mlsm_manager.multi_view.placement import PlacedPoints
+from mlsm_manager.multi_view.compare.comparing import Comparing
+from mlsm_manager.multi_view.compare.neighbours import TIE
+from mlsm_manager.multi_view.placing.placement import PlacedPoints
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 
 SCANS = np.repeat(np.arange(6), 15)

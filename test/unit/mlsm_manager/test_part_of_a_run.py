@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.multi_view.batch_solver import solved, solved_part
-from mlsm_manager.multi_view.live_solver import LiveSolver
 from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.state import DELAY, RUN_COLUMNS
+from mlsm_manager.multi_view.solve.batch_solver import solved, solved_part
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.multi_view.unknowns.state import DELAY, RUN_COLUMNS
 
 FIRST = 8
 SCANS = tour(24, direction=0.12, delay=0.6).scans

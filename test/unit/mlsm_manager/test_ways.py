@@ -8,15 +8,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.heading_factors import AHEAD, ASIDE
-from mlsm_manager.multi_view.odometry_motion import Motion
-from mlsm_manager.multi_view.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.multi_view.motion.heading_factors import AHEAD, ASIDE
+from mlsm_manager.multi_view.motion.odometry_motion import Motion
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.multi_view.way_comparisons import nats_of
-from mlsm_manager.multi_view.way_echoes import WayEchoes
-from mlsm_manager.multi_view.way_motion import drawn, led
-from mlsm_manager.multi_view.way_nodes import on_path
-from mlsm_manager.multi_view.ways import Ways, begun
+from mlsm_manager.multi_view.ways.way_comparisons import nats_of
+from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
+from mlsm_manager.multi_view.ways.way_motion import drawn, led
+from mlsm_manager.multi_view.ways.way_nodes import on_path
+from mlsm_manager.multi_view.ways.ways import Ways, begun
 
 PART = 5.0  # s
 

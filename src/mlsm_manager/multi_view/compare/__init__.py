@@ -1,0 +1,1 @@
+"""Compares points with the surfaces that other scans heard."""

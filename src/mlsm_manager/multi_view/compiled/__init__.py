@@ -1,0 +1,1 @@
+"""Loops compiled by numba. Nothing here imports the rest of the solver."""

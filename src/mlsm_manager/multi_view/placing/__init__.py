@@ -1,0 +1,1 @@
+"""Where the vehicle was, and where points lie, given the unknowns."""

@@ -1,0 +1,1 @@
+"""Search for places and motions that the solver's own steps do not reach."""
