@@ -1,5 +1,8 @@
 #!/usr/bin/env python3
-"""A vehicle with a compass alone finds its way through the simulated harbour; its odometry comes from the fixes."""
+"""A vehicle with a compass alone finds its way through the simulated harbour; its odometry comes from the fixes.
+
+Parameter ~odometry: the profile.
+"""
 
 import sys
 import unittest
@@ -23,7 +26,8 @@ class CompassDemo(unittest.TestCase):
         """Both begin at the same place; the odometry moves too, because it is told the velocity."""
         truth, odometry = Inbox("/ground_truth", Odometry), Inbox("/odom", Odometry)
         fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
-        arguments = ("odometry:=heading", "real_time_factor:=12.0", "shapes:=false", "rviz:=false")
+        odometry_argument = f"odometry:={rospy.get_param('~odometry')}"
+        arguments = (odometry_argument, "real_time_factor:=12.0", "shapes:=false", "rviz:=false")
         with launched("demo.launch", *arguments):
             times, fixed = _way(fixes.wait_for_number(FIXES, LONG_PATIENCE)[:FIXES])
             truth.wait_for(lambda message: message.header.stamp.to_sec() >= times[-1])

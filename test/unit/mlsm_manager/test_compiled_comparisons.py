@@ -68,6 +68,18 @@ def test_sums_of_any_comparisons_are_the_same(seed, count, scans):
             np.testing.assert_allclose(found, expected, rtol=SAME, atol=SAME * np.abs(expected).max())
 
 
+def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
+    T_base_sonar = np.eye(4)
+    T_base_sonar[:2, 3] = SONAR_IN_BASE
+    solvers = [
+        LiveSolver(MultiViewParameters(kernel=SolverKernel.NUMBA), place)
+        for place in (SONAR_IN_BASE, T_base_sonar[:2, 3])
+    ]
+    for scan in tour(2).scans:
+        expected, found = (solver.add(scan) for solver in solvers)
+    np.testing.assert_array_equal(found.node, expected.node)
+
+
 @pytest.fixture(scope="module")
 def log():
     return logged(tour(3, direction=0.1, delay=0.3).scans)

@@ -23,7 +23,8 @@ class RunLog:
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
-        self.sonar_in_base = np.asarray(sonar_in_base, dtype=np.float64)
+        # Compiled loops take no column of a matrix.
+        self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryTimeline()
         self._node_times = GrowingArray()
         self._surfaces, self.lone = PointTable(), PointTable()
