@@ -3,12 +3,11 @@
 import numpy as np
 
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
-from mlsm_manager.multi_view.ways.ways import Draw, Ways
+from mlsm_manager.multi_view.ways.ways import HELD_SPEED, Draw, Ways
 
 _CHANGE = 0.3  # chance that the speed changes within a part of a turn: on average it is kept for 18 s
 _STOP = 0.4  # of these changes end at rest
 _NEW_SPEED = 0.4  # m/s: deviation of a speed in each direction after a change
-_HELD_SPEED = 0.02  # m/s: of a vehicle that holds its place
 _WALK = 0.07  # m/s: by which a speed that is kept strays within a part
 _ROUGH = 0.05  # m: by which steps stray besides
 _GUIDED = 0.25  # share of the ways that are led to where an echo that stands alone meets an earlier one
@@ -24,7 +23,7 @@ def drawn(ways: Ways, duration: float, turn: float, rng: np.random.RandomState) 
     count = len(ways.nats)
     with_heading = rng.rand(count, 1) < 0.5
     kept = np.where(with_heading, _turned(ways.speeds, turn), ways.speeds) + _WALK * rng.normal(size=(count, 2))
-    new = np.where(rng.rand(count, 1) < _STOP, _HELD_SPEED, _NEW_SPEED) * rng.normal(size=(count, 2))
+    new = np.where(rng.rand(count, 1) < _STOP, HELD_SPEED, _NEW_SPEED) * rng.normal(size=(count, 2))
     changes, before = rng.rand(count, 1) < _CHANGE, duration * rng.rand(count, 1)
     speeds = np.where(changes, new, kept)
     steps = np.where(changes, before * ways.speeds + (duration - before) * new, duration / 2.0 * (ways.speeds + kept))

@@ -7,6 +7,9 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
+Draw = Tuple[np.ndarray, np.ndarray]
+"""Places (n, 2) [m] at the next node and speeds (n, 2) [m/s] there."""
+HELD_SPEED = 0.02  # m/s: of a vehicle that holds its place
 _ALIKE = 1.0  # m by which the ends of ways may differ that count as one
 _CENTRES = 100  # ways around whose ends the others are counted: enough that one is near the middle of each group
 _UNEVEN = 0.5  # share of the ways that must still count, or else they are drawn anew
@@ -65,10 +68,5 @@ class Ways(NamedTuple):
 
 def begun(count: int, place: np.ndarray, speed: float, rng: np.random.RandomState) -> Ways:
     """Return `count` ways that begin at `place` (2,): half of them at rest, half at about `speed` [m/s]."""
-    deviations = np.where(rng.rand(count, 1) < 0.5, _AT_REST, speed)
+    deviations = np.where(rng.rand(count, 1) < 0.5, HELD_SPEED, speed)
     return Ways(np.tile(place, (count, 1, 1)), deviations * rng.normal(size=(count, 2)), np.zeros(count))
-
-
-_AT_REST = 0.02  # m/s: a vehicle that holds its place
-Draw = Tuple[np.ndarray, np.ndarray]
-"""Places (n, 2) [m] at the next node and speeds (n, 2) [m/s] there."""
