@@ -12,7 +12,7 @@ ACROSS = 0.7  # m: deviation of an echo across the surface of another
 ALONG = 1.5  # m: and along it, where it tells less
 AROUND = 1.0  # m: of an echo that stands alone
 FARTHEST = 12.0  # squared deviations; echoes farther apart tell nothing
-_FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
+FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
 _GATE = 8.0  # m that two echoes may be apart on the mean path, besides twice the ways' spread
 
 _AT_ONCE = 200  # ways whose echoes are placed together: as many as fit into a processor's cache
@@ -54,7 +54,7 @@ def candidates_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Candida
     apart = heard[:, np.newaxis] - targets.places(mean, 0)
     near = np.hypot(apart[..., 0], apart[..., 1]) < gate
     near &= sources.lone[:, np.newaxis] == targets.lone
-    near &= sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > _FACING)
+    near &= sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > FACING)
     rows, columns = np.nonzero(near)
     return Candidates(np.searchsorted(rows, np.arange(len(sources) + 1)), columns)
 
