@@ -25,6 +25,10 @@ _JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "positio
 _DRIVER_JOINTS_IN = _subscribes(
     topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
 )
+_EMULATED_HEAD = (
+    _serves("~order_fault", "OrderFault", "makes a fault happen at once"),
+    _subscribes("tf", "", "`world -> ` frame of the head, if `head_frame` is set"),
+)
 _AS_POINTS = "also as PointCloud2 on `.../cloud`"
 
 DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second")
@@ -42,7 +46,7 @@ NODES: Dict[str, NodeDescription] = {
     "imagenex_852_emulator": NodeDescription(
         "An emulated Imagenex 852 on a pseudo-terminal, with faults at random or on request. "
         "See [the emulated head](imagenex_852_driver.md#the-emulated-head).",
-        (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
+        _EMULATED_HEAD,
     ),
     "ping360_driver": NodeDescription(
         "Driver of the Blue Robotics Ping360 sonar, over serial and UDP. See [the driver](ping360_driver.md).",
@@ -54,7 +58,7 @@ NODES: Dict[str, NodeDescription] = {
     "ping360_emulator": NodeDescription(
         "An emulated Ping360 on a pseudo-terminal or a UDP port, with faults at random or on request. "
         "See [the emulated head](ping360_driver.md#the-emulated-head).",
-        (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),),
+        _EMULATED_HEAD,
     ),
     "sonar_to_cloud": NodeDescription(
         "Assembles beams into scans (thesis 6.5.2). A beam waits until tf can place it at its own stamp. "
@@ -240,6 +244,7 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(topics.VELOCITY, "geometry_msgs/Twist", "velocity as the odometry measures it"),
             _publishes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "the same, if `drive` is SCRIPT"),
             _publishes(topics.CLOCK, "rosgraph_msgs/Clock", "simulated time"),
+            _publishes("tf", "", "`world -> true_sonar` and `world -> map`, if `head` is EMULATED"),
             _publishes("~world", "visualization_msgs/Marker", "triangles of the world; latched"),
             _publishes("~progress", "std_msgs/Float32", "completed share of the script, 0 to 1; latched"),
         ),
