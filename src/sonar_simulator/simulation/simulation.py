@@ -3,14 +3,14 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import chain
-from typing import Iterator, List, Optional, Sequence
+from typing import Iterator, List, Optional, Sequence, Union
 
 import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
 from sonar_simulator.vehicle.movement import Movement, VehicleState
-from sonar_simulator.vehicle.odometry import Estimate, Odometry
+from sonar_simulator.vehicle.odometry import Estimate, NoOdometry, Odometry
 from sonar_simulator.vehicle.scripted_vehicle import TiltCommand
 from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
 
@@ -34,6 +34,7 @@ class Instruments(Enum):
 
     DVL = "DVL"
     COMPASS = "COMPASS"
+    NONE = "NONE"
 
 
 @dataclass(frozen=True)
@@ -54,7 +55,8 @@ class SimulatorParameters(ParameterSet):
     )
     instruments: Instruments = parameter(
         Instruments.DVL,
-        "DVL: publishes odometry and its tf; COMPASS: publishes imu and depth instead; simulate_bag always has a DVL",
+        "DVL: publishes odometry and its tf; COMPASS: publishes imu and depth instead; NONE: publishes a tf in "
+        "which the vehicle stays where it starts",
         tunable=False,
     )
     head: Head = parameter(
@@ -128,7 +130,7 @@ class Simulation:
     def __init__(
         self,
         movement: Movement,
-        odometry: Odometry,
+        odometry: Union[Odometry, NoOdometry],
         sonar: Sonar,
         head: Optional[SonarHead],
         T_base_sonar: np.ndarray,
