@@ -41,6 +41,7 @@ class HeadInWorld(Protocol):
 Place = Callable[[], Optional[np.ndarray]]
 """Returns the (4, 4) T_world_sonar of now; None where it is not known."""
 
+_SPREAD = 0.15  # m: the length of a real head's usual pulse of 100 us
 DEFAULT_SONAR = SonarParameters()
 
 
@@ -59,7 +60,7 @@ class WorldEchoes:
         pose = self._place()
         if pose is None:
             return bytes(ping.bin_count)
-        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.max_range))
+        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.max_range, spread=_SPREAD))
         sonar = Sonar(self._caster, self._pattern, model, self._rng)
         factor = 10 ** (ping.gain_db / 20)
         strengths = sonar.ping(pose, ping.angle) * factor
