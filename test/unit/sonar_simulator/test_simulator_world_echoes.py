@@ -31,7 +31,9 @@ def source():
 
 
 def mean_range(echoes, max_range):
+    """Return the mean range of the strong echoes; those of noise are weaker."""
     strengths = np.frombuffer(echoes, dtype=np.uint8).astype(float)
+    strengths[strengths < 0.9 * strengths.max()] = 0.0
     return np.average((np.arange(len(strengths)) + 0.5) * max_range / len(strengths), weights=strengths)
 
 
