@@ -5,12 +5,12 @@ from enum import Enum
 
 import numpy as np
 
-from mlsm_manager.localisation.odometry_choice import OdometryChoice
+from mlsm_manager.localisation.odometry_choice import OdometryChoice, OdometryKind
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.kernels import Kernel, check_kernel
-from node_support.parameters import parameter
+from node_support.parameters import ParameterError, parameter
 
 # Deviations by which beams may be later than their stamps, and s of odometry that are worth waiting for.
 _LATE = 3.0
@@ -70,9 +70,14 @@ class JointParameters(OdometryChoice):
     )
 
     def check(self) -> None:
-        """Refuse what is not installed."""
+        """Refuse what is not installed, and parts of turns whose headings nobody reports."""
         if self.solver_kernel is SolverKernel.NUMBA:
             check_kernel("solver_kernel", Kernel.NUMBA)
+        if self.odometry is OdometryKind.NONE and self.scan_parts > 1:
+            raise ParameterError(
+                f"scan_parts = {self.scan_parts}: must be 1 with odometry = NONE, because parts of turns are placed "
+                "by ways that need a heading"
+            )
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.
@@ -91,18 +96,25 @@ class JointParameters(OdometryChoice):
                 world_scale_deviation=of_world,
                 sonar_delay_deviation=self.sonar_delay_deviation,
             ),
-            matching=SurfaceMatching(
-                range_deviation=self.echo_deviation,
-                normal_deviation=self.normal_deviation,
-                lone_quality=self.lone_quality,
-                scan_parts=self.scan_parts,
-                block_scans=self.block_scans * self.scan_parts,
-            ),
-            window=SolverWindow(
-                free_nodes=self.free_scans * self.scan_parts,
-                settled=0.0 if odometry.distance_deviation < _POOR_DISTANCES else _SETTLED,
-                lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
-                max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),
-            ),
+            matching=self._matching(),
+            window=self._window(odometry.distance_deviation),
             kernel=self.solver_kernel.resolved,
+        )
+
+    def _matching(self) -> SurfaceMatching:
+        return SurfaceMatching(
+            range_deviation=self.echo_deviation,
+            normal_deviation=self.normal_deviation,
+            lone_quality=self.lone_quality,
+            scan_parts=self.scan_parts,
+            block_scans=self.block_scans * self.scan_parts,
+        )
+
+    def _window(self, distance_deviation: float) -> SolverWindow:
+        """distance_deviation: relative, of the distances that the odometry reports; infinity where it reports none."""
+        return SolverWindow(
+            free_nodes=self.free_scans * self.scan_parts,
+            settled=0.0 if distance_deviation < _POOR_DISTANCES else _SETTLED,
+            lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
+            max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),
         )
