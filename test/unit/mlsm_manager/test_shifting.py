@@ -107,3 +107,9 @@ def test_shifts_that_no_vehicle_goes_are_not_tried():
     for turn, is_moved in ((TURN, True), (TURN / 100.0, False)):
         found = ShiftSearch(HEARD, turn * numbers, 1, refit=lambda path: path).climbed([resting])
         assert any(one.path.any() for one in found) == is_moved
+
+
+def test_a_run_that_heard_nothing_stays_as_it_is():
+    search = ShiftSearch(HEARD.selected(np.empty(0, dtype=int)), TURN * np.arange(SCANS + 1.0), 1, lambda path: path)
+    best = search.climbed([TRUE])[0]
+    assert (best.nats, best.path is TRUE) == (0.0, True)
