@@ -25,7 +25,8 @@ _JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "positio
 _DRIVER_JOINTS_IN = _subscribes(
     topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
 )
-_EMULATED_HEAD = (
+_OF_DRIVERS = (_DRIVER_JOINTS_IN, _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"))
+_OF_EMULATORS = (
     _serves("~order_fault", "OrderFault", "makes a fault happen at once"),
     _subscribes("tf", "", "`world -> ` frame of the head, if `head_frame` is set"),
 )
@@ -38,27 +39,21 @@ NODES: Dict[str, NodeDescription] = {
     "imagenex_852_driver": NodeDescription(
         "Driver of the Imagenex 852 sonar (thesis 4.1.3, 4.5.1). See [the driver](imagenex_852_driver.md), also for "
         "the log tools `play_852`, `record_852` and `convert_852`.",
-        (
-            _DRIVER_JOINTS_IN,
-            _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"),
-        ),
+        _OF_DRIVERS,
     ),
     "imagenex_852_emulator": NodeDescription(
         "An emulated Imagenex 852 on a pseudo-terminal, with faults at random or on request. "
         "See [the emulated head](imagenex_852_driver.md#the-emulated-head).",
-        _EMULATED_HEAD,
+        _OF_EMULATORS,
     ),
     "ping360_driver": NodeDescription(
         "Driver of the Blue Robotics Ping360 sonar, over serial and UDP. See [the driver](ping360_driver.md).",
-        (
-            _DRIVER_JOINTS_IN,
-            _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"),
-        ),
+        _OF_DRIVERS,
     ),
     "ping360_emulator": NodeDescription(
         "An emulated Ping360 on a pseudo-terminal or a UDP port, with faults at random or on request. "
         "See [the emulated head](ping360_driver.md#the-emulated-head).",
-        _EMULATED_HEAD,
+        _OF_EMULATORS,
     ),
     "sonar_to_cloud": NodeDescription(
         "Assembles beams into scans (thesis 6.5.2). A beam waits until tf can place it at its own stamp. "
@@ -76,9 +71,7 @@ NODES: Dict[str, NodeDescription] = {
                 topics.LASER_SCANS, "sensor_msgs/LaserScan", "every revolution, for gmapping, hector or slam_toolbox"
             ),
             _publishes(
-                topics.TURNS,
-                "sensor_msgs/PointCloud2",
-                "every revolution, x y z intensity time in the sonar's frame",
+                topics.TURNS, "sensor_msgs/PointCloud2", "every revolution, x y z intensity time in the sonar's frame"
             ),
             _publishes(
                 topics.POLAR_SCANS,
@@ -173,9 +166,7 @@ NODES: Dict[str, NodeDescription] = {
                 "every block at its true size; all at first, then what changed",
             ),
             _publishes(
-                topics.MAP_CLOUD,
-                "sensor_msgs/PointCloud2",
-                "mean, height, depth and number of points of every block",
+                topics.MAP_CLOUD, "sensor_msgs/PointCloud2", "mean, height, depth and number of points of every block"
             ),
             _publishes(topics.MAP_GRID, "nav_msgs/OccupancyGrid", "free, unknown and occupied from above"),
             _publishes(topics.MAP_OCTOMAP, "octomap_msgs/Octomap", "voxels; where these messages are installed"),
@@ -208,9 +199,7 @@ NODES: Dict[str, NodeDescription] = {
                 "orientation, x east or any fixed direction, z up; `heading_type` sets the type",
             ),
             _subscribes(
-                topics.DEPTH,
-                "PoseWithCovarianceStamped, Float64 or FluidPressure",
-                "depth; `depth_type` sets the type",
+                topics.DEPTH, "PoseWithCovarianceStamped, Float64 or FluidPressure", "depth; `depth_type` sets the type"
             ),
             _subscribes(
                 topics.MATCHED_ODOMETRY,

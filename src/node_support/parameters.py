@@ -11,8 +11,9 @@ From that declaration come the start-up check, the refusal at run time and the d
 
 import dataclasses
 import math
+from difflib import get_close_matches
 from enum import Enum
-from typing import Any, Callable, Dict, Mapping, Optional, Tuple, Type, TypeVar
+from typing import Any, Callable, Dict, Mapping, Optional, Sequence, Tuple, Type, TypeVar
 
 _METADATA_KEY = "parameter"
 Self = TypeVar("Self", bound="ParameterSet")
@@ -97,7 +98,7 @@ class ParameterSet:
         known = [field.name for field in dataclasses.fields(cls)]
         for key in values:
             if key not in known:
-                raise ParameterError(f"{key} = {values[key]!r}: no such parameter; there are {', '.join(known)}")
+                raise ParameterError(f"{key} = {values[key]!r}: no such parameter; {_names_like(key, known)}")
         return cls(**values)
 
     @classmethod
@@ -149,6 +150,12 @@ def with_defaults(**defaults: Any) -> Callable[[type], type]:
         return derived
 
     return changed
+
+
+def _names_like(key: str, known: Sequence[str]) -> str:
+    """Say which parameters there are, first the one that `key` may have meant."""
+    guess = get_close_matches(key, known, n=1)
+    return "".join(f"did you mean {name}? " for name in guess) + f"there are {', '.join(known)}"
 
 
 def _validated(field: dataclasses.Field, value: Any) -> Any:

@@ -1,10 +1,11 @@
-"""What the joint solver's estimates mean for the localiser: belief, correction and match."""
+"""What the joint solver's estimates mean for the localiser: belief, correction, match and update."""
 
 from typing import Optional
 
 import numpy as np
 
 from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.matching.problem.fading import Fading
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, Prior, prior_of
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
@@ -64,8 +65,18 @@ def path_times(start: float, end: float) -> np.ndarray:
     return np.linspace(start, end, PATH_POINTS)
 
 
-def match_of(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSession, seconds: float) -> MatchResult:
-    """Return what the solver found for a scan, as a matcher would say it. seconds: that it took."""
+def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float) -> ScanUpdate:
+    """Return what a run that has just taken a scan made of it. seconds: that it took."""
+    solver = session.solver
+    estimate = solver.estimates[-1]
+    if not estimate.comparisons:
+        return ScanUpdate(scan, None, True, belief, provisional=session.is_provisional)
+    result = _match(scan, estimate, belief, session, seconds)
+    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional)
+
+
+def _match(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSession, seconds: float) -> MatchResult:
+    """Return what the solver found for a scan, as a matcher would say it."""
     times = path_times(min(scan.start, estimate.time - 1e-3), estimate.time)
     return MatchResult(
         status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,

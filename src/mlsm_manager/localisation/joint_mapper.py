@@ -5,26 +5,24 @@ from typing import List, Mapping, Optional
 
 import numpy as np
 
-from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.joint_belief import (
     belief_at,
     belief_of,
     belief_of_match,
     correction_of,
-    match_of,
     path_times,
     prior_at,
+    update_of,
 )
 from mlsm_manager.localisation.joint_clouds import JointClouds
 from mlsm_manager.localisation.joint_maps import JointMaps
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
-from mlsm_manager.localisation.map_updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.localisation.uncarved_clouds import UncarvedClouds
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.matching.problem.result import MatchResult
@@ -37,8 +35,6 @@ from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry.planar import composed, transformed
-
-_ORIGIN = np.zeros(3)
 
 
 class JointMapper(ShowsMaps):
@@ -76,11 +72,9 @@ class JointMapper(ShowsMaps):
         self._end_session()
         self.belief: Optional[Belief] = None
         self._expected: Optional[Belief] = None
-        self.correction = _ORIGIN
+        self.correction = np.zeros(3)
         self._start: Optional[np.ndarray] = None
-        self._history = CorrectionHistory()
         self._clouds = JointClouds(self._maps.shown)
-        self._uncarved = UncarvedClouds()
 
     @property
     def lookahead(self) -> float:
@@ -194,10 +188,7 @@ class JointMapper(ShowsMaps):
         """Put a cloud into the map that is shown, or let it wait for the scan of its time; see JointClouds."""
         if self.matching:
             return self._clouds.take(cloud, self._session)
-        origins = self._history.origins(cloud.times, self._sonar_in_base)
-        if origins is None:
-            self._uncarved.append(transformed(self.correction, cloud.points), cloud.times)
-        return self._clouds.place(cloud, self.correction, origins)
+        return self._clouds.place(cloud, self.correction, self._sonar_in_base)
 
     def take_placed(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""
@@ -207,17 +198,12 @@ class JointMapper(ShowsMaps):
         """Insert or carve the next cloud that waited, if its time is known now; None when there is none."""
         known_until = -np.inf if self._session is None else self._session.known_until
         cloud = self._clouds.next_until(known_until if self.matching else np.inf)
-        return self._carve_waiting() if cloud is None else self.take_cloud(cloud)
-
-    def _carve_waiting(self) -> Optional[CloudUpdate]:
-        """Carve the next cloud that was inserted before the scan of its time came; None when there is none.
-
-        A run does not tell where the vehicle was by the odometry, with which such a cloud was placed.
-        """
+        if cloud is not None:
+            return self.take_cloud(cloud)
         if self.matching:
-            self._uncarved.clear()
-        beams = self._uncarved.next_known(self._history, self._sonar_in_base)
-        return None if beams is None else CloudUpdate(NOTHING_INSERTED, False, 0, self._maps.shown.carve(*beams))
+            # A run does not tell where the vehicle was by the odometry, with which such clouds were placed.
+            self._clouds.forget_uncarved()
+        return self._clouds.carve_next(self._sonar_in_base)
 
     def follow(self, track: Track, time: float) -> None:
         """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
@@ -229,7 +215,9 @@ class JointMapper(ShowsMaps):
 
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
-        session = self._session or self._new_session()
+        session = self._session
+        if session is None:
+            session = self._maps.begun(self.parameters, self._sonar_in_base, self.correction.copy(), self._start)
         session.add(scan)
         return self._taken(scan, session, start)
 
@@ -239,11 +227,7 @@ class JointMapper(ShowsMaps):
         self._maps.matched.add(TimedPoints.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
-        estimate = session.solver.estimates[-1]
-        if not estimate.comparisons:
-            return ScanUpdate(scan, None, True, self.belief, provisional=session.is_provisional)
-        result = match_of(scan, estimate, self.belief, session, perf_counter() - start)
-        return ScanUpdate(scan, result, True, self.belief, session.solver.found, session.is_provisional)
+        return update_of(scan, session, self.belief, perf_counter() - start)
 
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]
@@ -254,15 +238,10 @@ class JointMapper(ShowsMaps):
         self._end_session()
         pose = composed(self.correction, scan.reference_pose)
         self.belief = belief_at(scan.reference_time, pose, self.errors)
-        times = path_times(scan.start, scan.reference_time)
-        self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
-        origins = self._history.origins(scan.times, self._sonar_in_base)
+        self._clouds.learn_path(path_times(scan.start, scan.reference_time), self.correction, scan.track)
+        origins = self._clouds.origins(scan.times, self._sonar_in_base)
         self._maps.matched.insert_cloud(transformed(self.correction, scan.points), scan.times, origins)
         return ScanUpdate(scan, None, True, self.belief)
-
-    def _new_session(self) -> JointSession:
-        known = self._matched_map.blocks.mean[:, :2]
-        return JointSession.begun(self.parameters, self._sonar_in_base, self.correction.copy(), self._start, known)
 
     def _end_session(self, until: float = np.inf) -> None:
         """End the run; what it heard after `until` [s] is forgotten."""

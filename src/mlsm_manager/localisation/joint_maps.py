@@ -1,6 +1,6 @@
 """The two maps of a joint run, drawn from its keyframes."""
 
-from typing import Dict, Mapping
+from typing import Dict, Mapping, Optional
 
 import numpy as np
 
@@ -49,6 +49,14 @@ class JointMaps:
             session.T_map_odom, session.solver.log.sonar_in_base, session.scans, session.solver.stored(),
             self.shown.moving, self.shown.covered, self.matched.covered,
         ).arrays()  # fmt: skip
+
+    def begun(
+        self, parameters: MultiViewParameters, sonar_in_base: np.ndarray, T_map_odom: np.ndarray,
+        start: Optional[np.ndarray],
+    ) -> JointSession:  # fmt: skip
+        """Return a new run among the surfaces of the matched map; see JointSession.begun."""
+        known = self.matched.map.blocks.mean[:, :2]
+        return JointSession.begun(parameters, sonar_in_base, T_map_odom, start, known)
 
     def resumed(self, run: StoredRun, parameters: MultiViewParameters) -> JointSession:
         """Return a stored run that goes on, and draw it in these maps, which were stored with it.

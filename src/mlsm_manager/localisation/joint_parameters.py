@@ -96,18 +96,25 @@ class JointParameters(OdometryChoice):
                 world_scale_deviation=of_world,
                 sonar_delay_deviation=self.sonar_delay_deviation,
             ),
-            matching=SurfaceMatching(
-                range_deviation=self.echo_deviation,
-                normal_deviation=self.normal_deviation,
-                lone_quality=self.lone_quality,
-                scan_parts=self.scan_parts,
-                block_scans=self.block_scans * self.scan_parts,
-            ),
-            window=SolverWindow(
-                free_nodes=self.free_scans * self.scan_parts,
-                settled=0.0 if odometry.distance_deviation < _POOR_DISTANCES else _SETTLED,
-                lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
-                max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),
-            ),
+            matching=self._matching(),
+            window=self._window(odometry.distance_deviation),
             kernel=self.solver_kernel.resolved,
+        )
+
+    def _matching(self) -> SurfaceMatching:
+        return SurfaceMatching(
+            range_deviation=self.echo_deviation,
+            normal_deviation=self.normal_deviation,
+            lone_quality=self.lone_quality,
+            scan_parts=self.scan_parts,
+            block_scans=self.block_scans * self.scan_parts,
+        )
+
+    def _window(self, distance_deviation: float) -> SolverWindow:
+        """distance_deviation: relative, of the distances that the odometry reports; infinity where it reports none."""
+        return SolverWindow(
+            free_nodes=self.free_scans * self.scan_parts,
+            settled=0.0 if distance_deviation < _POOR_DISTANCES else _SETTLED,
+            lookahead=min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD),
+            max_frozen_blocks=max(_FROZEN_SCANS // self.block_scans, 1),
         )

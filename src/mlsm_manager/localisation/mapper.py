@@ -149,7 +149,10 @@ class Mapper(ShowsMaps):
         """Insert or carve the next cloud that waited, if its time is known now; None when there is none."""
         if self._waiting and not (self.matching and self._waiting[0].end > self._history.end):
             return self.take_cloud(self._waiting.popleft())
-        return self._carve_waiting()
+        if self.matching:
+            # Corrections that scans are matched with are not those that such a cloud was placed with.
+            self._uncarved.clear()
+        return self._uncarved.carve_next(self._history, self._sonar_in_base, self._carve)
 
     def follow(self, track: Track, time: float) -> None:
         """Predict the belief at a later `time` by the odometry, after a long time without scans."""
@@ -163,16 +166,6 @@ class Mapper(ShowsMaps):
             self._uncarved.append(points, times)
             return CloudUpdate(report, False, unplaced)
         return CloudUpdate(report, False, unplaced, self._carve(points, times, origins))
-
-    def _carve_waiting(self) -> Optional[CloudUpdate]:
-        """Carve the next cloud that was inserted before the scan of its time came; None when there is none.
-
-        While scans are matched their corrections are not those that such a cloud was placed with.
-        """
-        if self.matching:
-            self._uncarved.clear()
-        beams = self._uncarved.next_known(self._history, self._sonar_in_base)
-        return None if beams is None else CloudUpdate(NOTHING_INSERTED, False, 0, self._carve(*beams))
 
     def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
         if self.settings.carver is None:

@@ -65,18 +65,20 @@ class OdometryChoice(ParameterSet):
         0.002, "THRUSTERS: random walk of the current", unit="m/s/sqrt(s)", low=0.0, high=1.0, tunable=False
     )
     start_speed_deviation: float = parameter(
-        0.3, "HEADING, NONE: standard deviation of the speed ahead when matching begins; 0.02 for a standing start",
-        unit="m/s", low=0.0, high=5.0, tunable=False,
+        0.3,
+        "HEADING, HOVERING, NONE: standard deviation of the speed ahead when matching begins; 0.02 for a standing "
+        "start", unit="m/s", low=0.0, high=5.0, tunable=False,
     )  # fmt: skip
     travel_walk: float = parameter(
-        0.005, "HEADING, NONE: random walk of the speed of travel, around which the speed ahead changes",
+        0.005, "HEADING, HOVERING, NONE: random walk of the speed of travel, around which the speed ahead changes",
         unit="m/s/sqrt(s)", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
     slip_deviation: float = parameter(
-        0.07, "HEADING, NONE: standard deviation of the speed sideways", unit="m/s", low=0.001, high=5.0, tunable=False
-    )
+        0.07, "HEADING, HOVERING, NONE: standard deviation of the speed sideways",
+        unit="m/s", low=0.001, high=5.0, tunable=False,
+    )  # fmt: skip
     slip_time: float = parameter(
-        20.0, "HEADING, NONE: how long a speed sideways lasts", unit="s", low=1.0, high=1e5, tunable=False
+        20.0, "HEADING, HOVERING, NONE: how long a speed sideways lasts", unit="s", low=1.0, high=1e5, tunable=False
     )
     turn_rate_time: float = parameter(
         10.0, "NONE: how long a turn rate lasts", unit="s", low=1.0, high=1e5, tunable=False

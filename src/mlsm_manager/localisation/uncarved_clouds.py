@@ -1,20 +1,16 @@
 """Clouds that came before the scan of their time: they are in the map, but where they were heard is not known yet."""
 
 from collections import deque
-from typing import Deque, NamedTuple, Optional
+from typing import Callable, Deque, Optional
 
 import numpy as np
 
 from mlsm_manager.localisation.correction_history import CorrectionHistory
-from mlsm_manager.localisation.map_updates import MOST_WAITING
+from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate
+from mlsm_manager.surface_map.free_space.carving import CarveReport
 
-
-class PlacedBeams(NamedTuple):
-    """points: (n, 4) in map. times: (n,) s of their beams. origins: (n, 2) m in map, where they were heard from."""
-
-    points: np.ndarray
-    times: np.ndarray
-    origins: np.ndarray
+Carve = Callable[[np.ndarray, np.ndarray, np.ndarray], Optional[CarveReport]]
+"""Takes points (n, 4) in map, times (n,) s of their beams, and origins (n, 2) m in map, where they were heard from."""
 
 
 class UncarvedClouds:
@@ -32,8 +28,8 @@ class UncarvedClouds:
         """Forget them all: their places are not known any more."""
         self._waiting.clear()
 
-    def next_known(self, history: CorrectionHistory, sonar_in_base: np.ndarray) -> Optional[PlacedBeams]:
-        """Return the next cloud whose time the history knows, and forget it; None where there is none.
+    def carve_next(self, history: CorrectionHistory, sonar_in_base: np.ndarray, carve: Carve) -> Optional[CloudUpdate]:
+        """Carve with the next cloud whose time the history knows, and forget it; None where there is none.
 
         sonar_in_base: (2,) m. Clouds from before the history begins are forgotten: it will never know them.
         """
@@ -41,5 +37,5 @@ class UncarvedClouds:
             points, times = self._waiting.popleft()
             origins = history.origins(times, sonar_in_base)
             if origins is not None:
-                return PlacedBeams(points, times, origins)
+                return CloudUpdate(NOTHING_INSERTED, False, 0, carve(points, times, origins))
         return None

@@ -17,6 +17,7 @@ from recordings.reading.parameters import ReadingParameters
 from recordings.vehicle.motion import MotionSource
 
 _EPILOG = "docs/map_bag.md describes the options, what is written, and how a vehicle is calibrated by it."
+_USAGE = "map_bag BAG [BAG ...] --out DIR [options]\n       map_bag BAG --inspect [options]"
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
@@ -42,9 +43,10 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
 
 
 def _parser() -> CommandLine:
-    parser = CommandLine("map_bag", description="Map a recording without a ROS master.", epilog=_EPILOG)
+    description = "Map a recording without a ROS master."
+    parser = CommandLine("map_bag", usage=_USAGE, description=description, epilog=_EPILOG)
     parser.add_argument(
-        "bags", type=Path, nargs="+", metavar="bag",
+        "bags", type=Path, nargs="+", metavar="BAG",
         help="recording: a bag of ROS 1 or ROS 2, or the log of a sonar's maker; each further one starts in the map of "
         "those before",
     )  # fmt: skip
@@ -91,7 +93,7 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     if options.check and not options.refine:
         parser.error("--check repeats the fit of --refine; give both")
     if options.out is None and not options.inspect:
-        parser.error("the following arguments are required: --out")
+        parser.error("--out is required, unless --inspect is given")
     if options.vehicle and len(options.bags) > 1:
         parser.error("--vehicle belongs to one recording, not to several")
 

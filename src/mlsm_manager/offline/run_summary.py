@@ -30,10 +30,11 @@ def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: 
 
 def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     """Return what map_bag prints at its end."""
+    alone = summary["scans"] - summary["matched"] - summary["rejected"]
     lines = [
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
-        f"{summary['blocks']} blocks; {summary['seconds']} s, {summary['times_real_time']} times real time with "
-        f"{summary['solver_kernel'].lower()}",
+        f"{alone} with nothing to match; {summary['blocks']} blocks; {summary['seconds']} s, "
+        f"{summary['times_real_time']} times real time with {summary['solver_kernel'].lower()}",
         f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
     ]
     for name in (ODOMETRY, CORRECTED, REFINED):

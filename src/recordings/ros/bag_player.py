@@ -112,7 +112,8 @@ def read_messages(options: Namespace) -> List[Played]:
     except rosbag.ROSBagUnindexedException:
         raise StartError(f"{options.bag}: not indexed, the recording was cut off; run: rosbag reindex") from None
     except OSError as error:
-        raise StartError(f"{options.bag}: {error.strerror or error}") from None
+        advice = "" if options.bag.is_absolute() else "; give the whole path, since roslaunch starts nodes elsewhere"
+        raise StartError(f"{options.bag.absolute()}: {error.strerror or error}{advice}") from None
     except (rosbag.ROSBagException, EOFError, ValueError) as error:
         raise StartError(f"{options.bag}: not a bag, or damaged: {error}") from None
     if not played:

@@ -46,12 +46,9 @@ class SonarToCloud:
         self._newest_beam = PointsPublisher(topics.NEWEST_BEAM)
         self._revolutions = RevolutionPublisher(self.health, polar_sink)
         parameters = self._live.current
+        mount = SonarMount(parameters, self.health.name)
         self._filter = TransformFilter(
-            parameters.target_frame,
-            self.health,
-            self._forget_scan,
-            parameters.stamp_tolerance,
-            SonarMount(parameters, self.health.name),
+            parameters.target_frame, self.health, self._forget_scan, parameters.stamp_tolerance, mount
         )
         self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)

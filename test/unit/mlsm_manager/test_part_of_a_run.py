@@ -9,6 +9,7 @@ from mlsm_manager.multi_view.solve.batch_solver import solved, solved_part
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.unknowns.state import DELAY, RUN_COLUMNS
 
+pytestmark = pytest.mark.long
 FIRST = 8
 SCANS = tour(24, direction=0.12, delay=0.6).scans
 

@@ -12,6 +12,7 @@ from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.refitting import displaced, other_settings, refitted_verdicts
 from node_support.geometry.planar import inverse, transformed
 
+pytestmark = pytest.mark.long
 PITCH = 2.5  # m, hardly more than the cut within which points are compared
 WALLS = tour(24, direction=0.12, delay=0.6).scans
 

@@ -46,10 +46,10 @@ def test_a_bad_value_is_refused_with_key_value_and_what_is_allowed(values, text)
     assert str(refused.value) == text
 
 
-def test_an_unknown_key_is_refused_with_the_keys_there_are():
+def test_an_unknown_key_is_refused_with_the_one_it_resembles_and_all_there_are():
     with pytest.raises(ParameterError) as refused:
         ExampleParameters.from_mapping({"raduis": 2.0})
-    text = "raduis = 2.0: no such parameter; there are radius, count, fast, frame, color, inner"
+    text = "raduis = 2.0: no such parameter; did you mean radius? there are radius, count, fast, frame, color, inner"
     assert str(refused.value) == text
 
 

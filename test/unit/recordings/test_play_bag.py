@@ -84,3 +84,9 @@ def test_a_file_that_is_no_bag_is_refused_in_one_line(tmp_path):
     path.write_text("no bag")
     with pytest.raises(StartError, match="not a bag, or damaged"):
         _read(path)
+
+
+def test_a_relative_path_that_is_not_there_is_told_whole(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(StartError, match=f"^{tmp_path}/no.bag: No such file or directory; give the whole path"):
+        _read("no.bag")

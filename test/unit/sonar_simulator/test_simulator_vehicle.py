@@ -85,7 +85,7 @@ def test_a_vehicle_is_still_while_it_waits_and_outside_the_script_only():
     [
         ([{"wait": 1.0}, {"x": "far"}], r"entry 2: x = 'far': must be a number"),
         ([{"x": 1.0, "speed": 0}], r"entry 1: speed = 0: must be a number from 0.001 m/s"),
-        ([{"x": 1.0, "sped": 1}], r"entry 1: sped = 1: no such parameter; there are x, y"),
+        ([{"x": 1.0, "sped": 1}], r"entry 1: sped = 1: no such parameter; did you mean speed\? there are x, y"),
         ([{"wait": -1}], r"entry 1: wait = -1: must be a number from 0 s"),
         ([{"wait": 1, "x": 2}], r"entry 1: x = 2: no such parameter; there are wait"),
         ([{"x": math.nan}], r"entry 1: x = nan"),

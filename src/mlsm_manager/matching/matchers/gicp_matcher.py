@@ -5,7 +5,7 @@ It starts from the prior's pose and finds a pose only: it neither searches nor e
 
 import importlib
 import time
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -27,6 +27,15 @@ _MOST_ITERATIONS = 50
 _PLANAR = np.array([3, 4, 2])
 # m: the deviation of an echo that meets its block exactly, so that the covariance can be inverted.
 _LEAST_ERROR = 1e-3
+
+
+class _Found(NamedTuple):
+    """correction: (3,) T_map_odom. covariance: (3, 3) of the pose. error: m, root mean square. used: echoes."""
+
+    correction: np.ndarray
+    covariance: np.ndarray
+    error: float
+    used: int
 
 
 class GicpMatcher:
@@ -62,7 +71,7 @@ class GicpMatcher:
         T_map_expected = composed(composed(origin, moved), inverse(origin))
         status, reason = self._judge(composed(T_map_expected, expected), expected, covariance, prior)
         correction = composed(T_map_expected, prior.correction)
-        return _result(status, reason, scan, prior, correction, covariance, found.inlier_rmse, used, start)
+        return _result(status, reason, scan, prior, _Found(correction, covariance, found.inlier_rmse, used), start)
 
     def _register(self, points: np.ndarray, target: Blocks, origin: np.ndarray) -> tuple:
         """Return Open3D's result and the (3, 3) information of x, y, yaw for echoes that err by 1 m."""
@@ -111,45 +120,26 @@ def _planar(transformation: np.ndarray) -> np.ndarray:
 
 
 def _unmatched(status: MatchStatus, reason: str, scan: Scan, prior: Prior, start: float) -> MatchResult:
-    return _result(status, reason, scan, prior, prior.correction, prior.covariance[POSE, POSE], np.inf, 0, start)
+    return _result(
+        status, reason, scan, prior, _Found(prior.correction, prior.covariance[POSE, POSE], np.inf, 0), start
+    )
 
 
-def _result(
-    status: MatchStatus,
-    reason: str,
-    scan: Scan,
-    prior: Prior,
-    correction: np.ndarray,
-    covariance: np.ndarray,
-    error: float,
-    used: int,
-    start: float,
-) -> MatchResult:
-    """Return the result for a (3,) T_map_odom with the (3, 3) covariance of the pose; the rest stays the prior's.
+def _result(status: MatchStatus, reason: str, scan: Scan, prior: Prior, found: _Found, start: float) -> MatchResult:
+    """Return the result of a match that began at `start` [s]; besides the pose the state stays the prior's.
 
     Open3D does not tell the number of its iterations: 0.
     """
     beam_times = np.unique(np.append(scan.times, scan.reference_time))
-    beam_poses = composed(correction, scan.track.at(beam_times))
-    pose = composed(correction, scan.reference_pose)
+    pose = composed(found.correction, scan.reference_pose)
     pose[2] = wrapped(pose[2])
     state = prior.covariance.copy()
     if status is MatchStatus.CONVERGED:
         state[POSE, :] = state[:, POSE] = 0.0
-        state[POSE, POSE] = covariance
+        state[POSE, POSE] = found.covariance
     return MatchResult(
-        status=status,
-        pose=pose,
-        velocity=scan.track.velocity_at(scan.reference_time) + prior.rate,
-        covariance=state[:6, :6],
-        rate=prior.rate,
-        motion=prior.motion,
-        state_covariance=state,
-        error=float(error),
-        points_used=used,
-        iterations=0,
-        seconds=time.perf_counter() - start,
-        beam_times=beam_times,
-        beam_poses=beam_poses,
-        reason=reason,
-    )
+        status=status, pose=pose, velocity=scan.track.velocity_at(scan.reference_time) + prior.rate,
+        covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state,
+        error=float(found.error), points_used=found.used, iterations=0, seconds=time.perf_counter() - start,
+        beam_times=beam_times, beam_poses=composed(found.correction, scan.track.at(beam_times)), reason=reason,
+    )  # fmt: skip

@@ -9,7 +9,6 @@ from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.multi_view.compare.islands import Islands
 from mlsm_manager.multi_view.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.multi_view.judge.misfit import misfit_variances
-from mlsm_manager.multi_view.measured.growing import GrowingArray
 from mlsm_manager.multi_view.measured.run_log import RunLog
 from mlsm_manager.multi_view.measured.scan_parts import parts_of
 from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
@@ -19,6 +18,7 @@ from mlsm_manager.multi_view.priors import run_mean
 from mlsm_manager.multi_view.search.motion_search import searched_node
 from mlsm_manager.multi_view.search.place_search import Whereabouts, island_place, silent_scans, whereabouts
 from mlsm_manager.multi_view.solve.live_window import LiveWindow
+from mlsm_manager.multi_view.solve.solved_nodes import SolvedNodes
 from mlsm_manager.multi_view.solve.stacking import stacked, unstacked
 from mlsm_manager.multi_view.unknowns.state import RUN_COLUMNS, State
 from mlsm_manager.multi_view.ways.way_nodes import nodes_on_ways
@@ -53,11 +53,7 @@ class LiveSolver:
         self.log = RunLog(sonar_in_base)
         self.odometry = parameters.odometry
         self.estimates: List[LiveEstimate] = []
-        self._nodes = GrowingArray(self.odometry.width)
-        self._nodes.extend(self.odometry.first_node()[np.newaxis])
-        self._node_covariances = GrowingArray(3, 3)
-        self._run = run_mean(parameters.sonar)
-        self._misfits = GrowingArray()
+        self._nodes = SolvedNodes(self.odometry.first_node(), run_mean(parameters.sonar))
         self._start, self._known = start, known
         self.islands = Islands(np.empty(0))
         self.search: Optional[Whereabouts] = None
@@ -67,10 +63,7 @@ class LiveSolver:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
         return {
             "odometry": _name_of(self.odometry),
-            "nodes": self._nodes.values.copy(),
-            "node_covariances": self._node_covariances.values.copy(),
-            "run_unknowns": self._run.copy(),
-            "misfits": self._misfits.values.copy(),
+            **self._nodes.stored(),
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             "islands": self.islands.numbers,
@@ -91,33 +84,29 @@ class LiveSolver:
         Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
         """
         if not np.array_equal(stored["odometry"], _name_of(parameters.odometry)):
-            raise ValueError("it was stored with another odometry profile")
+            name = stored["odometry"].tobytes().decode("ascii", "replace")
+            raise ValueError(
+                f"it was stored with another odometry profile: {name}, not {type(parameters.odometry).__name__}"
+            )
         start, known = stored["start"], stored["known"]
         solver = cls(
             parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None
         )
         for scan in scans:
             solver._append(scan)
-        nodes, covariances = stored["nodes"], stored["node_covariances"]
-        if nodes.shape != (solver.log.scan_count + 1, solver.odometry.width) or covariances.shape[1:] != (3, 3):
-            raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {len(scans)} scans")
-        solver._nodes.replace_from(0, nodes)
-        solver._node_covariances.replace_from(0, covariances)
-        solver._run[:] = stored["run_unknowns"]
-        solver._misfits.replace_from(0, stored["misfits"])
+        solver._nodes.restore(stored, solver.log.scan_count)
         solver.islands = Islands(stored["islands"])
         solver._ways = None if solver._ways is None else solver._ways.resumed(solver.log, stored)
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
-        if len(solver.estimates) != solver.log.scan_count:
-            raise ValueError(f"{len(solver.estimates)} estimates for {len(scans)} scans")
-        if len(stored["islands"]) != solver.log.scan_count:
-            raise ValueError(f"{len(stored['islands'])} islands for {len(scans)} scans")
+        for name, found in (("estimates", solver.estimates), ("islands", stored["islands"])):
+            if len(found) != solver.log.scan_count:
+                raise ValueError(f"{len(found)} {name} for {solver.log.scan_count} scans")
         return solver
 
     @property
     def state(self) -> State:
         """The unknowns as they are known now; a view that the next scan makes invalid."""
-        return State(self._nodes.values, self._run)
+        return self._nodes.state
 
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
@@ -127,8 +116,7 @@ class LiveSolver:
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
-        scans, nodes, run = self.log.scan_count, self._nodes.values.copy(), self._run.copy()
-        ways = self._ways
+        scans, before, ways = self.log.scan_count, self.state.copy(), self._ways
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self._append(scan)
@@ -137,8 +125,7 @@ class LiveSolver:
             raise
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
-            self._nodes.replace_from(0, nodes)
-            self._run[:] = run
+            self._nodes.take_back(before)
             self._ways = ways
             self._shorten(scans)
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
@@ -170,14 +157,14 @@ class LiveSolver:
         """Return what is known of the scans of the log that have no estimates yet."""
         for node in range(len(self._nodes), self.log.scan_count + 1):
             motion = self.log.node_motion(np.array([node - 1, node]))
-            self._nodes.extend(self.odometry.advanced(self._nodes.values[-1:], motion[:1], motion[1:]))
+            self._nodes.extend(self.odometry.advanced(self.state.nodes[-1:], motion[:1], motion[1:]))
         self.search = None
         self._search()
         window = self._fitted()
         if self.islands.is_apart and self._join(window.estimates(1)[0]):
             window = self._fitted()
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
-        self._node_covariances.replace_from(window.oldest, covariances)
+        self._nodes.covariances.replace_from(window.oldest, covariances)
         variance = self._misfit_variance()
         return [replace(estimate, misfit_variance=variance) for estimate in estimates]
 
@@ -185,13 +172,13 @@ class LiveSolver:
         """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
         first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
         newest = misfit_variances(self.log, self.odometry, self.state, self.parameters.matching, first)
-        self._misfits.replace_from(first, newest)
-        return float(self._misfits.values.sum()) + (0.0 if self._ways is None else self._ways.variance)
+        self._nodes.misfits.replace_from(first, newest)
+        return float(self._nodes.misfits.values.sum()) + (0.0 if self._ways is None else self._ways.variance)
 
     def _fitted(self) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution."""
         window = LiveWindow(
-            self.log, self.odometry, self.parameters, self.state, self.estimates, self._node_covariances.values,
+            self.log, self.odometry, self.parameters, self.state, self.estimates, self._nodes.covariances.values,
             self._start, self._known, self.islands,
         )  # fmt: skip
         cut = self.parameters.matching.wide_cut
@@ -231,13 +218,12 @@ class LiveSolver:
         if self._ways is not None:
             self._ways = self._ways.followed(self.log)
             is_told = self._known is not None or self._start is not None
-            nodes = nodes_on_ways(self._ways, self.log, self.state.nodes, self.parameters, is_told)
-            self._nodes.replace_from(self.log.scan_count + 1 - len(nodes), nodes)
+            self._nodes.replace_newest(nodes_on_ways(self._ways, self.log, self.state.nodes, self.parameters, is_told))
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
         first = self.islands.start
-        self._nodes.values[-1] = searched_node(
+        self.state.nodes[-1] = searched_node(
             self.log, self.odometry, self.state, covariance, self.parameters.matching, first
         )
 
@@ -252,7 +238,7 @@ class LiveSolver:
 
     def _move(self, moves: np.ndarray) -> None:
         """Move the newest nodes by `moves` (k, width)."""
-        self._nodes.values[-len(moves) :] += moves
+        self.state.nodes[-len(moves) :] += moves
 
 
 def _name_of(odometry: OdometryModel) -> np.ndarray:

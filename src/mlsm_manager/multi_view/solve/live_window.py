@@ -1,10 +1,10 @@
 """The problem of one scan: the newest nodes against each other and against the frozen map."""
 
-from typing import List, Optional, Sequence, Tuple
+from typing import Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.compare.association import Neighbours, pairs_of
+from mlsm_manager.multi_view.compare.association import Neighbours, Pairs, pairs_of
 from mlsm_manager.multi_view.compare.comparing import Comparing
 from mlsm_manager.multi_view.compare.comparisons import add_comparisons
 from mlsm_manager.multi_view.compare.islands import Islands
@@ -16,7 +16,7 @@ from mlsm_manager.multi_view.measured.run_log import RunLog
 from mlsm_manager.multi_view.motion.odometry_model import OdometryModel, frozen_deviations
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placing.estimate import LiveEstimate
-from mlsm_manager.multi_view.placing.placement import place
+from mlsm_manager.multi_view.placing.placement import PlacedPoints, place
 from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.multi_view.solve.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.multi_view.unknowns.normal_equations import DenseSolution, NormalEquations
@@ -50,14 +50,9 @@ class LiveWindow:
         first = max(0, last - parameters.window.free_nodes)
         self._scans_per_block = parameters.matching.block_scans
         self._recent = first // self._scans_per_block * self._scans_per_block
+        around = log.node_poses(last)[:2] + state.nodes[last, :2]
         self._frozen = nearest_blocks(
-            log,
-            odometry,
-            state,
-            first // self._scans_per_block,
-            log.node_poses(last)[:2] + state.nodes[last, :2],
-            parameters,
-            self._comparing.placed,
+            log, odometry, state, first // self._scans_per_block, around, parameters, self._comparing.placed
         )
         self._layout = Layout(first, last, odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
@@ -136,6 +131,7 @@ class LiveWindow:
         return mean, deviations, self._anchor.run, of_run
 
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
+        """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
         matching = self._parameters.matching
         rows = self._log.rows(self._recent, self._layout.last)
         recent = place(self._log, self._odometry, self._state, rows, self._comparing.placed)
@@ -143,18 +139,7 @@ class LiveWindow:
         weak = WeakDirections.of((frozen, recent), matching)
         frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        if self._lists is None:
-            self._lists = tuple(
-                self._comparing.neighbours(targets, matching.block_scans) for targets in (frozen, recent)
-            )
-        to_frozen, to_recent = (
-            pairs_of(lists, sources, targets, cut, matching, self._comparing.weighed)
-            for lists, targets in zip(self._lists, (frozen, recent))
-        )
-        to_frozen, to_recent = (
-            self._islands.within(pairs, sources, targets)
-            for pairs, targets in ((to_frozen, frozen), (to_recent, recent))
-        )
+        to_frozen, to_recent = self._compared(sources, (frozen, recent), cut)
         met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
         summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
         if self._known is not None:
@@ -166,6 +151,17 @@ class LiveWindow:
         self._met = tuple(met)
         by = self._comparing.summed
         return sum(add_comparisons(equations, self._layout, *some, matching, cut, by) for some in summed)
+
+    def _compared(
+        self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
+    ) -> Iterator[Pairs]:
+        """Compare `sources` with frozen and recent points, whose neighbours are looked up once for all steps."""
+        matching = self._parameters.matching
+        if self._lists is None:
+            self._lists = tuple(self._comparing.neighbours(targets, matching.block_scans) for targets in surfaces)
+        for lists, targets in zip(self._lists, surfaces):
+            pairs = pairs_of(lists, sources, targets, cut, matching, self._comparing.weighed)
+            yield self._islands.within(pairs, sources, targets)
 
     def _move(self, step: np.ndarray) -> None:
         nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)
