@@ -10,6 +10,7 @@ from mlsm_manager.multi_view.compare.islands import MAP
 from mlsm_manager.multi_view.placing.turns import Turns
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 
+pytestmark = pytest.mark.long
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
 
 

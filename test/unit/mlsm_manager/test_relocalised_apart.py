@@ -10,6 +10,7 @@ from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
 
+pytestmark = pytest.mark.long
 HEARD, SILENT, AFTER = 10, 5, 3
 CARRIED = 150.0
 """s: the vehicle is carried in the silence to where it would have been so much later, farther than it goes itself."""
