@@ -6,8 +6,9 @@ import numpy as np
 
 from mlsm_manager.multi_view.judge.continuity import shares_heard_before
 from mlsm_manager.multi_view.placing.path import NodePath
+from mlsm_manager.multi_view.shifting.echo_agreement import agreement
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.ways.way_search import agreement_of
+from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.self_check.continuity import scans_go_on
 
 _WORTH_TRYING = 0.75
@@ -27,7 +28,8 @@ def may_strafe(ahead: Optional[LiveSolver]) -> bool:
 def strafes(ahead: LiveSolver, strafing: LiveSolver) -> bool:
     """Return whether echoes clearly speak more for the run of a solver that expects strafing, of the same scans."""
     times = strafing.log.node_times
-    one, other = (agreement_of(strafing.log, strafing.parameters, _path(solver, times)) for solver in (ahead, strafing))
+    echoes = WayEchoes.of_run(strafing.log, strafing.odometry, strafing.parameters)
+    one, other = (agreement(echoes, _path(solver, times)) for solver in (ahead, strafing))
     return other > _CLEARLY * one
 
 

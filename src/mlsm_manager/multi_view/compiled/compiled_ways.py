@@ -14,7 +14,7 @@ ARM_X, ARM_Y, SHARE, ACROSS_X, ACROSS_Y, ALONG_X, ALONG_Y = range(7)
 """Columns of a point. ACROSS, ALONG: two directions, divided by the deviation in each, 1/m; a source has none."""
 
 
-@njit(cache=True)
+@njit(cache=True, fastmath=True)
 def _write_nodes(ways, nodes, ranges):
     """Write the nodes (k, 2, lanes) of some ways (n, k, 2), the last of which fills what is left of the lanes.
 

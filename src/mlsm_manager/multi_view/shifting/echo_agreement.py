@@ -25,7 +25,7 @@ class _Pairs(NamedTuple):
 def agreement(echoes: WayEchoes, path: np.ndarray) -> float:
     """Return how much [nats] `echoes` of all scans speak for a path (k, 2) [m] in map through all nodes.
 
-    Each echo counts as far as it lies on one of an earlier scan, as in way_search.agreement_of.
+    Each echo counts as far as it lies on one of an earlier scan, as it does for each way of a WaySearch.
     """
     if not len(echoes):
         return 0.0

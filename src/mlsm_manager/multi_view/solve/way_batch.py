@@ -46,8 +46,7 @@ def _found(live: LiveSolver, seed: int) -> State:
 
 def _shift_search(live: LiveSolver) -> ShiftSearch:
     log, parameters = live.log, live.parameters
-    scans = range(log.scan_count)
-    echoes = WayEchoes.joined([WayEchoes.of(log, parameters.odometry, parameters, scan) for scan in scans])
+    echoes = WayEchoes.of_run(log, parameters.odometry, parameters)
 
     def refit(path: np.ndarray) -> np.ndarray:
         return _path(live, settled(live, _on_path(live, path)))

@@ -8,7 +8,9 @@ import scipy.sparse
 import scipy.sparse.linalg
 
 _REGULARISATION = 1e-9  # of a column that no residual touches: it stays where it is
-_MOST_DENSE = 2500  # unknowns, about 500 scans: up to there 50 MB and faster than a sparse solution
+_MOST_DENSE = 5000
+"""Unknowns, about 1000 scans or parts of scans: up to there 200 MB. With 3895 of a strafing vehicle's 50 minutes a step
+took 0.6 s of CPU time, a sparse solution 3.4 s and 1.2 GB."""
 
 
 Scattering = Callable[[np.ndarray, np.ndarray, np.ndarray], None]
@@ -63,7 +65,8 @@ class NormalEquations:
         for columns, blocks in zip(self._columns, self._blocks):
             self._scattering(result, columns, blocks)
         result = result[: self.size, : self._columns_end]
-        return result[:, : self.size] + _REGULARISATION * np.eye(self.size), result[:, self.size :]
+        result[np.diag_indices(self.size)] += _REGULARISATION
+        return result[:, : self.size], result[:, self.size :].copy()
 
     def sparse(self) -> scipy.sparse.csc_matrix:
         """Return the information as a sparse matrix (size, size)."""

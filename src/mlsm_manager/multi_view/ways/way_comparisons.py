@@ -1,5 +1,7 @@
 """How much echoes speak for ways: those that lie on what the same way heard before."""
 
+from typing import Tuple
+
 import numpy as np
 
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
@@ -23,9 +25,8 @@ def nats_of(ways: Ways, sources: WayEchoes, targets: WayEchoes, kernel: SolverKe
     """
     if not len(sources) or not len(targets):
         return np.zeros(len(ways.nats))
-    candidates = candidates_of(ways, sources, targets)
-    rows = np.flatnonzero(candidates.any(axis=0))
-    targets, candidates = targets.selected(rows), candidates[:, rows]
+    candidates, rows = candidates_of(ways, sources, targets)
+    targets = targets.selected(rows)
     if kernel.resolved is SolverKernel.NUMPY:
         return _nats(ways, sources, targets, candidates)
     from mlsm_manager.multi_view.compiled.compiled_ways import way_nats
@@ -38,15 +39,22 @@ def nats_of(ways: Ways, sources: WayEchoes, targets: WayEchoes, kernel: SolverKe
     )  # fmt: skip
 
 
-def candidates_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> np.ndarray:
-    """Return (s, t) bool, which of t targets s sources may lie on: of one kind, facing one way, and not too far off."""
+def candidates_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Tuple[np.ndarray, np.ndarray]:
+    """Return (s, t) bool, which of t targets each of s sources may lie on, and the rows (t,) of these targets.
+
+    They are of one kind, face one way, and are not too far off.
+    """
     mean, last = ways.mean(), ways.paths.shape[1] - 2
-    heard = sources.places(mean, int(sources.nodes[0]) - last)
+    heard, earlier = sources.places(mean, int(sources.nodes[0]) - last), targets.places(mean, 0)
     gate = _GATE + 2.0 * ways.paths[:, -1].std(axis=0).max()
-    apart = heard[:, np.newaxis] - targets.places(mean, 0)
+    around = (earlier > heard.min(axis=0) - gate) & (earlier < heard.max(axis=0) + gate)
+    rows = np.flatnonzero(around.all(axis=1))
+    targets, apart = targets.selected(rows), heard[:, np.newaxis] - earlier[rows]
     near = np.hypot(apart[..., 0], apart[..., 1]) < gate
     near &= sources.lone[:, np.newaxis] == targets.lone
-    return near & (sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > FACING))
+    near &= sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > FACING)
+    met = near.any(axis=0)
+    return near[:, met], rows[met]
 
 
 def _columns(echoes: WayEchoes) -> np.ndarray:

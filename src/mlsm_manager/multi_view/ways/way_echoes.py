@@ -50,6 +50,11 @@ class WayEchoes:
         return cls.joined([cls._made(surfaces, _SURFACE_NATS * surfaces.qualities), cls._made(lone, worth, True)])
 
     @classmethod
+    def of_run(cls, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters) -> "WayEchoes":
+        """Return those of all scans of the log, at least one."""
+        return cls.joined([cls.of(log, odometry, parameters, scan) for scan in range(log.scan_count)])
+
+    @classmethod
     def _made(cls, points: PlacedPoints, nats: np.ndarray, lone: bool = False) -> "WayEchoes":
         return cls(points.scans, points.places, points.shares, points.normals, nats, np.full(len(points), lone))
 

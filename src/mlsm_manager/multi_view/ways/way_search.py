@@ -85,16 +85,6 @@ class WaySearch:
         return replace(self, scans=scan + 1, echoes=echoes, ways=ways)
 
 
-def agreement_of(log: RunLog, parameters: MultiViewParameters, path: np.ndarray) -> float:
-    """Return how much [nats] the echoes of a whole run speak for one path (k, 2) [m] in map through its nodes."""
-    echoes = tuple(WayEchoes.of(log, parameters.odometry, parameters, scan) for scan in range(log.scan_count))
-    total = 0.0
-    for scan in range(1, log.scan_count):
-        way = Ways(path[np.newaxis, : scan + 2], np.zeros((1, 2)), np.zeros(1))
-        total += float(nats_of(way, echoes[scan], _targets(echoes[:scan], 0), parameters.kernel)[0])
-    return total
-
-
 def _targets(echoes: Tuple[WayEchoes, ...], first: int) -> Optional[WayEchoes]:
     """Return all echoes, with nodes that count from `first`; None where there are none."""
     if not echoes:

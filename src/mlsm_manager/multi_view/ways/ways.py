@@ -53,7 +53,7 @@ class Ways(NamedTuple):
             return self
         chosen = np.searchsorted(np.cumsum(shares), (rng.rand() + np.arange(count)) / count)
         chosen = np.minimum(chosen, count - 1)
-        return Ways(self.paths[chosen], self.speeds[chosen], np.zeros(count))
+        return Ways(self.paths.take(chosen, axis=0), self.speeds[chosen], np.zeros(count))
 
     def continued(self, ends: np.ndarray, speeds: np.ndarray, longest: int) -> "Ways":
         """Return the ways with places (n, 2) at the next node and `speeds` (n, 2) there; no longer than `longest`."""
