@@ -80,7 +80,7 @@ class JointParameters(OdometryChoice):
             )
 
     def longest_turn(self, errors: OdometryErrors) -> float:
-        """Return how long a turn of the head may take [s], so that a part of it hears the vehicle at about one speed."""
+        """Return how long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
         measured = not np.isinf(self.odometry_model(errors).distance_deviation)
         return np.inf if measured or self.estimator is Estimator.SCAN_BY_SCAN else errors.rate_time * self.scan_parts
 
