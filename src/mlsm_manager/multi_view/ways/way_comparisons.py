@@ -10,7 +10,7 @@ ACROSS = 0.7  # m: deviation of an echo across the surface of another
 ALONG = 1.5  # m: and along it, where it tells less
 AROUND = 1.0  # m: of an echo that stands alone
 FARTHEST = 12.0  # squared deviations; echoes farther apart tell nothing
-_FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
+FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
 _GATE = 8.0  # m that two echoes may be apart on the mean path, besides twice the ways' spread
 
 _AT_ONCE = 200  # ways whose echoes are placed together: as many as fit into a processor's cache
@@ -46,7 +46,7 @@ def candidates_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> np.ndar
     apart = heard[:, np.newaxis] - targets.places(mean, 0)
     near = np.hypot(apart[..., 0], apart[..., 1]) < gate
     near &= sources.lone[:, np.newaxis] == targets.lone
-    return near & (sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > _FACING))
+    return near & (sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > FACING))
 
 
 def _columns(echoes: WayEchoes) -> np.ndarray:
