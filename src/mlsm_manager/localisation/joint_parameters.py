@@ -79,6 +79,11 @@ class JointParameters(OdometryChoice):
                 "by ways that need a heading"
             )
 
+    def longest_turn(self, errors: OdometryErrors) -> float:
+        """Return how long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
+        measured = not np.isinf(self.odometry_model(errors).distance_deviation)
+        return np.inf if measured or self.estimator is Estimator.SCAN_BY_SCAN else errors.rate_time * self.scan_parts
+
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.
 

@@ -34,6 +34,13 @@ def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
         health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction are kept")
 
 
+def report_turn(health: Health, seconds: float, longest: float) -> None:
+    """Warn of a turn of the head that took longer than the vehicle is assumed to keep its speed."""
+    if seconds > longest:
+        detail = f"{seconds:.0f} s, must be at most {longest:g} s where no speed is measured"
+        health.problem("turns of the head too slow", f"{detail}; take larger steps, fewer samples or a shorter range")
+
+
 def report_verdicts(health: Health, verdicts: Sequence[Verdict]) -> None:
     """Show what a run says of itself, and warn where it is not to be trusted."""
     for verdict in verdicts:

@@ -10,7 +10,8 @@ from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_verdicts
+from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_turn, report_verdicts
+from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.ros.autosave import Autosave
 from mlsm_manager.ros.fix_publisher import FixPublisher
@@ -43,6 +44,7 @@ class MlsmCore:
         self.healths = [self.health]
         parameters = read_parameters(MlsmCoreParameters, namespace)
         self._localiser = parameters.build_localiser()
+        self._longest_turn = parameters.longest_turn(parameters.part(OdometryErrors))
         self._live = ReconfigurableParameters(
             MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters
         )
@@ -133,6 +135,7 @@ class MlsmCore:
         report_scan(self.health, taken.scan, self._localiser.matching)
         if taken.scan.found:
             rospy.loginfo("%s: found again after a silence of the sonar: %s", self.health.name, taken.scan.found)
+        report_turn(self.health, scan.reference_time - scan.start, self._longest_turn)
         report_verdicts(self.health, self._localiser.verdicts())
         self._publish_fix(taken.scan, cloud.stamp_ns)
 

@@ -8,10 +8,13 @@ from dead_reckoning.parameters import DeadReckoningParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import PROFILES, profile_values, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.update_report import report_turn
+from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from node_support.health import Health
 
 TIMES = np.linspace(0.0, 100.0, 50)
 
@@ -55,6 +58,17 @@ def test_what_a_person_set_is_not_changed_by_a_profile():
     chosen = with_odometry(mine, OdometryKind.HEADING, {"slip_deviation"})
     assert chosen.slip_deviation == 0.4
     assert chosen.speed_deviation == profile_values(OdometryKind.HEADING)["speed_deviation"]
+
+
+@pytest.mark.parametrize(("kind", "slow"), [("DVL", False), ("THRUSTERS", False), ("HEADING", True), ("NONE", True)])
+def test_a_turn_of_a_minute_is_too_slow_where_no_speed_is_measured(kind, slow):
+    """A Ping360 with 400 beams over a serial line takes nearly as long."""
+    parameters = with_odometry(ReplayParameters(), OdometryKind(kind), ())
+    warnings = []
+    for seconds in (16.0, 60.0):
+        health = Health("mlsm_core", warnings.append)
+        report_turn(health, seconds, parameters.longest_turn(parameters.part(OdometryErrors)))
+    assert ["60 s, must be at most 40 s" in line for line in warnings] == [True] * slow
 
 
 @pytest.mark.parametrize("kind", [OdometryKind.HEADING, OdometryKind.HOVERING])
