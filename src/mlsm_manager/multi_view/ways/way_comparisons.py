@@ -18,9 +18,10 @@ _GATE = 8.0  # m that two echoes may be apart on the mean path, besides twice th
 _AT_ONCE = 200  # ways whose echoes are placed together: as many as fit into a processor's cache
 
 
-class Candidates(NamedTuple):
-    """starts: (n + 1,) where those of each source stand in rows. rows: (m,) of targets."""
+class Nearby(NamedTuple):
+    """targets: that any source may lie on. starts: (n + 1,) where those of each source stand in rows. rows: (m,)."""
 
+    targets: WayEchoes
     starts: np.ndarray
     rows: np.ndarray
 
@@ -32,52 +33,57 @@ def nats_of(ways: Ways, sources: WayEchoes, targets: WayEchoes, kernel: SolverKe
     """
     if not len(sources) or not len(targets):
         return np.zeros(len(ways.nats))
-    candidates = candidates_of(ways, sources, targets)
-    rows, place_of = np.unique(candidates.rows, return_inverse=True)
-    targets, candidates = targets.selected(rows), Candidates(candidates.starts, place_of)
+    return nats_among(ways, sources, nearby_of(ways, sources, targets), kernel)
+
+
+def nearby_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Nearby:
+    """Return which targets each source may lie on: of the same kind, facing the same way, and not too far off."""
+    mean, last = ways.mean(), ways.paths.shape[1] - 2
+    heard, earlier = sources.places(mean, int(sources.nodes[0]) - last), targets.places(mean, 0)
+    gate = _GATE + 2.0 * ways.paths[:, -1].std(axis=0).max()
+    reached = np.flatnonzero(((earlier > heard.min(axis=0) - gate) & (earlier < heard.max(axis=0) + gate)).all(axis=1))
+    targets, apart = targets.selected(reached), np.abs(heard[:, np.newaxis] - earlier[reached])
+    own, others = np.nonzero((apart[..., 0] < gate) & (apart[..., 1] < gate))
+    facing = np.einsum("na,na->n", sources.normals[own], targets.normals[others]) > _FACING
+    alike = (sources.lone[own] == targets.lone[others]) & (sources.lone[own] | facing)
+    alike &= np.hypot(apart[own, others, 0], apart[own, others, 1]) < gate
+    rows, places = np.unique(others[alike], return_inverse=True)
+    return Nearby(targets.selected(rows), np.searchsorted(own[alike], np.arange(len(sources) + 1)), places)
+
+
+def nats_among(ways: Ways, sources: WayEchoes, nearby: Nearby, kernel: SolverKernel) -> np.ndarray:
+    """Return how much (n,) sources speak for n ways, each by what it may lie on."""
     if kernel.resolved is SolverKernel.NUMPY:
-        return _nats(ways, sources, targets, candidates)
+        return _nats(ways, sources, nearby)
     from mlsm_manager.multi_view.compiled.compiled_ways import way_nats
 
+    targets = nearby.targets
     return way_nats(
-        np.ascontiguousarray(ways.paths), *candidates, sources.arms, sources.shares, sources.nats, sources.lone,
-        targets.nodes, targets.arms, targets.shares, targets.normals,
+        np.ascontiguousarray(ways.paths), nearby.starts, nearby.rows, sources.arms, sources.shares, sources.nats,
+        sources.lone, targets.nodes, targets.arms, targets.shares, targets.normals,
         np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST,
     )  # fmt: skip
 
 
-def candidates_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Candidates:
-    """Return which targets each source may lie on: of the same kind, facing the same way, and not too far off."""
-    mean, last = ways.mean(), ways.paths.shape[1] - 2
-    heard = sources.places(mean, int(sources.nodes[0]) - last)
-    gate = _GATE + 2.0 * ways.paths[:, -1].std(axis=0).max()
-    apart = heard[:, np.newaxis] - targets.places(mean, 0)
-    near = np.hypot(apart[..., 0], apart[..., 1]) < gate
-    near &= sources.lone[:, np.newaxis] == targets.lone
-    near &= sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > _FACING)
-    rows, columns = np.nonzero(near)
-    return Candidates(np.searchsorted(rows, np.arange(len(sources) + 1)), columns)
-
-
-def _nats(ways: Ways, sources: WayEchoes, targets: WayEchoes, candidates: Candidates) -> np.ndarray:
+def _nats(ways: Ways, sources: WayEchoes, nearby: Nearby) -> np.ndarray:
     parts = np.array_split(ways.paths, max(1, len(ways.paths) // _AT_ONCE))
-    return np.concatenate([_nats_of_some(paths, sources, targets, candidates) for paths in parts])
+    return np.concatenate([_nats_of_some(paths, sources, nearby) for paths in parts])
 
 
-def _nats_of_some(paths: np.ndarray, sources: WayEchoes, targets: WayEchoes, candidates: Candidates) -> np.ndarray:
+def _nats_of_some(paths: np.ndarray, sources: WayEchoes, nearby: Nearby) -> np.ndarray:
     total, last = np.zeros(len(paths)), paths.shape[1] - 2
     heard = sources.places(paths, int(sources.nodes[0]) - last).transpose(2, 1, 0)
-    earlier = np.ascontiguousarray(targets.places(paths, 0).transpose(2, 1, 0))
+    earlier = np.ascontiguousarray(nearby.targets.places(paths, 0).transpose(2, 1, 0))
     for source in range(len(sources)):
-        rows = candidates.rows[candidates.starts[source] : candidates.starts[source + 1]]
+        rows = nearby.rows[nearby.starts[source] : nearby.starts[source + 1]]
         if len(rows):
             x, y = (own[source] - others[rows] for own, others in zip(heard, earlier))
-            squared = _squared(x, y, targets.normals[rows], bool(sources.lone[source])).min(axis=0)
+            squared = squared_deviations(x, y, nearby.targets.normals[rows], bool(sources.lone[source])).min(axis=0)
             total += sources.nats[source] * np.where(squared < FARTHEST, np.exp(-0.5 * squared), 0.0)
     return total
 
 
-def _squared(x: np.ndarray, y: np.ndarray, normals: np.ndarray, is_lone: bool) -> np.ndarray:
+def squared_deviations(x: np.ndarray, y: np.ndarray, normals: np.ndarray, is_lone: bool) -> np.ndarray:
     """Return squared deviations (m, n) of offsets x, y (m, n) [m] from m points with `normals` (m, 2)."""
     if is_lone:
         return (x**2 + y**2) / AROUND**2

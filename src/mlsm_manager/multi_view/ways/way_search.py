@@ -15,6 +15,7 @@ from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatch
 from mlsm_manager.multi_view.ways.way_comparisons import nats_of
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.multi_view.ways.way_motion import drawn, led
+from mlsm_manager.multi_view.ways.way_weighing import weighed
 from mlsm_manager.multi_view.ways.ways import Ways, begun
 
 _COUNT = 6000  # ways: with 1000 one simulated tour of two is lost
@@ -79,7 +80,7 @@ class WaySearch:
         draw = draw if targets is None else led(before, draw, sources, targets, duration, rng)
         ways = before.continued(*draw, longest=longest + 1)
         if targets is not None:
-            ways = ways.believed(nats_of(ways, sources, targets, self.parameters.kernel)).resampled(rng)
+            ways = weighed(ways, sources, targets, duration, self.parameters.kernel, rng).resampled(rng)
         ways = Ways(ways.paths[:, -longest:], ways.speeds, ways.nats)
         echoes = (*self.echoes, sources)[-(longest - 1) :]
         return replace(self, scans=scan + 1, echoes=echoes, ways=ways)

@@ -46,6 +46,10 @@ class Ways(NamedTuple):
         offset = ends - shares @ ends
         return (offset * shares[:, np.newaxis]).T @ offset
 
+    def selected(self, rows: np.ndarray) -> "Ways":
+        """Return the ways in `rows` (m,)."""
+        return Ways(self.paths[rows], self.speeds[rows], self.nats[rows])
+
     def resampled(self, rng: np.random.RandomState) -> "Ways":
         """Return as many ways, each as often as it is believed, where few of them count; or else the same."""
         shares, count = self.shares, len(self.nats)
