@@ -150,12 +150,24 @@ def test_a_speed_is_kept_in_map_or_in_base_link_or_ends():
         assert (np.hypot(*(speeds - kept).T) < 0.2).mean() > least
 
 
-def test_ways_are_drawn_anew_as_often_as_they_are_believed():
-    ways = ways_of(1, count=1000)
-    ways = ways._replace(nats=np.where(np.arange(1000) < 10, 0.0, -50.0))
+def test_ways_of_one_place_are_drawn_anew_as_often_as_they_are_believed():
+    rng = np.random.RandomState(1)
+    ways = Ways(rng.uniform(0.1, 1.9, (1000, 4, 2)), rng.normal(size=(1000, 2)), np.full(1000, -50.0))
+    ways.nats[:10] = 0.0
     again = ways.resampled(np.random.RandomState(0))
     assert {tuple(end) for end in again.paths[:, -1]} == {tuple(end) for end in ways.paths[:10, -1]}
-    np.testing.assert_array_equal(again.nats, np.zeros(1000))
+    np.testing.assert_allclose(again.nats, np.zeros(1000), atol=1e-9)
+
+
+def test_a_place_believed_little_keeps_its_belief_and_more_ways_than_that():
+    paths = np.full((1000, 2, 2), 1.0)
+    paths[:10, 1] = [31.0, 1.0]
+    ways = Ways(paths, np.zeros((1000, 2)), np.where(np.arange(1000) < 10, 0.0, -0.5 * np.arange(1000)))
+    ways.nats[10] = np.log(990.0)
+    again = ways.resampled(np.random.RandomState(0))
+    far = again.paths[:, -1, 0] > 30.0
+    assert again.shares[far].sum() == pytest.approx(ways.shares[:10].sum(), rel=0.1)
+    assert far.mean() > 5.0 * ways.shares[:10].sum()
 
 
 def test_ways_that_all_count_are_not_drawn_anew():

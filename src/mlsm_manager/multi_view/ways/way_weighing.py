@@ -12,7 +12,7 @@ from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from mlsm_manager.multi_view.ways.way_comparisons import nats_among, nearby_of
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.multi_view.ways.way_pulls import pulled
-from mlsm_manager.multi_view.ways.ways import Ways
+from mlsm_manager.multi_view.ways.ways import Ways, squares_of
 
 _CELL = 6.0  # m: side of the squares within which ways end near each other, less than echoes may be apart
 
@@ -43,8 +43,6 @@ def weighed(
 
 def groups_of(ends: np.ndarray) -> List[np.ndarray]:
     """Return the rows of the ends (n, 2) [m] in each square of a grid that holds any."""
-    cells = np.floor(ends / _CELL).astype(np.int64)
-    _, numbers = np.unique(cells, axis=0, return_inverse=True)
-    numbers = numbers.ravel()
+    numbers = squares_of(ends, _CELL)
     order = np.argsort(numbers, kind="stable")
     return np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
