@@ -26,7 +26,10 @@ _DRIVER_JOINTS_IN = _subscribes(
     topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
 )
 _OF_DRIVERS = (_DRIVER_JOINTS_IN, _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"))
-_OF_EMULATORS = (_serves("~order_fault", "OrderFault", "makes a fault happen at once"),)
+_OF_EMULATORS = (
+    _serves("~order_fault", "OrderFault", "makes a fault happen at once"),
+    _subscribes("tf", "", "`world -> ` frame of the head, if `head_frame` is set"),
+)
 _AS_POINTS = "also as PointCloud2 on `.../cloud`"
 
 DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second")
@@ -230,6 +233,7 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(topics.VELOCITY, "geometry_msgs/Twist", "velocity as the odometry measures it"),
             _publishes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "the same, if `drive` is SCRIPT"),
             _publishes(topics.CLOCK, "rosgraph_msgs/Clock", "simulated time"),
+            _publishes("tf", "", "`world -> true_sonar` and `world -> map`, if `head` is EMULATED"),
             _publishes("~world", "visualization_msgs/Marker", "triangles of the world; latched"),
             _publishes("~progress", "std_msgs/Float32", "completed share of the script, 0 to 1; latched"),
         ),

@@ -175,13 +175,14 @@ class JointMapper(ShowsMaps):
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Begin a new run at a pose that was found elsewhere, in the map as it is, but without scans that lie apart."""
-        self._end_session(np.inf if self._session is None else self._session.apart_from)
+        session = self._session
+        self._end_session(np.inf if session is None else session.apart_from)
         self._expected = None
         self._clouds.found(scan.start)
         self.correction = result.correction(scan)
         self._start = np.sqrt(np.diag(result.covariance)[POSE])
         self.belief = belief_of_match(scan, result, self.errors)
-        return ScanUpdate(scan, result, True, self.belief)
+        return ScanUpdate(scan, result, True, self.belief, forgotten=0 if session is None else session.turns_apart)
 
     def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
         """Put a cloud into the map that is shown, or let it wait for the scan of its time; see JointClouds."""

@@ -5,12 +5,12 @@ from enum import Enum
 
 import numpy as np
 
-from mlsm_manager.localisation.odometry_choice import OdometryChoice
+from mlsm_manager.localisation.odometry_choice import OdometryChoice, OdometryKind
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.kernels import Kernel, check_kernel
-from node_support.parameters import parameter
+from node_support.parameters import ParameterError, parameter
 
 # Deviations by which beams may be later than their stamps, and s of odometry that are worth waiting for.
 _LATE = 3.0
@@ -70,9 +70,14 @@ class JointParameters(OdometryChoice):
     )
 
     def check(self) -> None:
-        """Refuse what is not installed."""
+        """Refuse what is not installed, and parts of turns whose headings nobody reports."""
         if self.solver_kernel is SolverKernel.NUMBA:
             check_kernel("solver_kernel", Kernel.NUMBA)
+        if self.odometry is OdometryKind.NONE and self.scan_parts > 1:
+            raise ParameterError(
+                f"scan_parts = {self.scan_parts}: must be 1 with odometry = NONE, because parts of turns are placed "
+                "by ways that need a heading"
+            )
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.

@@ -169,6 +169,11 @@ class JointSession:
         islands = self.solver.islands
         return float(self.solver.log.node_times[islands.start]) if islands.is_apart else np.inf
 
+    @property
+    def turns_apart(self) -> int:
+        """Number of turns of the head that nobody knows the place of in the map."""
+        return int(self.solver.islands.apart.sum()) // self.solver.parameters.matching.scan_parts
+
 
 def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:
     track = _moved_track(scan.track, T_map_odom)

@@ -103,7 +103,7 @@ class KeyframeCarving:
     ) -> None:
         """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`.
 
-        scans: how many came since the last look.
+        points: of each cloud, (n, 4) in map. scans: how many came since the last look.
         """
         if self._carver is None or not self._most_followed:
             return

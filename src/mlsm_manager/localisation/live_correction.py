@@ -46,6 +46,7 @@ class LiveCorrection:
         self._start = _IDENTITY
         self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
         self._state: Optional[np.ndarray] = None
+        self._state_time = -math.inf
         self._jump = _IDENTITY
         self._jump_time: Optional[float] = None
         self._shown: Optional[np.ndarray] = None
@@ -59,7 +60,7 @@ class LiveCorrection:
 
     def _believe(self, belief: Belief) -> None:
         self._state, self._fading = np.array(belief.theta), belief.fading
-        start = belief.time
+        start = self._state_time = belief.time
         self._beliefs.take(start)
         later = [sample for sample in self._samples if sample[0] > belief.time]
         earlier = [sample for sample in self._samples if sample[0] <= belief.time]
@@ -99,7 +100,13 @@ class LiveCorrection:
     def _follow(self, time: float, odometry: np.ndarray) -> None:
         if self._state is None or not self._samples:
             return
+        if time <= self._state_time:
+            return
         before, pose = self._samples[-1]
+        if before < self._state_time:
+            # A belief that is newer than the newest sample: what the odometry did before it is part of it.
+            track = Track(np.array([before, time]), np.array([pose, odometry]))
+            before, pose = self._state_time, track.at(np.array(self._state_time))
         self._step(before, pose, time, odometry)
 
     def _bring_on(self, start: float, track: Track, times: np.ndarray) -> None:

@@ -20,6 +20,7 @@ class ScanUpdate:
 
     result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
     found: how the vehicle was found again with it after a silence of the sonar; empty where it was not.
+    forgotten: turns of the head that lay apart from the map and are left out of it, because the run began anew.
     provisional: whether the map hangs on scans of an unknown velocity, none of which agrees with another yet.
     """
 
@@ -29,6 +30,7 @@ class ScanUpdate:
     belief: Belief
     found: str = ""
     provisional: bool = False
+    forgotten: int = 0
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """Named sets of parameters for vehicles that know more or less of their own motion, each value with its reason."""
 
-from typing import Any, Dict, NamedTuple, Sequence
+from typing import Any, Dict, List, NamedTuple, Sequence
 
 import yaml
 
@@ -96,6 +96,9 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
     ),
 }
 
+_ESTIMATING = (OdometryKind.HEADING, OdometryKind.HOVERING)
+"""Profiles whose velocities are estimated and taken by dead_reckoning."""
+
 
 def profile_values(kind: OdometryKind) -> Dict[str, Any]:
     """Return the parameters of mlsm_core that a profile sets."""
@@ -103,12 +106,22 @@ def profile_values(kind: OdometryKind) -> Dict[str, Any]:
 
 
 def profile_yaml(kind: OdometryKind) -> str:
-    """Return the text of a profile's yaml file, for the launch files' argument `odometry`."""
+    """Return the text of a profile's yaml file, for the launch files' argument `odometry`.
+
+    Where the odometry is made from the solver's velocities, it also says how dead_reckoning lets them fade.
+    """
     lines = [
         f"# Written by scripts/document. The launch files load it with odometry:={kind.value.lower()}.",
         "mlsm_core:",
     ]
     lines.append(f"  odometry: {kind.value}")
     for setting in PROFILES[kind]:
-        lines += [f"  # {setting.reason}", f"  {setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
+        lines += _lines_of(setting)
+    if kind in _ESTIMATING:
+        fading = Setting("velocity_fading", profile_values(kind)["rate_time"], "s: rate_time above")
+        lines += ["dead_reckoning:", *_lines_of(fading)]
     return "\n".join(lines) + "\n"
+
+
+def _lines_of(setting: Setting) -> List[str]:
+    return [f"  # {setting.reason}", f"  {setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]

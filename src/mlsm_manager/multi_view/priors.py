@@ -4,6 +4,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.parameters import SonarCalibration
 from mlsm_manager.multi_view.unknowns.normal_equations import NormalEquations
+from mlsm_manager.multi_view.unknowns.state import Layout
 
 _HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 
@@ -25,3 +26,18 @@ def run_mean(sonar: SonarCalibration) -> np.ndarray:
 def run_deviations(sonar: SonarCalibration) -> np.ndarray:
     """Return their standard deviations (2,)."""
     return np.array([sonar.range_scale_deviation, sonar.sonar_delay_deviation])
+
+
+def add_told_steps(
+    equations: NormalEquations, layout: Layout, places: np.ndarray, told: np.ndarray, deviation: float
+) -> None:
+    """Add that steps between all nodes, now at `places` (n, 2) [m] in map, are those of the path `told` (n, 2).
+
+    deviation: m, of each step in each direction.
+    """
+    count = len(places) - 1
+    columns = layout.pose_columns(np.column_stack([np.arange(count), np.arange(count) + 1]))
+    errors = np.diff(places - told, axis=0)
+    for axis in (0, 1):
+        jacobian = np.tile([-1.0, 1.0], (count, 1))
+        equations.add(columns[:, :, axis], jacobian, errors[:, axis], np.full(count, deviation**-2.0))

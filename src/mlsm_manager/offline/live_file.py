@@ -28,6 +28,8 @@ class _CloudParameters(ReadingParameters, BeamCorrection):
 
 
 _SHARED: Dict[str, Type[ParameterSet]] = {**NODES, "sonar_to_cloud": _CloudParameters}
+_ONLY_LIVE = {"dead_reckoning"}
+"""Nodes of which a profile's yaml file says something too, and that a replay has no use for."""
 _OF_THE_MACHINE = {"solver_kernel"}
 """What depends on what is installed, and changes no result."""
 _COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take it as parameters:=FILE.\n"
@@ -58,7 +60,7 @@ def replay_values(values: Mapping[str, Any]) -> Dict[str, Any]:
 
     Keys of the live nodes that a replay does not know are left out. Raises ParameterError for what a node would refuse.
     """
-    plain = {key: value for key, value in values.items() if key not in NODES}
+    plain = {key: value for key, value in values.items() if key not in {*NODES, *_ONLY_LIVE}}
     for name in NODES:
         if name in values:
             NODES[name].from_group(name, values[name])

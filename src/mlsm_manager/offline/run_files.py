@@ -82,7 +82,7 @@ def write_trajectory(path: Path, times: np.ndarray, poses: Mapping[str, np.ndarr
 
 
 def trajectory_csv(times: np.ndarray, poses: Mapping[str, np.ndarray]) -> str:
-    """Return the table of all trajectories: time [s], then x y [m] and yaw [rad] of each."""
+    """Return the table of trajectories (m, 3) at `times` (m,): time [s], then x y [m] and yaw [rad] of each."""
     header = ["time"] + [f"{_COLUMNS[name]}_{axis}" for name in poses for axis in ("x", "y", "yaw")]
     columns: List[np.ndarray] = [times[:, np.newaxis]]
     for path in poses.values():

@@ -86,7 +86,12 @@ class MapServices:
             return TriggerResponse(False, f"{update.result.status.value}: {update.result.reason}")
         self._on_fix(update)
         x, y, yaw = update.result.pose
-        return TriggerResponse(True, f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(wrapped(yaw)):.1f} deg in map")
+        found = f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(wrapped(yaw)):.1f} deg in map"
+        return TriggerResponse(True, found + _left_out(update.forgotten))
+
+
+def _left_out(turns: int) -> str:
+    return f"; the {turns} turns of the head since the silence, which lay apart, are left out of it" if turns else ""
 
 
 def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, run: str = "") -> StoredMap:

@@ -81,7 +81,8 @@ class BlockStore:
     def arrays(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Views to write to: rows, the row that follows each in its cell, crossings, and the first rows of all cells.
 
-        Who changes a row tells `announce` before.
+        Of n rows and s places for cells they are (n, ROW_WIDTH), (n,), (n,) and (s,). Who changes a row tells
+        `announce` before.
         """
         return self._rows, self._next, self._crossed, self._index.heads
 

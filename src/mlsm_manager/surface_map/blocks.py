@@ -91,7 +91,7 @@ class Blocks:
         return (self.cells + 0.5) * self.resolution
 
     def take(self, chosen: np.ndarray) -> "Blocks":
-        """Return the blocks at `chosen`, a mask or indices."""
+        """Return the blocks at `chosen`, a mask (n,) or indices (k,)."""
         return Blocks(self.rows[chosen], self.resolution, self.crossed[chosen])
 
     def in_box(self, low: np.ndarray, high: np.ndarray) -> "Blocks":

@@ -60,7 +60,7 @@ class CellIndex:
 
     @property
     def heads(self) -> np.ndarray:
-        """The number of the first block of the cell in each place, NO_BLOCK where there is none."""
+        """(s,) the number of the first block of the cell in each place, NO_BLOCK where there is none."""
         return self._heads.values
 
     def slots(self, keys: np.ndarray) -> np.ndarray:

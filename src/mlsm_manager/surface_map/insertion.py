@@ -45,7 +45,7 @@ def insert_points(store: BlockStore, points: np.ndarray, resolution: float, limi
 
 
 def insert_groups(store: BlockStore, groups: Intervals, resolution: float) -> np.ndarray:
-    """Insert sorted intervals that lie at least the resolution apart; return the keys of their cells, sorted."""
+    """Insert sorted intervals that lie at least the resolution apart; return the keys (c,) of their cells, sorted."""
     cells = groups.cell[np.flatnonzero(np.append(True, groups.cell[1:] != groups.cell[:-1]))]
     slots = store.slots(cells)
     if len(store):

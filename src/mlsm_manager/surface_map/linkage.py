@@ -33,7 +33,7 @@ class Extents:
         return len(self.cell)
 
     def take(self: AnyExtents, index: np.ndarray) -> AnyExtents:
-        """Return those at `index`, in its order."""
+        """Return those at `index` (k,), in its order."""
         return type(self)(*(getattr(self, name)[index] for name in self.__dataclass_fields__))
 
 

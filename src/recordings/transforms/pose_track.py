@@ -22,7 +22,7 @@ class PoseTrack:
 
     @classmethod
     def sorted_from(cls, stamps_ns: np.ndarray, translations: np.ndarray, rotations: np.ndarray) -> "PoseTrack":
-        """Return the track of poses in any order; of several with one stamp the first counts, as in tf2.
+        """Return the track of n poses in any order; of several with one stamp the first counts, as in tf2.
 
         Those that are not finite or no rotation are left out; the track may then be empty.
         """

@@ -7,7 +7,7 @@ _NORMS = (0.5, 2.0)
 
 
 def normalized(quaternions: np.ndarray) -> np.ndarray:
-    """Return quaternions of length one; NaN for those that are no rotation or not finite."""
+    """Return quaternions (..., 4) of length one; NaN for those that are no rotation or not finite."""
     norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
     with np.errstate(invalid="ignore"):
         valid = (norms > _NORMS[0]) & (norms < _NORMS[1])

@@ -29,6 +29,10 @@ class EmulatedHeadParameters(FaultRates):
         4.0, "pattern: distance to each wall", unit="m", low=0.1, high=100.0, tunable=False
     )
     world_file: str = parameter("worlds/basin.sdf", "world: SDF file; relative to the package's folder", tunable=False)
+    head_frame: str = parameter(
+        "", "world: frame of tf with which the head moves in the frame world; empty: it stands at x, y, z, yaw_deg",
+        tunable=False, may_be_empty=True,
+    )  # fmt: skip
     x: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
     y: float = parameter(0.0, "world: position of the head", unit="m", tunable=False)
     z: float = parameter(-2.0, "world: position of the head", unit="m", tunable=False)

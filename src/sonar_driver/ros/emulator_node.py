@@ -12,13 +12,14 @@ from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError, every, make_he
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FixedPattern, HeadServer, ServedLine
 from sonar_driver.emulator.parameters import EchoSourceKind, EmulatedHeadParameters
+from sonar_driver.ros.head_place import Place, place_in_tf
 from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
 
 PACKAGE = "underwater_map_construction"
 _MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
 
 # Builds the simulator's echoes; passed in, because no driver may depend on the simulator.
-WorldEchoes = Callable[[EmulatedHeadParameters], EchoSource]
+WorldEchoes = Callable[[EmulatedHeadParameters, Optional[Place]], EchoSource]
 
 
 class HeadModel(ABC):
@@ -51,7 +52,7 @@ class EmulatorNode:
             model.parameters, "~", model.config_name, self.health, self._use_parameters
         )
         parameters = self._live.current.changed({"link": os.path.expanduser(self._live.current.link)})
-        head = model.head(parameters, _echo_source(parameters, world_echoes), self._faults)
+        head = model.head(parameters, self._echo_source(parameters, world_echoes), self._faults)
         self._served = ExitStack()
         try:
             self._served.enter_context(HeadServer(head, model.line(parameters)))
@@ -61,6 +62,13 @@ class EmulatorNode:
         rospy.Service("~order_fault", OrderFault, self._order)
         every(DIAGNOSTICS_PERIOD, self._show_counts, self.health)
         rospy.loginfo("%s: the head is at %s", self.health.name, parameters.link)
+
+    def _echo_source(self, parameters: EmulatedHeadParameters, world_echoes: WorldEchoes) -> EchoSource:
+        if parameters.echo_source is EchoSourceKind.PATTERN:
+            return FixedPattern(parameters.wall_distance)
+        world_file = os.path.join(rospkg.RosPack().get_path(PACKAGE), os.path.expanduser(parameters.world_file))
+        place = place_in_tf(parameters.head_frame, self.health) if parameters.head_frame else None
+        return world_echoes(parameters.changed({"world_file": world_file}), place)
 
     def _use_parameters(self, parameters: EmulatedHeadParameters) -> None:
         if self._faults is None:
@@ -80,10 +88,3 @@ class EmulatorNode:
             return OrderFaultResponse(False, f"count = {request.count}: must be from 1 to {_MOST_ORDERED}")
         self._faults.order(fault, request.count)
         return OrderFaultResponse(True, f"{fault.value} {request.count} times")
-
-
-def _echo_source(parameters: EmulatedHeadParameters, world_echoes: WorldEchoes) -> EchoSource:
-    if parameters.echo_source is EchoSourceKind.PATTERN:
-        return FixedPattern(parameters.wall_distance)
-    world_file = os.path.join(rospkg.RosPack().get_path(PACKAGE), os.path.expanduser(parameters.world_file))
-    return world_echoes(parameters.changed({"world_file": world_file}))

@@ -69,7 +69,10 @@ def _summit(image: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarra
 
 
 def leading_edges(image: np.ndarray, peaks: Peaks) -> Peaks:
-    """Return where each peak's echo rises through half of the peak's height; one place per echo, its highest peak."""
+    """Return where each peak's echo rises through half of the peak's height; one place per echo, its highest peak.
+
+    image: (beams, bins) float32, in which the peaks were found.
+    """
     bins = np.rint(peaks.bins).astype(np.int64)
     half = peaks.heights / 2.0
     walking = np.arange(len(bins))

@@ -55,7 +55,7 @@ def planar_laser_scan(scan: PolarScan, parameters: SonarToCloudParameters) -> Pl
 
 
 def usual_rays(angles: np.ndarray) -> int:
-    """Return how many steps of the head's usual size make a turn; 1 when the head stands still."""
+    """Return how many steps of the usual size between `angles` (n,) [rad] make a turn; 1 when the head stands still."""
     steps = np.abs(wrapped(np.diff(angles)))
     steps = steps[steps > FULL_TURN / MOST_RAYS]
     return round(FULL_TURN / float(np.median(steps))) if steps.size else 1

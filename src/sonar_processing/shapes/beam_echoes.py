@@ -30,7 +30,7 @@ class BeamEchoes:
         return len(self.points)
 
     def strong(self, share: float) -> np.ndarray:
-        """Return the indices of the echoes with at least `share` times as many points as the usual one.
+        """Return the indices (k,) of the echoes with at least `share` times as many points as the usual one.
 
         Half of all points belong to echoes as large as the usual one or larger: noise, many echoes of one bin each,
         does not change it.

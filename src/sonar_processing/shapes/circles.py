@@ -114,7 +114,7 @@ class CircleModel:
         return _RADII_PER_PAIR * len(self._pairs)
 
     def hypotheses(self, number: int, rng: np.random.Generator) -> np.ndarray:
-        """Return the circles of random allowed radius through two points each, behind them as the sonar sees it."""
+        """Return circles (n, 4) of random allowed radius through two points each, behind them as the sonar sees it."""
         if not len(self._pairs):
             return np.empty((0, 4))
         samples = self._pairs[rng.integers(0, len(self._pairs), number)]
@@ -132,7 +132,7 @@ class CircleModel:
         return np.column_stack([centers, radius, self._parameters.distance + apart])
 
     def scores(self, hypotheses: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return how many points lie on each circle, less a penalty for those that stand too near to it."""
+        """Return (n,) how many `points` (k, 2) lie on each circle, less a penalty for those too near to it."""
         radius, apart = hypotheses[:, 2:3], hypotheses[:, 3:]
         from_center = _distances(hypotheses, points)
         on = np.abs(from_center - radius) <= self._parameters.distance
@@ -145,7 +145,7 @@ class CircleModel:
         return (score - 1.0) / len(self._pairs)
 
     def inliers(self, circle: np.ndarray) -> np.ndarray:
-        """Return the indices of the points on a circle."""
+        """Return the indices (m,) of the points on a circle (4,)."""
         from_center = _distances(circle[np.newaxis], self.points)[0]
         return np.flatnonzero(np.abs(from_center - circle[2]) <= self._parameters.distance)
 

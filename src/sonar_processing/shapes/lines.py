@@ -69,7 +69,7 @@ class LineModel:
         self._distance = distance
 
     def hypotheses(self, number: int, rng: np.random.Generator) -> np.ndarray:
-        """Return the lines through two points each; two points in one place make none."""
+        """Return lines (n, 3) through two points each; two points in one place make none."""
         count = len(self.points)
         first, second = rng.integers(0, count, number), rng.integers(1, max(count, 2), number)
         first, second = self.points[first], self.points[(first + second) % count]
@@ -80,7 +80,7 @@ class LineModel:
         return np.column_stack([normals, np.einsum("ij,ij->i", normals, first[distinct])])
 
     def scores(self, hypotheses: np.ndarray, points: np.ndarray) -> np.ndarray:
-        """Return the number of points near each line."""
+        """Return (n,) how many of `points` (k, 2) are near each line."""
         distances = hypotheses[:, :2] @ points.T
         distances -= hypotheses[:, 2:]
         return np.count_nonzero(np.abs(distances, out=distances) <= self._distance, axis=1)

@@ -35,7 +35,7 @@ class Sightings:
         return (self.points - self.origins) / np.maximum(self.ranges, 1e-9)[:, np.newaxis]
 
     def only(self, chosen: np.ndarray) -> "Sightings":
-        """Return the echoes at indices `chosen`."""
+        """Return the echoes at indices `chosen` (k,)."""
         parts = {name: getattr(self, name)[chosen] for name in ("points", "origins", "beams", "weights", "lengths")}
         return replace(self, **parts)
 

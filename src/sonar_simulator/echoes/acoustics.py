@@ -44,7 +44,10 @@ class Scattering:
         self._lambert = np.array([10.0 ** (material.lambert_db / 10.0) for material in materials])
 
     def per_ray(self, material: np.ndarray, cosines: np.ndarray) -> np.ndarray:
-        """Return sigma / cos t: the share that returns from a patch of 1 / cos t times the ray's cross-section."""
+        """Return sigma / cos t: the share that returns from a patch of 1 / cos t times the ray's cross-section.
+
+        material: (...) int, number of each ray's material. cosines: (...) of the incidence t.
+        """
         cosines = np.maximum(cosines, _GRAZING)
         inverse_square = 1.0 / np.square(cosines)
         facets = self._facets[material] * np.exp(self._steepness[material] * (1.0 - inverse_square))

@@ -16,8 +16,9 @@ from node_support.package_folder import package_folder
 from node_support.parameters import ParameterError
 from node_support.ros.node import guarded, make_health
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
+from sonar_simulator.ros.true_sonar import TrueSonar
 from sonar_simulator.simulation.moment_messages import map_origin
-from sonar_simulator.simulation.simulation import Drive, Moment
+from sonar_simulator.simulation.simulation import Drive, Head, Moment
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
@@ -41,6 +42,7 @@ class Simulator:
         origin = map_origin(self._setup.T_world_start, instruments)
         self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive, instruments, origin)
         self._publisher.publish_world(self._setup.world)
+        self._true_sonar = TrueSonar(origin) if self._parameters.head is Head.EMULATED else None
         self._start_time = START_TIME
         self._now = 0.0
         self._lock = threading.Lock()
@@ -90,6 +92,8 @@ class Simulator:
         self._keep_pace(moment, pace)
         if self._ended.is_set():
             return False
+        # Before the clock, so that a beam that is stamped with it is heard from where the sonar was then.
+        self._publish_true_sonar(moment, self._stamp(moment.time))
         self._publisher.publish(moment, self._stamp(moment.time))
         self._now = moment.time
         self.health.count("moments")
@@ -109,8 +113,13 @@ class Simulator:
         start, waited = self._setup.simulation.moment(0.0), 0.0
         while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
             waited += _WAIT_STEP if self._publisher.has_listener else 0.0
+            self._publish_true_sonar(start, rospy.Time.from_sec(self._start_time))
             self._publisher.publish_rest(start, rospy.Time.from_sec(self._start_time))
             self._start_time += _WAIT_STEP
+
+    def _publish_true_sonar(self, moment: Moment, stamp: rospy.Time) -> None:
+        if self._true_sonar is not None:
+            self._true_sonar.publish(self._setup.simulation.sonar_pose(moment), stamp)
 
     def _stamp(self, seconds: float) -> rospy.Time:
         return rospy.Time.from_sec(self._start_time + seconds)

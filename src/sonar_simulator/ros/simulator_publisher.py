@@ -32,11 +32,9 @@ class SimulatorPublisher:
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
         self._world = rospy.Publisher("~world", Marker, queue_size=1, latch=True)
         self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS[instruments].items()}
-        self._commands = (
-            _publisher(topics.VELOCITY_COMMANDS, TOPICS[instruments][topics.VELOCITY])
-            if drive is Drive.SCRIPT
-            else None
-        )
+        velocity = TOPICS[instruments].get(topics.VELOCITY)
+        is_told = drive is Drive.SCRIPT and velocity is not None
+        self._commands = _publisher(topics.VELOCITY_COMMANDS, velocity) if is_told else None
 
     @property
     def has_listener(self) -> bool:

@@ -13,15 +13,26 @@ ODOM_FRAME = "odom"
 MAP_FRAME = "map"
 SERVO_JOINT = "sonar_servo_joint"
 
+_VELOCITY = "geometry_msgs/Twist"
 _ALWAYS = {
     topics.JOINT_STATES: "sensor_msgs/JointState",
-    topics.VELOCITY: "geometry_msgs/Twist",
     topics.GROUND_TRUTH: "nav_msgs/Odometry",
     topics.BEAMS: "underwater_map_construction/SonarScanLine",
 }
 TOPICS = {
-    Instruments.DVL: {topics.TRANSFORMS: "tf2_msgs/TFMessage", topics.ODOMETRY: "nav_msgs/Odometry", **_ALWAYS},
-    Instruments.COMPASS: {topics.HEADING: "sensor_msgs/Imu", topics.DEPTH: "std_msgs/Float64", **_ALWAYS},
+    Instruments.DVL: {
+        topics.TRANSFORMS: "tf2_msgs/TFMessage",
+        topics.ODOMETRY: "nav_msgs/Odometry",
+        topics.VELOCITY: _VELOCITY,
+        **_ALWAYS,
+    },
+    Instruments.COMPASS: {
+        topics.HEADING: "sensor_msgs/Imu",
+        topics.DEPTH: "std_msgs/Float64",
+        topics.VELOCITY: _VELOCITY,
+        **_ALWAYS,
+    },
+    Instruments.NONE: {topics.TRANSFORMS: "tf2_msgs/TFMessage", **_ALWAYS},
 }
 """Topics and their types; relative to the namespace, except /tf."""
 
@@ -31,7 +42,7 @@ _Told = List[Tuple[str, Any]]
 def map_origin(T_world_start: np.ndarray, instruments: Instruments) -> np.ndarray:
     """Return where the frame map begins in the world, (3,) m, for a vehicle that starts at a (4, 4) pose.
 
-    A compass knows no position: the vehicle's dead reckoning, and so its map, begins at x = y = 0.
+    Without a DVL it knows no position: its dead reckoning, and so its map, begins at x = y = 0.
     """
     if instruments is Instruments.DVL:
         return np.zeros(3)
@@ -67,7 +78,7 @@ class MomentMessages:
         """Return the (topic, message) pairs that place vehicle and sonar, the transform, if there is one, first."""
         pose = moment.odometry.T_odom_base
         joint = (topics.JOINT_STATES, self._joint_state(moment.tilt, stamp))
-        if instruments is Instruments.DVL:
+        if instruments is not Instruments.COMPASS:
             transform = self.transform(pose, stamp, ODOM_FRAME, BASE_FRAME)
             return [(topics.TRANSFORMS, self.transforms([transform])), joint]
         if not moment.is_tick:
@@ -109,7 +120,9 @@ class MomentMessages:
         if instruments is Instruments.DVL:
             odometry = self._odometry(moment.odometry.T_odom_base, moment.odometry.twist, stamp, ODOM_FRAME)
             messages.append((topics.ODOMETRY, odometry))
-        velocity = self._make(_ALWAYS[topics.VELOCITY])
+        if instruments is Instruments.NONE:
+            return messages
+        velocity = self._make(_VELOCITY)
         _move(velocity, moment.odometry.twist)
         return [(topics.VELOCITY, velocity), *messages]
 

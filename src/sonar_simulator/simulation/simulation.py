@@ -3,14 +3,14 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 from itertools import chain
-from typing import Iterator, List, Optional, Sequence
+from typing import Iterator, List, Optional, Sequence, Union
 
 import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
 from sonar_simulator.vehicle.movement import Movement, VehicleState
-from sonar_simulator.vehicle.odometry import Estimate, Odometry
+from sonar_simulator.vehicle.odometry import Estimate, NoOdometry, Odometry
 from sonar_simulator.vehicle.scripted_vehicle import TiltCommand
 from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
 
@@ -22,11 +22,19 @@ class Drive(Enum):
     COMMANDS = "CMD_VEL"
 
 
+class Head(Enum):
+    """What sends the beams."""
+
+    SIMULATED = "SIMULATED"
+    EMULATED = "EMULATED"
+
+
 class Instruments(Enum):
     """What the vehicle navigates with."""
 
     DVL = "DVL"
     COMPASS = "COMPASS"
+    NONE = "NONE"
 
 
 @dataclass(frozen=True)
@@ -47,7 +55,14 @@ class SimulatorParameters(ParameterSet):
     )
     instruments: Instruments = parameter(
         Instruments.DVL,
-        "DVL: publishes odometry and its tf; COMPASS: publishes imu and depth instead; simulate_bag always has a DVL",
+        "DVL: publishes odometry and its tf; COMPASS: publishes imu and depth instead; NONE: publishes a tf in "
+        "which the vehicle stays where it starts",
+        tunable=False,
+    )
+    head: Head = parameter(
+        Head.SIMULATED,
+        "SIMULATED: the simulator sends beams; EMULATED: an emulated head does, which follows true_sonar, a frame that "
+        "tf then knows in the frame world",
         tunable=False,
     )
     seed: int = parameter(
@@ -115,14 +130,17 @@ class Simulation:
     def __init__(
         self,
         movement: Movement,
-        odometry: Odometry,
+        odometry: Union[Odometry, NoOdometry],
         sonar: Sonar,
-        head: SonarHead,
+        head: Optional[SonarHead],
         T_base_sonar: np.ndarray,
         servo: Optional[Servo] = None,
         tilt_commands: Sequence[TiltCommand] = (),
     ) -> None:
-        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` the mount is fixed."""
+        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` the mount is fixed.
+
+        Without `head` there are no pings.
+        """
         self.duration = movement.duration
         self._movement = movement
         self._odometry = odometry
@@ -158,10 +176,14 @@ class Simulation:
         truth = self._movement.state(time)
         return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), is_tick, head_angle)
 
+    def sonar_pose(self, moment: Moment) -> np.ndarray:
+        """Return the (4, 4) T_world_sonar that the sonar truly has at a moment."""
+        return moment.truth.T_world_base @ tilted(self._T_base_sonar, moment.tilt)
+
     def _unheard(self, tick_rate: float) -> Iterator[Moment]:
         tick, beam = 0, 0
         while True:
-            tick_time, beam_time = tick / tick_rate, self._head.time(beam)
+            tick_time, beam_time = tick / tick_rate, np.inf if self._head is None else self._head.time(beam)
             if min(tick_time, beam_time) > self.duration:
                 return
             if beam_time <= tick_time:
@@ -177,7 +199,7 @@ class Simulation:
         sending = [moment for moment in moments if moment.head_angle is not None]
         if not sending:
             return moments
-        poses = np.array([moment.truth.T_world_base @ tilted(self._T_base_sonar, moment.tilt) for moment in sending])
+        poses = np.array([self.sonar_pose(moment) for moment in sending])
         beams = iter(self._sonar.pings(poses, np.array([moment.head_angle for moment in sending])))
         return [
             moment if moment.head_angle is None else replace(moment, ping=Ping(moment.head_angle, next(beams)))

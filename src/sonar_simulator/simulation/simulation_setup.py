@@ -2,17 +2,17 @@
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Mapping, Type
+from typing import Any, Callable, Dict, Mapping, Optional, Type, Union
 
 import numpy as np
 
 from node_support.parameters import ParameterError, ParameterSet
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
-from sonar_simulator.simulation.simulation import Drive, Simulation, SimulatorParameters
+from sonar_simulator.simulation.simulation import Drive, Head, Instruments, Simulation, SimulatorParameters
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle.commanded_vehicle import CommandedVehicle, VehicleParameters
-from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
+from sonar_simulator.vehicle.odometry import NoOdometry, Odometry, OdometryParameters
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 from sonar_simulator.vehicle.script_file import load_script
 from sonar_simulator.vehicle.scripted_vehicle import ScriptError
@@ -95,14 +95,26 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
     is_scripted = parameters.drive is Drive.SCRIPT
     simulation = Simulation(
         script if is_scripted else commanded,
-        Odometry(settings.odometry, script.pose(0.0), measurements),
+        _odometry(settings, script.pose(0.0), measurements),
         sonar,
-        SonarHead(settings.sonar.beams_per_turn, settings.sonar.seconds_per_turn),
+        _head(settings),
         T_base_sonar,
         servo,
         script.tilt_commands if is_scripted else (),
     )
     return Setup(simulation, world, sonar, servo, commanded, T_base_sonar, script.pose(0.0))
+
+
+def _head(settings: Settings) -> Optional[SonarHead]:
+    if settings.simulator.head is Head.EMULATED:
+        return None
+    return SonarHead(settings.sonar.beams_per_turn, settings.sonar.seconds_per_turn)
+
+
+def _odometry(settings: Settings, start: np.ndarray, rng: np.random.Generator) -> Union[Odometry, NoOdometry]:
+    if settings.simulator.instruments is Instruments.NONE:
+        return NoOdometry(start)
+    return Odometry(settings.odometry, start, rng)
 
 
 def _load_world(path: Path, warn: Callable[[str], None]) -> World:

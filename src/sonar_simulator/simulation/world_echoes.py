@@ -1,7 +1,7 @@
 """Echoes from a world file for an emulated head, which needs one ping at a time (thesis 6.4)."""
 
 import math
-from typing import Protocol
+from typing import Callable, Optional, Protocol
 
 import numpy as np
 
@@ -38,38 +38,46 @@ class HeadInWorld(Protocol):
     seed: int
 
 
+Place = Callable[[], Optional[np.ndarray]]
+"""Returns the (4, 4) T_world_sonar of now; None where it is not known."""
+
+_SPREAD = 0.15  # m: the length of a real head's usual pulse of 100 us
 DEFAULT_SONAR = SonarParameters()
 
 
 class WorldEchoes:
-    """Answers pings with what a head at rest hears in a world; the gain scales the strengths."""
+    """Answers pings with what a head hears in a world; the gain scales the strengths."""
 
-    def __init__(
-        self, world: World, T_world_sonar: np.ndarray, seed: int, sonar: SonarParameters = DEFAULT_SONAR
-    ) -> None:
-        """Raises MissingPackageError when the ray caster is not installed. `T_world_sonar` is (4, 4)."""
+    def __init__(self, world: World, place: Place, seed: int, sonar: SonarParameters = DEFAULT_SONAR) -> None:
+        """Raises MissingPackageError when the ray caster is not installed."""
         self._caster = RayCaster(world)
-        self._pose = T_world_sonar
+        self._place = place
         self._pattern: BeamPattern = sonar.pattern()
         self._rng = np.random.default_rng(seed)
 
     def echoes(self, ping: PingRequest) -> bytes:
-        """Return `ping.bin_count` echo strengths (0 to 255), nearest bin first."""
-        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.max_range))
+        """Return `ping.bin_count` echo strengths (0 to 255), nearest bin first; none are heard without a place."""
+        pose = self._place()
+        if pose is None:
+            return bytes(ping.bin_count)
+        model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.max_range, spread=_SPREAD))
         sonar = Sonar(self._caster, self._pattern, model, self._rng)
         factor = 10 ** (ping.gain_db / 20)
-        strengths = sonar.ping(self._pose, ping.angle) * factor
+        strengths = sonar.ping(pose, ping.angle) * factor
         return np.minimum(np.rint(strengths), 255).astype(np.uint8).tobytes()
 
 
-def world_echoes(parameters: HeadInWorld) -> WorldEchoes:
-    """Load the world and place the head, upright; raises ParameterError when the file cannot be used."""
+def world_echoes(parameters: HeadInWorld, place: Optional[Place] = None) -> WorldEchoes:
+    """Load the world; raises ParameterError when the file cannot be used.
+
+    place: of a head that moves; without it the head stands still, upright, where the parameters say.
+    """
     position = parameters.x, parameters.y, parameters.z
     pose = pose_matrix(position, (0.0, 0.0, math.radians(parameters.yaw_deg)))
     sonar = SonarParameters(
         vertical_opening_deg=parameters.beam_height_deg, horizontal_opening_deg=parameters.beam_width_deg
     )
     try:
-        return WorldEchoes(load_world(parameters.world_file).world, pose, parameters.seed, sonar)
+        return WorldEchoes(load_world(parameters.world_file).world, place or (lambda: pose), parameters.seed, sonar)
     except WorldError as error:
         raise ParameterError(f"world_file: {error}") from error

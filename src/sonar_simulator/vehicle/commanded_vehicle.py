@@ -34,7 +34,7 @@ class VehicleParameters(ParameterSet):
     )
 
     def limits(self) -> np.ndarray:
-        """Return the greatest surge, sway, heave [m/s] and turn rate [rad/s]."""
+        """Return (4,) the greatest surge, sway, heave [m/s] and turn rate [rad/s]."""
         return np.array([self.surge_speed, self.sway_speed, self.heave_speed, math.radians(self.turn_rate_deg)])
 
 

@@ -39,6 +39,19 @@ class Estimate(NamedTuple):
     twist: np.ndarray
 
 
+class NoOdometry:
+    """What a vehicle that measures nothing knows: it stays where it starts, at x = y = 0."""
+
+    def __init__(self, start: np.ndarray) -> None:
+        """`start`: (4, 4) T_world_base at time 0."""
+        self._pose = start.copy()
+        self._pose[:2, 3] = 0.0
+
+    def estimate(self, time: float, state: VehicleState) -> Estimate:
+        """Return the same at any time."""
+        return Estimate(self._pose, np.zeros(6))
+
+
 class Odometry:
     """Dead reckoning from a speed and a turn rate measured with errors. At the start, odom is the world frame.
 

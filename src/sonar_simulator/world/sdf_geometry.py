@@ -22,7 +22,7 @@ _PROPERTIES = ("reflection", "slope", "lambert_db", "mirror")
 def shape_of(geometry: Element, name: str, pose: np.ndarray, is_collision: bool, beside: Path) -> Shape:
     """Return the shape that a child of <geometry> describes; `beside` is the folder of its file.
 
-    Raises ValueError or WorldError that say what is wrong with it.
+    pose: (4, 4) in the world. Raises ValueError or WorldError that say what is wrong with it.
     """
     if geometry.tag == "plane":
         return Shape(name, "plane", pose @ _turned_to(_normal(geometry)), _plane_size(geometry, is_collision))

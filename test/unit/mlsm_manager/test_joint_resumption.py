@@ -209,7 +209,8 @@ def test_a_run_that_does_not_fit_leaves_the_map_alone(killed, name, array):
 def test_a_run_with_another_odometry_profile_is_refused(killed):
     _, stored = killed
     other = PARAMETERS.changed({"odometry": "THRUSTERS"}).build_localiser(SONAR_IN_BASE)
-    assert other.restore(stored, same_odometry=True) == "it was stored with another odometry profile"
+    told = "it was stored with another odometry profile: DvlFactors, not ThrusterFactors"
+    assert other.restore(stored, same_odometry=True) == told
     assert other.mapper.solver is None
     assert other.map.block_count == len(stored.shown)
 
@@ -220,7 +221,8 @@ def test_two_profiles_with_as_many_unknowns_are_told_apart():
         made[kind] = PARAMETERS.changed({"odometry": kind}).build_localiser(SONAR_IN_BASE)
     taken(made["THRUSTERS"], scans)
     stored = made["THRUSTERS"].stored("map", {}, 0.0, "run")
-    assert made["NONE"].restore(stored, same_odometry=True) == "it was stored with another odometry profile"
+    told = "it was stored with another odometry profile: ThrusterFactors, not UnaidedFactors"
+    assert made["NONE"].restore(stored, same_odometry=True) == told
 
 
 def test_a_run_is_only_stored_for_the_run_of_the_graph_that_can_go_on_with_it(killed):

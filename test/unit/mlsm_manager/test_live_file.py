@@ -12,6 +12,7 @@ from hypothesis import strategies as st
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
+from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.parameters import MapInput
 from mlsm_manager.offline.live_file import NODES, live_text, live_values, replay_values, write_live
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -69,9 +70,16 @@ def values_of(field):
 
 
 OF_THE_MACHINE = {"solver_kernel"}
+
+
+def allowed_together(values):
+    """Return values without parts of turns where no heading is known."""
+    return {**values, "scan_parts": 1} if values["odometry"] is OdometryKind.NONE else values
+
+
 ANY_PARAMETERS = st.fixed_dictionaries(
     {field.name: values_of(field) for field in dataclasses.fields(ReplayParameters) if field.name not in OF_THE_MACHINE}
-)
+).map(allowed_together)
 
 
 @lru_cache(maxsize=None)

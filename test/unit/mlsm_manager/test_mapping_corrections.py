@@ -74,6 +74,17 @@ def test_a_fix_of_the_past_is_brought_to_now_by_the_odometry():
     np.testing.assert_allclose(correction.sample(TIMES[50], odometry(TIMES[50])), [0.0, 3.0, 0.0], atol=1e-9)
 
 
+@pytest.mark.parametrize("sampled_until", [1.9, 1.5, 0.0])
+def test_a_fix_newer_than_the_odometry_is_advanced_from_its_own_time_on(sampled_until):
+    """The fix is of 2 s; the first odometry after it is of 2.3 s."""
+    odometry = at_velocity((0.5, 0.0, 0.0))
+    correction = LiveCorrection(0.0)
+    for time in (0.0, sampled_until):
+        correction.sample(time, odometry(time))
+    correction.believe(belief_of(2.0, odometry(2.0) + np.array([0.0, 3.0, 0.0]), 0.2))
+    np.testing.assert_allclose(correction.sample(2.3, odometry(2.3)), [0.2 * 0.3, 3.0, 0.0], atol=1e-9)
+
+
 def test_an_error_of_the_speed_that_was_found_goes_on():
     correction = LiveCorrection(0.0)
     correction.believe(belief_of(0.0, np.zeros(3), 0.2))

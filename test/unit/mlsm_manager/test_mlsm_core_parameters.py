@@ -34,6 +34,11 @@ def test_compiled_loops_without_numba_are_refused_in_one_line(monkeypatch, key):
         MlsmCoreParameters(**{key: "NUMBA"})
 
 
+def test_parts_of_turns_without_any_heading_are_refused():
+    with pytest.raises(ParameterError, match=r"scan_parts = 3: must be 1 with odometry = NONE"):
+        MlsmCoreParameters(odometry="NONE", scan_parts=3)
+
+
 def test_without_numba_numpy_compares(monkeypatch):
     monkeypatch.setitem(sys.modules, "mlsm_manager.multi_view.compiled.compiled_search", None)
     assert SolverKernel.AUTO.resolved is SolverKernel.NUMPY

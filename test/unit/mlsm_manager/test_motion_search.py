@@ -6,12 +6,13 @@ from made_harbour import ahead, logged, tour
 
 from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
 from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry, HeadingOdometry
+from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry, HeadingOdometry, UnaidedOdometry
 from mlsm_manager.multi_view.motion.transition import Transition
+from mlsm_manager.multi_view.motion.unaided_factors import UnaidedFactors
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placing.path import NodePath
 from mlsm_manager.multi_view.search.motion_search import searched_node
-from mlsm_manager.multi_view.unknowns.state import State
+from mlsm_manager.multi_view.unknowns.state import YAW, State
 
 FAR = np.array([3.0, -5.0])
 HEADING = HeadingFactors(HeadingOdometry())
@@ -39,6 +40,18 @@ def test_a_scan_is_found_metres_from_where_it_was_expected(log):
 def test_a_scan_that_is_where_it_was_expected_stays(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
     found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, SurfaceMatching())
+    assert np.hypot(*found[:2]) < 1.5
+
+
+@pytest.mark.parametrize("turn", [-1.2, 0.5])
+def test_a_turn_that_nobody_measured_is_found(log, turn):
+    """A vehicle without a compass: the newest node is turned against the true heading, and beside the true place."""
+    unaided = UnaidedFactors(UnaidedOdometry())
+    state = state_with(log, unaided, np.array([1.0, 1.0]))
+    state.nodes[-1, YAW] = turn
+    covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3, 0.05]) ** 2
+    found = searched_node(log, unaided, state, covariance, SurfaceMatching())
+    assert abs(found[YAW]) < 0.1
     assert np.hypot(*found[:2]) < 1.5
 
 

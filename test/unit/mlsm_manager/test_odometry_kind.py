@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 import yaml
 
+from dead_reckoning.parameters import DeadReckoningParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import PROFILES, profile_values, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
@@ -54,3 +55,9 @@ def test_what_a_person_set_is_not_changed_by_a_profile():
     chosen = with_odometry(mine, OdometryKind.HEADING, {"slip_deviation"})
     assert chosen.slip_deviation == 0.4
     assert chosen.speed_deviation == profile_values(OdometryKind.HEADING)["speed_deviation"]
+
+
+@pytest.mark.parametrize("kind", [OdometryKind.HEADING, OdometryKind.HOVERING])
+def test_a_velocity_that_is_not_estimated_any_more_fades_as_fast_as_the_profile_lets_speeds_change(kind):
+    live = yaml.safe_load(profile_yaml(kind))
+    assert DeadReckoningParameters(**live["dead_reckoning"]).velocity_fading == profile_values(kind)["rate_time"]

@@ -59,6 +59,7 @@ def test_1_what_it_hears_after_the_silence_lies_apart(run):
 def test_2_it_is_found_in_the_map_from_before(run):
     found = run.localiser.relocalise()
     assert found.accepted
+    assert found.forgotten == AFTER
     np.testing.assert_allclose(found.result.pose[:2], run.expected[:2], atol=0.3)
 
 

@@ -49,7 +49,7 @@ def post(node, arm, share=0.5):
 @settings(max_examples=30, deadline=None)
 def test_the_compiled_loop_weighs_ways_as_numpy_does(seed, sources, targets):
     pytest.importorskip("numba")
-    rng, ways = np.random.RandomState(seed), ways_of(seed)
+    rng, ways = np.random.RandomState(seed), ways_of(seed, count=100)
     heard, earlier = echoes_of(rng, [7], sources), echoes_of(rng, [0, 1], targets)
     one, other = (nats_of(ways, heard, earlier, kernel) for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA))
     np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)

@@ -1,3 +1,4 @@
+import math
 import sys
 from pathlib import Path
 
@@ -56,7 +57,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, sc
     assert first != third
 
 
-@pytest.mark.parametrize("instruments", ["DVL", "COMPASS"])
+@pytest.mark.parametrize("instruments", ["DVL", "COMPASS", "NONE"])
 def test_moments_written_together_are_written_as_one_by_one(tmp_path, script, monkeypatch, instruments):
     asked, add = ("--set", f"instruments={instruments}"), SimulatedBag.add
     _, together = _write(tmp_path, script, "together.bag", *asked)
@@ -71,6 +72,18 @@ def test_the_map_of_a_vehicle_that_knows_no_position_begins_where_it_starts(tmp_
     _, out = _write(tmp_path, script, "at.bag", "--set", f"instruments={instruments}")
     position = _messages(out, "/ground_truth")[0][0].pose.pose.position
     assert (position.x, position.y, position.z) == pytest.approx((*begin, -1.5))
+
+
+def test_without_instruments_the_odometry_stays_where_the_vehicle_starts(tmp_path, script):
+    script.write_text("start: {x: 1.0, y: -2.0, z: -1.5, yaw_deg: 90.0}\nmoves: [{x: 2.0, yaw_deg: 40.0}]\n")
+    _, out = _write(tmp_path, script, "still.bag", "--set", "instruments=NONE")
+    placed = [message.transforms[0] for message, _ in _messages(out, "/tf") if len(message.transforms) > 1]
+    shifts = [(place.transform.translation.x, place.transform.translation.y) for place in placed]
+    assert {place.child_frame_id for place in placed} == {"base_link"}
+    assert set(shifts) == {(0.0, 0.0)}
+    turns = np.array([place.transform.rotation.z for place in placed])
+    np.testing.assert_allclose(turns, math.sqrt(0.5))
+    assert not _messages(out, "/cmd_vel")
 
 
 def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):

@@ -27,11 +27,13 @@ def head_in(world_file):
 
 @pytest.fixture
 def source():
-    return WorldEchoes(WALL, np.eye(4), seed=1)
+    return WorldEchoes(WALL, lambda: np.eye(4), seed=1)
 
 
 def mean_range(echoes, max_range):
+    """Return the mean range of the strong echoes; those of noise are weaker."""
     strengths = np.frombuffer(echoes, dtype=np.uint8).astype(float)
+    strengths[strengths < 0.9 * strengths.max()] = 0.0
     return np.average((np.arange(len(strengths)) + 0.5) * max_range / len(strengths), weights=strengths)
 
 
@@ -55,8 +57,17 @@ def test_less_gain_makes_weaker_echoes(source):
 
 
 def test_the_head_hears_from_where_it_was_placed():
-    source = WorldEchoes(WALL, pose_matrix((5.0, 0.0, 0.0), (0.0, 0.0, math.pi)), seed=1)
+    place = pose_matrix((5.0, 0.0, 0.0), (0.0, 0.0, math.pi))
+    source = WorldEchoes(WALL, lambda: place, seed=1)
     assert mean_range(source.echoes(ping(angle=math.pi)), 20) == pytest.approx(5.0, abs=0.5)
+
+
+def test_a_head_that_moves_hears_from_where_it_is_at_each_ping():
+    places = iter([pose_matrix((5.0, 0.0, 0.0)), None, pose_matrix((2.0, 0.0, 0.0))])
+    source = WorldEchoes(WALL, lambda: next(places), seed=1)
+    near, nowhere, far = (source.echoes(ping()) for _ in range(3))
+    assert [mean_range(near, 20), mean_range(far, 20)] == pytest.approx([5.1, 8.1], abs=0.5)
+    assert nowhere == bytes(500)
 
 
 def test_a_world_that_cannot_be_read_is_a_bad_parameter():

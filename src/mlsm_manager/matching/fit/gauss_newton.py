@@ -31,7 +31,7 @@ class PriorState:
     information: np.ndarray
 
     def prior_cost(self, theta: np.ndarray) -> float:
-        """Return half the squared Mahalanobis distance of a state from the mean."""
+        """Return half the squared Mahalanobis distance of a state (8,) from the mean."""
         difference = theta - self.mean
         return float(difference @ self.information @ difference) / 2.0
 

@@ -95,7 +95,7 @@ class PointEquations:
         return self._correspondences(world, self._motion.arms(world, path))
 
     def normal(self, theta: np.ndarray, scale: float) -> Normal:
-        """Return the normal equations at `theta` with a robust kernel of `scale` standard deviations."""
+        """Return the normal equations at `theta` (8,) with a robust kernel of `scale` standard deviations."""
         correspondences = self.correspondences(theta)
         weight = self._weights(correspondences, scale)
         robust = weight * geman_mcclure(correspondences.squared, scale)

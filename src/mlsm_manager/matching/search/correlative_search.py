@@ -106,6 +106,6 @@ def _clear_around(best: np.ndarray, index: tuple, yaws: np.ndarray, offsets: np.
 
 
 def separation(first: np.ndarray, second: np.ndarray) -> float:
-    """Return how far apart two states are: 1 where they differ by what keeps two candidates apart."""
+    """Return how far apart two states (8,) are: 1 where they differ by what keeps two candidates apart."""
     distance = np.hypot(*(first[POSITION] - second[POSITION])) / _APART
     return float(max(distance, abs(float(wrapped(first[YAW] - second[YAW]))) / _APART_YAW))

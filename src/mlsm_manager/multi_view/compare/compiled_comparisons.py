@@ -31,8 +31,10 @@ class CompiledNeighbours:
         if not len(sources) or not len(targets):
             nothing = np.empty(0, dtype=np.int64)
             return nothing, nothing, np.empty(0), np.empty(0)
-        if not (np.isfinite(sources.places).all() and np.isfinite(targets.places).all()):
-            raise ValueError("points without a finite place")
+        for points in (sources, targets):
+            if not np.isfinite(points.places).all():
+                nowhere = np.count_nonzero(~np.isfinite(points.places).all(axis=1))
+                raise ValueError(f"{nowhere} of {len(points)} points without a finite place")
         places, other_places = np.ascontiguousarray(sources.places), np.ascontiguousarray(targets.places)
         cells = Cells(*sorted_into_cells(places, other_places, cut + TIE))
         return shared_neighbours(

@@ -53,7 +53,7 @@ class PointTable:
         return np.arange(self._starts[first], self._starts[last])
 
     def points(self, rows: np.ndarray) -> SurfacePoints:
-        """Return the points in `rows`."""
+        """Return the points in `rows` (n,) int."""
         return SurfacePoints(**{name: array.values[rows] for name, array in self._points.items()})
 
     def scans(self, rows: np.ndarray) -> np.ndarray:

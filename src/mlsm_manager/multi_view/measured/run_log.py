@@ -85,7 +85,7 @@ class RunLog:
         return self._surfaces.rows(first, last)
 
     def points(self, rows: np.ndarray) -> SurfacePoints:
-        """Return the points in `rows`."""
+        """Return the points in `rows` (n,) int."""
         return self._surfaces.points(rows)
 
     def scans(self, rows: np.ndarray) -> np.ndarray:

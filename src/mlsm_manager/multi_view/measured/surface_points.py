@@ -123,5 +123,5 @@ def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, 
 
 
 def ramp(values: np.ndarray, zero: np.ndarray, one: np.ndarray) -> np.ndarray:
-    """Return 0 for values at `zero` and beyond, 1 at `one` and beyond, and linearly between."""
+    """Return 0 for values (...) at `zero` and beyond, 1 at `one` and beyond, and linearly between."""
     return np.clip((values - zero) / (one - zero), 0.0, 1.0)

@@ -33,7 +33,10 @@ def add_forgetting(
 def add_compass(
     equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray, compass: Compass
 ) -> None:
-    """Add how the correction of the reported heading changes: an error that lasts, and a walk."""
+    """Add how the correction of the reported heading changes: an error that lasts, and a walk.
+
+    starts: (n - 1,) columns of all nodes but the last. nodes: (n, width). durations: (n - 1,) s between them.
+    """
     kept = np.exp(-durations / compass.heading_time)
     variance = compass.heading_deviation**2 * (1.0 - kept**2) + compass.heading_walk**2 * durations
     add_forgetting(equations, starts, nodes.shape[1], nodes[:, YAW], YAW, kept, variance)

@@ -82,12 +82,12 @@ def placed(
 def place(
     log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray, placing: Placing = placed
 ) -> PlacedPoints:
-    """Return the surface points in `rows` of the log."""
+    """Return the surface points in `rows` (n,) int of the log."""
     return placing(log, odometry, state, log.points(rows), log.scans(rows))
 
 
 def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the lone points in `rows` of the log's table of these."""
+    """Return the lone points in `rows` (n,) int of the log's table of these."""
     return placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
 
 

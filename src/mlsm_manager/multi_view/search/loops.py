@@ -73,7 +73,10 @@ def agreed(loops: List[Loop]) -> List[Loop]:
 
 
 def add_loops(equations: NormalEquations, layout: Layout, loops: List[Loop], nodes: np.ndarray, start: State) -> None:
-    """Add that the scans of `loops` are moved by their shifts against `start`, in which these were found."""
+    """Add that the scans of `loops` are moved by their shifts against `start`, in which these were found.
+
+    nodes: (n, width) as they are now.
+    """
     if not loops:
         return
     ends = np.array([[loop.scan + 1, loop.older + 1] for loop in loops])

@@ -1,5 +1,7 @@
 """Looks for the newest node where the solver's own steps do not reach, because the motion is hardly known."""
 
+from typing import NamedTuple, Tuple
+
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -8,7 +10,7 @@ from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
 from mlsm_manager.multi_view.motion.transition import Transition
 from mlsm_manager.multi_view.parameters import SurfaceMatching
 from mlsm_manager.multi_view.placing.placement import PlacedPoints, place, place_lone
-from mlsm_manager.multi_view.unknowns.state import BEFORE_THE_RUN, State
+from mlsm_manager.multi_view.unknowns.state import BEFORE_THE_RUN, YAW, State
 
 _REACH = 3.0  # standard deviations of the step within which is searched
 _KNOWN = 2.0  # so many within the cut, and the solver's own steps do
@@ -17,6 +19,10 @@ _CELL = 1.0  # m: about twice the deviation of an echo, so that no place falls b
 COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
 _MOST_POINTS = 150  # of the newest scan; neighbours on a wall say the same
 _LONE_NATS = 1.0  # that a point which stands alone is worth where another one stood: there are few
+_FEW_POINTS = 50  # of it, while many turns are compared
+_KNOWN_TURN = 0.1  # rad, deviation: the solver's own steps find turns of less than twice as much
+_TURN_CELL = 0.08  # rad: moves an echo 20 m away by less than twice a cell
+_LEAST_LEFT = 1e-6  # rad^2: of the heading, once a turn is chosen
 _NATS = 0.1  # that a point on a surface is worth: neighbours share errors
 
 
@@ -42,14 +48,51 @@ def searched_node(
     before, own = log.rows(min(max(first, last - 1 - COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
-    sources = place(log, odometry, state, own[:: max(1, len(own) // _MOST_POINTS)])
-    shifts = cells(step[:2, :2], _MOST_CELLS)
-    found = _NATS * fits(sources, place(log, odometry, state, before), _moved(sources, shifts), matching)
-    if matching.lone_quality:
-        found = found + matching.lone_quality * _LONE_NATS * _lone_fits(log, odometry, state, shifts, matching)
-    costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
-    best = shifts[np.argmax(found - costs)]
-    return newest + step[:, :2] @ np.linalg.solve(step[:2, :2], best)
+    search = _Search(log, odometry, matching, place(log, odometry, state, before), own)
+    if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
+        state, step = search.turned(state, step)
+    return search.beside(state, step, _MOST_POINTS)[1]
+
+
+class _Search(NamedTuple):
+    """What the newest scan is compared with. targets: of earlier scans. own: (n,) rows of the newest scan's points."""
+
+    log: RunLog
+    odometry: OdometryModel
+    matching: SurfaceMatching
+    targets: PlacedPoints
+    own: np.ndarray
+
+    def beside(self, state: State, step: np.ndarray, most: int) -> Tuple[float, np.ndarray]:
+        """Return the newest node (width,) at the best place near its own, and what speaks for it [nats].
+
+        step: covariance (width, width) of the node. most: points of the scan that are compared.
+        """
+        log, odometry, matching = self.log, self.odometry, self.matching
+        sources = place(log, odometry, state, self.own[:: max(1, len(self.own) // most)])
+        shifts = cells(step[:2, :2], _MOST_CELLS)
+        found = _NATS * _MOST_POINTS / most * fits(sources, self.targets, _moved(sources, shifts), matching)
+        if matching.lone_quality:
+            found = found + matching.lone_quality * _LONE_NATS * _lone_fits(log, odometry, state, shifts, matching)
+        costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
+        best = np.argmax(found - costs)
+        node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])
+        return float((found - costs)[best]), node
+
+    def turned(self, state: State, step: np.ndarray) -> Tuple[State, np.ndarray]:
+        """Return the state whose newest node is turned as its scan fits best, and what is open then of `step`."""
+        deviation = np.sqrt(step[YAW, YAW])
+        by_yaw = step[:, YAW] / step[YAW, YAW]
+        left = step - np.outer(by_yaw, step[YAW])
+        left[YAW, YAW] = max(left[YAW, YAW], _LEAST_LEFT)
+        count = int(np.ceil(_REACH * deviation / _TURN_CELL))
+        states, told = [], []
+        for turn in _TURN_CELL * np.arange(-count, count + 1):
+            candidate = state.copy()
+            candidate.nodes[-1] += by_yaw * turn
+            states.append(candidate)
+            told.append(self.beside(candidate, left, _FEW_POINTS)[0] - 0.5 * (turn / deviation) ** 2)
+        return states[int(np.argmax(told))], left
 
 
 def step_covariance(

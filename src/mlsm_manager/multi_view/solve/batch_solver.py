@@ -17,7 +17,7 @@ from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.multi_view.placing.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.multi_view.placing.placement import PlacedPoints, place
-from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
+from mlsm_manager.multi_view.priors import add_belief, add_told_steps, run_deviations, run_mean
 from mlsm_manager.multi_view.search.loops import Loop, add_loops, loops_of
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.unknowns.normal_equations import NormalEquations, solution_of
@@ -26,6 +26,7 @@ from mlsm_manager.multi_view.unknowns.state import POSE_COLUMNS, RUN_COLUMNS, La
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
 _CONVINCING = 10.0  # nats by which a run with loops must fit better
+_TOLD_STEP = 0.3  # m: deviation of a step of a path that is told, within which scans then find their places
 _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
 
@@ -97,18 +98,31 @@ def closed(live: LiveSolver, batch: BatchResult) -> Closed:
 
 
 def solved(
-    live: LiveSolver, parameters: Optional[MultiViewParameters] = None, start: Optional[State] = None
+    live: LiveSolver,
+    parameters: Optional[MultiViewParameters] = None,
+    start: Optional[State] = None,
+    keeps_steps: bool = False,
 ) -> BatchResult:
     """Return the fit of all scans that `live` has taken; its own state stays as it is.
 
-    parameters, start: others than those of `live`, with the same odometry.
+    parameters, start: others than those of `live`, with the same odometry. keeps_steps: see `settled`.
     """
     parameters, start = parameters or live.parameters, start or live.state
-    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy())
+    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy(), keeps_steps=keeps_steps)
     steps, converged = problem.converge()
     poses, run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(live, problem.state))
     return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
+
+
+def settled(live: LiveSolver, start: State) -> State:
+    """Return the unknowns of the fit that begins at `start` and takes its steps for told, without covariances.
+
+    Where next to nothing tells the way along a wall, a fit that is not told creeps to a standstill there.
+    """
+    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, start.copy(), keeps_steps=True)
+    problem.converge()
+    return problem.state
 
 
 def solved_part(live: LiveSolver, first: int) -> PartResult:
@@ -140,12 +154,13 @@ class _Batch:
         parameters: MultiViewParameters,
         state: State,
         loops: Sequence[Loop] = (),
+        keeps_steps: bool = False,
     ) -> None:
         self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
         self._islands = islands
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
-        self._loops, self._start = list(loops), state.copy()
+        self._loops, self._start, self._keeps_steps = list(loops), state.copy(), keeps_steps
         self._solution = None
         self._move = np.zeros(self._layout.size)
         self._comparing = Comparing.by(parameters.kernel)
@@ -188,6 +203,9 @@ class _Batch:
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
+        if self._keeps_steps:
+            now, told = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._start))
+            add_told_steps(equations, self._layout, now, told, _TOLD_STEP)
         return equations
 
     def _met(self) -> Tuple[PlacedPoints, Pairs]:

@@ -30,7 +30,7 @@ class FrozenMap:
     run: np.ndarray
 
     def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
-        """Return the points with the run's unknowns at `run`, to first order."""
+        """Return the points with the run's unknowns at `run` (2,), to first order."""
         return self.points.moved_by_run(run - self.run)
 
 

@@ -84,7 +84,10 @@ class LiveSolver:
         Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
         """
         if not np.array_equal(stored["odometry"], _name_of(parameters.odometry)):
-            raise ValueError("it was stored with another odometry profile")
+            name = stored["odometry"].tobytes().decode("ascii", "replace")
+            raise ValueError(
+                f"it was stored with another odometry profile: {name}, not {type(parameters.odometry).__name__}"
+            )
         start, known = stored["start"], stored["known"]
         solver = cls(
             parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None

@@ -6,15 +6,19 @@ from typing import List
 import numpy as np
 
 from mlsm_manager.multi_view.placing.estimate import misfit_covariance
-from mlsm_manager.multi_view.solve.batch_solver import BatchResult, solved
+from mlsm_manager.multi_view.shifting.shift_search import ShiftSearch
+from mlsm_manager.multi_view.solve.batch_solver import BatchResult, settled, solved
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.unknowns.state import State
+from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.multi_view.ways.way_nodes import on_path
-from mlsm_manager.multi_view.ways.way_search import WaySearch, agreement_of, needs_ways
+from mlsm_manager.multi_view.ways.way_search import WaySearch, needs_ways
 
 _SEARCHES = 3  # besides the live one: one of three or four loses a simulated tour now and then
 _ALL_TURNS = 200  # that ways reach back: all of a run of 50 minutes
 _LIKELY = 10.0  # nats: a fit that agrees less by so much is believed e times less, since neighbours share errors
+_LONGEST_SHIFTED = 80  # turns, about 20 minutes: the time that shifts take grows faster than with their square
+_CLEARLY = 3.0  # nats by which shifted paths must be better than the best fit before, or else that one is good enough
 
 
 def solved_best(live: LiveSolver) -> BatchResult:
@@ -23,27 +27,59 @@ def solved_best(live: LiveSolver) -> BatchResult:
     Where the motion is reported, or hardly changes within a turn, the first is the only one. Places that differ
     between fits that agree about as well are uncertain by as much.
     """
-    fits = [solved(live)]
-    if needs_ways(live.odometry, live.parameters.matching):
-        fits += [solved(live, start=_found(live, seed)) for seed in range(1, _SEARCHES + 1)]
-    return _best(live, fits) if len(fits) > 1 else fits[0]
+    if not needs_ways(live.odometry, live.parameters.matching):
+        return solved(live)
+    fits = [solved(live), *(solved(live, start=_found(live, seed)) for seed in range(1, _SEARCHES + 1))]
+    search = _shift_search(live)
+    nats = [search.judged(_path(live, fit.state)).nats for fit in fits]
+    for better in _shifted(live, search, fits, max(nats) + _CLEARLY):
+        fits.append(better)
+        nats.append(search.judged(_path(live, better.state)).nats)
+    return _best(live, fits, np.array(nats))
 
 
 def _found(live: LiveSolver, seed: int) -> State:
     """Return the unknowns on the ways that a search of the whole run believes most."""
     search = WaySearch(live.parameters, seed=seed, remembered_turns=_ALL_TURNS).followed(live.log)
-    path, start = search.ways.most_believed(), live.state.copy()
+    return _on_path(live, search.ways.most_believed())
+
+
+def _shift_search(live: LiveSolver) -> ShiftSearch:
+    log, parameters = live.log, live.parameters
+    scans = range(log.scan_count)
+    echoes = WayEchoes.joined([WayEchoes.of(log, parameters.odometry, parameters, scan) for scan in scans])
+
+    def refit(path: np.ndarray) -> np.ndarray:
+        return _path(live, settled(live, _on_path(live, path)))
+
+    return ShiftSearch(echoes, log.node_times.copy(), parameters.matching.scan_parts, refit)
+
+
+def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], least: float) -> List[BatchResult]:
+    """Return fits from paths that shifts of those of `fits` lead to, none if none is worth `least` nats."""
+    if live.log.scan_count > _LONGEST_SHIFTED * live.parameters.matching.scan_parts:
+        return []
+    climbed = search.climbed([_path(live, fit.state) for fit in fits])
+    if climbed[0].nats < least:
+        return []
+    return [solved(live, start=_on_path(live, one.path), keeps_steps=True) for one in climbed]
+
+
+def _on_path(live: LiveSolver, path: np.ndarray) -> State:
+    """Return the unknowns of `live` with its newest nodes on `path` (k, 2) [m] in map."""
+    start = live.state.copy()
     newest = np.arange(len(start.nodes) - len(path), len(start.nodes))
     start.nodes[newest] = on_path(start.nodes[newest], path, live.log.node_motion(newest))
     return start
 
 
-def _best(live: LiveSolver, fits: List[BatchResult]) -> BatchResult:
-    nodes = np.arange(len(live.log.node_times))
-    reported = live.log.node_poses(nodes)[:, :2]
-    paths = np.array([reported + fit.state.nodes[:, :2] for fit in fits])
-    nats = np.array([agreement_of(live.log, live.parameters, path) for path in paths])
-    best = int(np.argmax(nats))
+def _path(live: LiveSolver, state: State) -> np.ndarray:
+    """Return where the nodes are (n, 2) [m] in map."""
+    return live.log.node_poses(np.arange(len(state.nodes)))[:, :2] + state.nodes[:, :2]
+
+
+def _best(live: LiveSolver, fits: List[BatchResult], nats: np.ndarray) -> BatchResult:
+    paths, best = np.array([_path(live, fit.state) for fit in fits]), int(np.argmax(nats))
     shares = np.exp((nats - nats.max()) / _LIKELY)
     apart = ((paths - paths[best]) ** 2).sum(axis=2) / 2.0
     spread = (shares[:, np.newaxis] * apart).sum(axis=0) / shares.sum()

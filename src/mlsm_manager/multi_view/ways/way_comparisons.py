@@ -12,17 +12,20 @@ ACROSS = 0.7  # m: deviation of an echo across the surface of another
 ALONG = 1.5  # m: and along it, where it tells less
 AROUND = 1.0  # m: of an echo that stands alone
 FARTHEST = 12.0  # squared deviations; echoes farther apart tell nothing
-_FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
+FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
 _GATE = 8.0  # m that two echoes may be apart on the mean path, besides twice the ways' spread
 
 _AT_ONCE = 200  # ways whose echoes are placed together: as many as fit into a processor's cache
 
 
 class Nearby(NamedTuple):
-    """targets: that any source may lie on. starts: (n + 1,) where those of each source stand in rows. rows: (m,)."""
+    """targets: that any source may lie on. sources, rows: (m,) pairs of a source and the row of such a target.
+
+    Pairs stand in the order of their sources.
+    """
 
     targets: WayEchoes
-    starts: np.ndarray
+    sources: np.ndarray
     rows: np.ndarray
 
 
@@ -44,11 +47,11 @@ def nearby_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Nearby:
     reached = np.flatnonzero(((earlier > heard.min(axis=0) - gate) & (earlier < heard.max(axis=0) + gate)).all(axis=1))
     targets, apart = targets.selected(reached), np.abs(heard[:, np.newaxis] - earlier[reached])
     own, others = np.nonzero((apart[..., 0] < gate) & (apart[..., 1] < gate))
-    facing = np.einsum("na,na->n", sources.normals[own], targets.normals[others]) > _FACING
-    alike = (sources.lone[own] == targets.lone[others]) & (sources.lone[own] | facing)
-    alike &= np.hypot(apart[own, others, 0], apart[own, others, 1]) < gate
-    rows, places = np.unique(others[alike], return_inverse=True)
-    return Nearby(targets.selected(rows), np.searchsorted(own[alike], np.arange(len(sources) + 1)), places)
+    facing = np.einsum("na,na->n", sources.normals[own], targets.normals[others]) > FACING
+    near = np.hypot(apart[own, others, 0], apart[own, others, 1]) < gate
+    near &= (sources.lone[own] == targets.lone[others]) & (sources.lone[own] | facing)
+    some, rows = np.unique(others[near], return_inverse=True)
+    return Nearby(targets.selected(some), own[near], rows)
 
 
 def nats_among(ways: Ways, sources: WayEchoes, nearby: Nearby, kernel: SolverKernel) -> np.ndarray:
@@ -57,12 +60,21 @@ def nats_among(ways: Ways, sources: WayEchoes, nearby: Nearby, kernel: SolverKer
         return _nats(ways, sources, nearby)
     from mlsm_manager.multi_view.compiled.compiled_ways import way_nats
 
-    targets = nearby.targets
+    order = np.argsort(nearby.rows, kind="stable")
+    starts = np.searchsorted(nearby.rows[order], np.arange(len(nearby.targets) + 1))
     return way_nats(
-        np.ascontiguousarray(ways.paths), nearby.starts, nearby.rows, sources.arms, sources.shares, sources.nats,
-        sources.lone, targets.nodes, targets.arms, targets.shares, targets.normals,
-        np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST,
+        np.ascontiguousarray(ways.paths), starts, nearby.sources[order], _columns(sources), sources.nats,
+        nearby.targets.nodes, _columns(nearby.targets), FARTHEST,
     )  # fmt: skip
+
+
+def _columns(echoes: WayEchoes) -> np.ndarray:
+    """Return the points (n, 7) as `compiled_ways` takes them. One that stands alone has no normal of its own."""
+    lone = echoes.lone[:, np.newaxis]
+    normals = np.where(lone, [1.0, 0.0], echoes.normals)
+    across = normals / np.where(lone, AROUND, ACROSS)
+    along = np.column_stack([-normals[:, 1], normals[:, 0]]) / np.where(lone, AROUND, ALONG)
+    return np.ascontiguousarray(np.column_stack([echoes.arms, echoes.shares, across, along]))
 
 
 def _nats(ways: Ways, sources: WayEchoes, nearby: Nearby) -> np.ndarray:
@@ -75,7 +87,7 @@ def _nats_of_some(paths: np.ndarray, sources: WayEchoes, nearby: Nearby) -> np.n
     heard = sources.places(paths, int(sources.nodes[0]) - last).transpose(2, 1, 0)
     earlier = np.ascontiguousarray(nearby.targets.places(paths, 0).transpose(2, 1, 0))
     for source in range(len(sources)):
-        rows = nearby.rows[nearby.starts[source] : nearby.starts[source + 1]]
+        rows = nearby.rows[nearby.sources == source]
         if len(rows):
             x, y = (own[source] - others[rows] for own, others in zip(heard, earlier))
             squared = squared_deviations(x, y, nearby.targets.normals[rows], bool(sources.lone[source])).min(axis=0)

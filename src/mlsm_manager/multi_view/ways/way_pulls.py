@@ -35,9 +35,9 @@ def pulls_of(ways: Ways, sources: WayEchoes, nearby: Nearby, kernel: SolverKerne
         return _pulls(ways.paths, sources, nearby)
     from mlsm_manager.multi_view.compiled.compiled_pulls import way_pulls
 
-    targets = nearby.targets
+    targets, starts = nearby.targets, np.searchsorted(nearby.sources, np.arange(len(sources) + 1))
     return way_pulls(
-        np.ascontiguousarray(ways.paths), nearby.starts, nearby.rows, sources.arms, sources.shares, sources.nats,
+        np.ascontiguousarray(ways.paths), starts, nearby.rows, sources.arms, sources.shares, sources.nats,
         sources.lone, targets.nodes, targets.arms, targets.shares, targets.normals,
         np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST, FADING, _FREEDOM**-2.0,
     )  # fmt: skip
@@ -49,7 +49,7 @@ def _pulls(paths: np.ndarray, sources: WayEchoes, nearby: Nearby) -> np.ndarray:
     earlier = nearby.targets.places(paths, 0)
     matrices, pull = np.tile(_FREEDOM**-2.0 * np.eye(2), (len(paths), 1, 1)), np.zeros((len(paths), 2))
     for source in range(len(sources)):
-        rows = nearby.rows[nearby.starts[source] : nearby.starts[source + 1]]
+        rows = nearby.rows[nearby.sources == source]
         if len(rows):
             offsets = earlier[:, rows] - heard[:, source, np.newaxis]
             weights, forces = _forces(offsets, nearby.targets.normals[rows], bool(sources.lone[source]))

@@ -1,0 +1,109 @@
+"""Paths of a whole run: how much echoes speak for them, which posts they miss, and shifts that lead to better ones."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mlsm_manager.multi_view.judge.missed_echoes import MissedEchoes
+from mlsm_manager.multi_view.shifting.echo_agreement import agreement, shift_gains
+from mlsm_manager.multi_view.shifting.shift_search import ShiftSearch
+from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.multi_view.ways.way_comparisons import nats_of
+from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
+from mlsm_manager.multi_view.ways.ways import Ways
+
+ALONG = np.array([1.0, 0.0])
+TURN = 16.0  # s; each is one scan here
+SCANS = 12
+WALL = np.column_stack([np.arange(-60.0, 90.0, 3.0), np.full(50, 12.0)])
+POSTS = np.array([[0.0, 5.0], [13.0, -4.0], [31.0, 3.0], [50.0, -6.0]])
+TRUE = np.column_stack([3.0 * np.arange(SCANS + 1.0), np.zeros(SCANS + 1)])  # m: on along the wall, 3 m in each turn
+
+
+def heard(path, far=25.0):
+    """Return what a vehicle hears of wall and posts, each scan all at once in the middle between its nodes."""
+    parts = []
+    for scan, place in enumerate((path[:-1] + path[1:]) / 2.0):
+        for places, is_lone in ((WALL, False), (POSTS, True)):
+            arms = places[np.hypot(*(places - place).T) < far] - place
+            count = len(arms)
+            parts.append(
+                WayEchoes(
+                    np.full(count, scan), arms, np.full(count, 0.5), np.tile([0.0, 1.0], (count, 1)),
+                    np.full(count, 3.0 if is_lone else 0.4), np.full(count, is_lone),
+                )
+            )  # fmt: skip
+    return WayEchoes.joined(parts)
+
+
+HEARD = heard(TRUE)
+
+
+def stray(scan, length):
+    """Return the true path shifted by `length` [m] along the wall from a scan on."""
+    return TRUE + np.where(np.arange(SCANS + 1) >= scan, length, 0.0)[:, np.newaxis] * ALONG
+
+
+@given(st.integers(0, 10**6))
+@settings(max_examples=10, deadline=None)
+def test_a_path_is_worth_what_its_scans_are_worth_one_after_the_other(seed):
+    path = TRUE + np.random.RandomState(seed).normal(0.0, 1.0, TRUE.shape)
+    total = 0.0
+    for scan in range(1, SCANS):
+        way = Ways(path[np.newaxis, : scan + 2], np.zeros((1, 2)), np.zeros(1))
+        own, earlier = (HEARD.selected(np.flatnonzero(some)) for some in (HEARD.nodes == scan, HEARD.nodes < scan))
+        total += float(nats_of(way, own, earlier, SolverKernel.NUMPY)[0])
+    assert agreement(HEARD, path) == pytest.approx(total)
+
+
+@given(st.integers(1, SCANS - 1), st.integers(-20, 20))
+@settings(max_examples=10, deadline=None)
+def test_a_gain_is_what_the_shifted_path_is_worth_more(scan, length):
+    # What is heard just at a node moves as that node does.
+    at_nodes = replace(HEARD, shares=np.zeros(len(HEARD)))
+    gains = shift_gains(at_nodes, TRUE, ALONG, np.array([-20.0, length, 20.0]))
+    expected = agreement(at_nodes, stray(scan, length)) - agreement(at_nodes, TRUE)
+    assert gains[scan, 1] == pytest.approx(expected)
+
+
+def test_the_greatest_gain_takes_back_what_went_wrong():
+    lengths = np.arange(-30.0, 31.0)
+    gains = shift_gains(HEARD, stray(6, 11.0), ALONG, lengths)
+    scan, number = np.unravel_index(np.argmax(gains), gains.shape)
+    assert (abs(scan - 6) <= 1, lengths[number]) == (True, -11.0)
+
+
+def test_on_the_true_path_nothing_is_missed():
+    assert MissedEchoes(HEARD, 1).nats(TRUE) == 0.0
+
+
+def test_a_post_that_was_passed_unheard_is_missed():
+    post = heard(TRUE[:2]).selected(np.array([-1]))
+    assert post.lone.all()
+    wall = HEARD.selected(np.flatnonzero(~HEARD.lone))
+    missed = MissedEchoes(WayEchoes.joined([wall, post]), 1).nats(TRUE)
+    assert 1.0 < missed < post.nats.sum()
+
+
+def test_a_post_behind_a_wall_is_not_missed():
+    behind = replace(heard(TRUE[:2]).selected(np.array([-1])), arms=np.array([[0.0, 20.0]]))
+    near = HEARD.selected(np.flatnonzero(~HEARD.lone & (HEARD.nodes > 0)))
+    assert MissedEchoes(WayEchoes.joined([near, behind]), 1).nats(TRUE) == 0.0
+
+
+def test_paths_that_went_wrong_twice_are_led_back():
+    wrong = stray(4, 14.0) + stray(9, -23.0) - TRUE
+    search = ShiftSearch(HEARD, TURN * np.arange(SCANS + 1.0), 1, refit=lambda path: path)
+    best = search.climbed([wrong])[0]
+    assert np.hypot(*(best.path - TRUE).T).mean() < 1.5
+    assert best.nats > search.judged(wrong).nats + 10.0
+
+
+def test_shifts_that_no_vehicle_goes_are_not_tried():
+    numbers, resting = np.arange(SCANS + 1.0), np.zeros(TRUE.shape)
+    for turn, is_moved in ((TURN, True), (TURN / 100.0, False)):
+        found = ShiftSearch(HEARD, turn * numbers, 1, refit=lambda path: path).climbed([resting])
+        assert any(one.path.any() for one in found) == is_moved
