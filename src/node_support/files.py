@@ -1,5 +1,6 @@
 """Files that are written whole or not at all."""
 
+import errno
 import fcntl
 import os
 import tempfile
@@ -28,7 +29,7 @@ def whole_file(path: Path) -> Iterator[Path]:
     The folder is made where it is missing; on any failure an older file stays as it was. What killed processes left
     behind in that folder is removed first. Raises OSError.
     """
-    path.parent.mkdir(parents=True, exist_ok=True)
+    make_folder(path.parent)
     remove_abandoned_parts(path.parent)
     handle, temporary = _locked_part(path)
     try:
@@ -41,6 +42,14 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
     finally:
         os.close(handle)
+
+
+def make_folder(path: Path) -> None:
+    """Make a folder, and those that it is in, where they are missing. Raises OSError."""
+    try:
+        path.mkdir(parents=True, exist_ok=True)
+    except FileExistsError:
+        raise NotADirectoryError(errno.ENOTDIR, "is a file, must be a folder", str(path)) from None
 
 
 def remove_abandoned_parts(folder: Path) -> None:

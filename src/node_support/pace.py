@@ -1,4 +1,4 @@
-"""Keeps simulated or recorded time in step with the wall clock. Free of ROS."""
+"""Keeps simulated or recorded time in step with the wall clock."""
 
 import time
 from typing import Callable

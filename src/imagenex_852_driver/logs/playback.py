@@ -1,4 +1,4 @@
-"""When the pings of a log were recorded, as far as that can be known. Free of ROS."""
+"""When the pings of a log were recorded, as far as that can be known."""
 
 from typing import Iterable, Iterator, Optional, Tuple
 

@@ -91,6 +91,8 @@ def _export(options: Namespace) -> List[str]:
 def _crop(options: Namespace) -> List[str]:
     if not (len(options.low) == len(options.high) in (2, 3)):
         raise ValueError(f"--low {options.low} --high {options.high}: must both be X Y or both X Y Z")
+    if any(low > high for low, high in zip(options.low, options.high)):
+        raise ValueError(f"--low {options.low} --high {options.high}: low must not be above high")
     stored = cropped(read_any(options.map), np.array(options.low), np.array(options.high))
     if not len(stored):
         raise ValueError(f"{options.map}: the map has no blocks between {options.low} and {options.high}")

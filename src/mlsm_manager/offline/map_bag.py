@@ -14,6 +14,7 @@ from mlsm_manager.offline.mission_report import mission_of
 from mlsm_manager.offline.run_files import REPORT, errors_of, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.run_summary import summary_lines, summary_of
 from mlsm_manager.report.mission import Mission
+from node_support.files import make_folder
 from node_support.parameters import ParameterError
 from recordings.errors import RecordingError
 from recordings.inspection.report import report
@@ -45,7 +46,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     recording = read_recording(options.bags[0], options.request)
     for note in recording.notes:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
-    options.out.mkdir(parents=True, exist_ok=True)
+    make_folder(options.out)
     mapped = mapped_bag(recording, options)
     _write_results(mapped, options)
     errors = errors_of(mapped.run, mapped.recording)

@@ -41,8 +41,8 @@ def motion_of_csv(path: Path, names: MotionNames) -> Motion:
     headings = [name for name in _HEADINGS if name in table]
     if "time" not in table or len(headings) != 1 or ("x" in table) != ("y" in table):
         raise RecordingError(
-            f"{path}: columns {', '.join(table) or 'unknown'}; needs time, one of {', '.join(_HEADINGS)}, and "
-            "both x and y or neither"
+            f"{path}: has the known columns {', '.join(table) or 'none'}; needs time, one of "
+            f"{', '.join(_HEADINGS)}, and both x and y or neither"
         )
     times = table["time"]
     zeros = np.zeros(len(times))

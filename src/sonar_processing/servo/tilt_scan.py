@@ -1,4 +1,4 @@
-"""Steps the sonar's servo through its range, one scan per step (thesis 4.4.2, scenario 1). Free of ROS."""
+"""Steps the sonar's servo through its range, one scan per step (thesis 4.4.2, scenario 1)."""
 
 import math
 from dataclasses import dataclass

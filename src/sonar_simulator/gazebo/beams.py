@@ -1,4 +1,4 @@
-"""Makes sonar beams from ray scans, with the simulator's echo models. Free of ROS."""
+"""Makes sonar beams from ray scans, with the simulator's echo models."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The parameters of gazebo_sonar. Free of ROS."""
+"""The parameters of gazebo_sonar."""
 
 import math
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""The rays of Gazebo's ray sensors, whose messages are flat and lack the number of rows. Free of ROS."""
+"""The rays of Gazebo's ray sensors, whose messages are flat and lack the number of rows."""
 
 import math
 from dataclasses import dataclass

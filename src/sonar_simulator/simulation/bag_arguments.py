@@ -59,10 +59,14 @@ def settings_of(options: argparse.Namespace, package: Path) -> Dict[str, Any]:
     for key, value in assigned_values(options.set).items():
         _set(values, key, value)
     shipped = package / "worlds" / f"{options.world}.sdf"
+    world = shipped if shipped.is_file() else Path(options.world).expanduser().absolute()
+    if not world.exists():
+        own_worlds = ", ".join(sorted(path.stem for path in shipped.parent.glob("*.sdf")))
+        raise ParameterError(f"--world {options.world}: must be {own_worlds}, or a file that exists")
     tour = package / "yaml" / f"{options.world}_tour.yaml"
     if options.script is None and not tour.is_file():
         raise ParameterError(f"--script is missing: only worlds of this package have a tour, {options.world} has none")
-    values["world"] = str(shipped if shipped.is_file() else Path(options.world).expanduser().absolute())
+    values["world"] = str(world)
     values["script"] = str(Path(options.script or tour).expanduser().absolute())
     return values
 

@@ -1,4 +1,4 @@
-"""Simulates world, vehicle and sonar together over time (thesis 6.4). Free of ROS."""
+"""Simulates world, vehicle and sonar together over time (thesis 6.4)."""
 
 from dataclasses import dataclass, replace
 from enum import Enum

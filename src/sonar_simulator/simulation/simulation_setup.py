@@ -1,4 +1,4 @@
-"""Makes a simulation from plain parameter values, for the node and for bags. Free of ROS."""
+"""Makes a simulation from plain parameter values, for the node and for bags."""
 
 from dataclasses import dataclass
 from pathlib import Path

@@ -60,6 +60,12 @@ def test_further_fits_need_the_first_one(tmp_path):
     assert (done.returncode, "--check repeats the fit of --refine" in done.stderr) == (2, True)
 
 
+def test_an_output_folder_that_is_a_file_is_refused(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    assert refused(BASIN, "--out", file) == f"map_bag: {file}: is a file, must be a folder"
+
+
 def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
     broken = tmp_path / "no.bag"
     broken.write_bytes(b"no bag")

@@ -6,13 +6,22 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_harbour import CANAL, SONAR_IN_BASE, along_canal, tour
 
+from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.judge.missed_echoes import MissedEchoes
 from mlsm_manager.multi_view.shifting.echo_agreement import agreement, shift_gains
 from mlsm_manager.multi_view.shifting.shift_search import ShiftSearch
+from mlsm_manager.multi_view.solve.batch_solver import settled
+from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from mlsm_manager.multi_view.ways.way_comparisons import nats_of
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
+from mlsm_manager.multi_view.ways.way_nodes import on_path
 from mlsm_manager.multi_view.ways.ways import Ways
 
 ALONG = np.array([1.0, 0.0])
@@ -103,7 +112,25 @@ def test_paths_that_went_wrong_twice_are_led_back():
 
 
 def test_shifts_that_no_vehicle_goes_are_not_tried():
-    numbers, resting = np.arange(SCANS + 1.0), np.zeros(TRUE.shape)
-    for turn, is_moved in ((TURN, True), (TURN / 100.0, False)):
-        found = ShiftSearch(HEARD, turn * numbers, 1, refit=lambda path: path).climbed([resting])
-        assert any(one.path.any() for one in found) == is_moved
+    hundredths, resting = 0.01 * np.arange(SCANS + 1.0), np.zeros(TRUE.shape)
+    (only,) = ShiftSearch(HEARD, hundredths, 1, refit=lambda path: path).climbed([resting])
+    assert only.path is resting
+
+
+def test_a_run_that_heard_nothing_stays_as_it_is():
+    search = ShiftSearch(HEARD.selected(np.empty(0, dtype=int)), TURN * np.arange(SCANS + 1.0), 1, lambda path: path)
+    best = search.climbed([TRUE])[0]
+    assert (best.nats, best.path is TRUE) == (0.0, True)
+
+
+def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():
+    made = tour(6, path=along_canal, corners=CANAL)
+    profile = MlsmCoreParameters(estimator=Estimator.JOINT).changed(profile_values(OdometryKind.HEADING))
+    live = LiveSolver(profile.solver_parameters(profile.part(OdometryErrors), 0.0), SONAR_IN_BASE)
+    for scan in made.scans:
+        live.add(scan)
+    motion = live.log.node_motion(np.arange(len(live.log.node_times)))
+    true = made.truth.at(live.log.node_times)[:, :2]
+    start = replace(live.state, nodes=on_path(live.state.nodes, true, motion))
+    found = motion.poses[:, :2] + settled(live, start).nodes[:, :2]
+    np.testing.assert_allclose(found - found[0], true - true[0], atol=0.3)

@@ -122,7 +122,7 @@ def test_the_motion_comes_from_a_table(tmp_path, text):
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("time,x,y\n1,2,3\n2,3,4\n", "columns time, x, y; needs time, one of yaw, yaw_deg, heading_deg"),
+        ("time,x,y\n1,2,3\n2,3,4\n", "has the known columns time, x, y; needs time, one of yaw, yaw_deg, heading_deg"),
         ("time,x,yaw\n1,2,3\n2,3,4\n", "both x and y or neither"),
         ("time,yaw\n1,2\n2,east\n", "line 3: yaw = 'east', must be a number"),
         ("time,yaw\n1,2\n", "1 rows; needs at least 2"),

@@ -140,7 +140,7 @@ def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):
         (["--set", "odometry.scale_eror=1"], "odometry: scale_eror = 1: no such parameter"),
         (["--set", "seed"], "--set seed: must be KEY=VALUE"),
         (["--set", "drive=CMD_VEL"], "drive = 'CMD_VEL': nobody sends commands while a bag is written"),
-        (["--world", "none.sdf"], "none.sdf"),
+        (["--world", "none.sdf"], "--world none.sdf: must be basin, harbour, tank, or a file that exists"),
         (["--robot", "none.urdf"], "none.urdf: No such file or directory"),
         (["--parameters", "none.yaml"], "none.yaml: No such file or directory"),
     ],

@@ -1,6 +1,7 @@
 """How much speaks against a path: echoes that stand alone, as of posts, that other turns should have heard too."""
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 
@@ -30,16 +31,18 @@ class MissedEchoes:
         Each echo counts as far as the turns that should have heard it, and its own one, did not.
         """
         lone, missed, heard = self._lone, np.zeros(len(self._lone)), np.zeros(len(self._lone))
+        if not len(lone):
+            return 0.0
         places = self._echoes.places(path, 0)
         origins = places - self._echoes.arms
         for turn in np.unique(self._turns):
             others = self._turns[lone] != turn
             own = np.flatnonzero(self._turns == turn)
-            is_heard = _nearest(places[lone], places[own]) < _SAME
+            distance, _ = cKDTree(places[own]).query(places[lone], distance_upper_bound=_SAME)
+            heard += others & np.isfinite(distance)
             nodes = path[self._parts * turn : self._parts * (turn + 1) + 1]
-            expected = self._in_reach(places[lone], nodes) & ~self._hidden(places[lone], origins[own], own)
-            missed += others & expected & ~is_heard
-            heard += others & is_heard
+            silent = np.flatnonzero(others & ~np.isfinite(distance) & self._in_reach(places[lone], nodes))
+            missed[silent] += ~self._hidden(places[lone[silent]], origins[own], own)
         return float(self._echoes.nats[lone] @ (missed / (1.0 + missed + heard)))
 
     def _in_reach(self, places: np.ndarray, nodes: np.ndarray) -> np.ndarray:
@@ -54,8 +57,3 @@ class MissedEchoes:
         beside = np.abs(offset[..., 0] * self._sights[own, 1] - offset[..., 1] * self._sights[own, 0])
         on_line = (along > 0.0) & (beside < _WIDTH * along + _BREADTH)
         return (on_line & (self._ranges[own] < along - _SAME)).any(axis=1)
-
-
-def _nearest(places: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """Return how far (n,) [m] each of `places` (n, 2) is from the nearest of `others` (m, 2), m > 0."""
-    return np.hypot(*(places[:, np.newaxis] - others).transpose(2, 0, 1)).min(axis=1)

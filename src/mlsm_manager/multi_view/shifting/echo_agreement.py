@@ -27,6 +27,8 @@ def agreement(echoes: WayEchoes, path: np.ndarray) -> float:
 
     Each echo counts as far as it lies on one of an earlier scan, as in way_search.agreement_of.
     """
+    if not len(echoes):
+        return 0.0
     places, best = echoes.places(path, 0), np.zeros(len(echoes))
     near = cKDTree(places).query_pairs(_FARTHEST_ALONG, output_type="ndarray")
     later = np.where(echoes.nodes[near[:, 0]] > echoes.nodes[near[:, 1]], 0, 1)
@@ -43,7 +45,7 @@ def shift_gains(echoes: WayEchoes, path: np.ndarray, axis: np.ndarray, shifts: n
     the vehicle goes that far count a little wrong.
     """
     pairs = _in_order(_pairs_within(echoes, echoes.places(path, 0), axis, float(np.abs(shifts).max())))
-    scans = int(echoes.nodes.max()) + 1
+    scans = len(path) - 1
     present = _by_scan(echoes, pairs, 0.0, scans)
     after = np.maximum.accumulate(present[:, ::-1], axis=1)[:, ::-1]
     is_shifted = echoes.nodes[:, np.newaxis] >= np.arange(1, scans)
@@ -59,9 +61,9 @@ def _by_scan(echoes: WayEchoes, pairs: _Pairs, shift: float, scans: int) -> np.n
     """Return how near (n, scans) each echo, shifted [m] along the axis, is to the nearest one of each earlier scan."""
     first, last = np.searchsorted(pairs.offsets[:, 0], [-shift - _FARTHEST_ALONG, -shift + _FARTHEST_ALONG])
     some = _Pairs(*(array[first:last] for array in pairs))
-    places = some.sources * scans + echoes.nodes[some.targets]
-    result = np.zeros(len(echoes) * scans)
-    np.maximum.at(result, places, _nearness(echoes, some, shift))
+    nearness, result = _nearness(echoes, some, shift), np.zeros(len(echoes) * scans)
+    near = np.flatnonzero(nearness)
+    np.maximum.at(result, some.sources[near] * scans + echoes.nodes[some.targets[near]], nearness[near])
     return result.reshape(len(echoes), scans)
 
 

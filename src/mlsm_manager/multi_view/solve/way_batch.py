@@ -17,7 +17,7 @@ from mlsm_manager.multi_view.ways.way_search import WaySearch, needs_ways
 _SEARCHES = 3  # besides the live one: one of three or four loses a simulated tour now and then
 _ALL_TURNS = 200  # that ways reach back: all of a run of 50 minutes
 _LIKELY = 10.0  # nats: a fit that agrees less by so much is believed e times less, since neighbours share errors
-_LONGEST_SHIFTED = 80  # turns, about 20 minutes: the time that shifts take grows faster than with their square
+_LONGEST_SHIFTED = 60  # turns, about 15 minutes: the time that shifts take grows with their square
 _CLEARLY = 3.0  # nats by which shifted paths must be better than the best fit before, or else that one is good enough
 
 
