@@ -27,6 +27,7 @@ class SolverKernel(Enum):
             prepare_cache()
             import mlsm_manager.multi_view.compiled.compiled_cells
             import mlsm_manager.multi_view.compiled.compiled_places
+            import mlsm_manager.multi_view.compiled.compiled_pulls
             import mlsm_manager.multi_view.compiled.compiled_search
             import mlsm_manager.multi_view.compiled.compiled_sums
             import mlsm_manager.multi_view.compiled.compiled_ways

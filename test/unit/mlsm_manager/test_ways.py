@@ -12,10 +12,12 @@ from mlsm_manager.multi_view.measured.odometry_timeline import OdometryTimeline
 from mlsm_manager.multi_view.motion.heading_factors import AHEAD, ASIDE
 from mlsm_manager.multi_view.motion.odometry_motion import Motion
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.multi_view.ways.way_comparisons import nats_of
+from mlsm_manager.multi_view.ways.way_comparisons import nats_of, nearby_of
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.multi_view.ways.way_motion import drawn, led
 from mlsm_manager.multi_view.ways.way_nodes import on_path
+from mlsm_manager.multi_view.ways.way_pulls import pulled, pulls_of
+from mlsm_manager.multi_view.ways.way_weighing import groups_of, weighed
 from mlsm_manager.multi_view.ways.ways import Ways, begun
 
 PART = 5.0  # s
@@ -51,6 +53,57 @@ def test_the_compiled_loop_weighs_ways_as_numpy_does(seed, sources, targets):
     heard, earlier = echoes_of(rng, [7], sources), echoes_of(rng, [0, 1], targets)
     one, other = (nats_of(ways, heard, earlier, kernel) for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA))
     np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
+
+
+@given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 60))
+@settings(max_examples=30, deadline=None)
+def test_the_compiled_loop_pulls_ways_as_numpy_does(seed, sources, targets):
+    pytest.importorskip("numba")
+    rng, ways = np.random.RandomState(seed), ways_of(seed)
+    heard, earlier = echoes_of(rng, [7], sources), echoes_of(rng, [0, 1], targets)
+    nearby = nearby_of(ways, heard, earlier)
+    one, other = (pulls_of(ways, heard, nearby, kernel) for kernel in (SolverKernel.NUMPY, SolverKernel.NUMBA))
+    np.testing.assert_allclose(one, other, rtol=1e-9, atol=1e-9)
+
+
+def test_an_echo_that_stands_alone_pulls_a_way_towards_an_earlier_one():
+    ways, heard = Ways(np.zeros((1, 3, 2)), np.zeros((1, 2)), np.zeros(1)), post(1, [5.0, 0.0], 1.0)
+    nearby = nearby_of(ways, heard, post(0, [5.5, 0.5]))
+    move = pulls_of(ways, heard, nearby, SolverKernel.NUMPY)[0]
+    assert 0.2 < move[0] < 0.5
+    assert move[0] == pytest.approx(move[1])
+
+
+def test_a_wall_pulls_a_way_across_itself_only():
+    ways = Ways(np.zeros((1, 3, 2)), np.zeros((1, 2)), np.zeros(1))
+    heard, wall = (replace(echo, lone=np.array([False])) for echo in (post(1, [5.0, 0.0]), post(0, [5.5, 1.0])))
+    move = pulls_of(ways, heard, nearby_of(ways, heard, wall), SolverKernel.NUMPY)[0]
+    assert 0.1 < move[0] < 1.0
+    assert move[1] == 0.0
+
+
+def test_some_ways_are_pulled_and_their_speeds_with_them():
+    ways = Ways(np.zeros((400, 3, 2)), np.zeros((400, 2)), np.zeros(400))
+    heard = post(1, [5.0, 0.0], 1.0)
+    nearby, rng = nearby_of(ways, heard, post(0, [6.0, 0.0])), np.random.RandomState(0)
+    moved = pulled(ways, heard, nearby, PART, SolverKernel.NUMPY, rng)
+    assert 100 < (moved.paths[:, -1, 0] > 0.0).sum() < 300
+    np.testing.assert_allclose(moved.speeds, moved.paths[:, -1] / PART)
+
+
+def test_few_ways_far_from_all_others_are_compared_with_what_they_heard_there():
+    paths = np.zeros((1000, 3, 2))
+    paths[:3, -1] = [60.0, 0.0]
+    ways = Ways(paths, np.zeros((1000, 2)), np.zeros(1000))
+    heard, earlier = post(1, [-30.0, 0.0], 1.0), post(0, [30.0, 0.0])
+    nats = weighed(ways, heard, earlier, PART, SolverKernel.NUMPY, np.random.RandomState(0)).nats
+    np.testing.assert_allclose(nats[:3], 0.0)
+    assert nats[3:].max() < -2.0
+
+
+def test_ways_that_end_in_one_square_are_one_group():
+    groups = groups_of(np.array([[1.0, 1.0], [50.0, 1.0], [2.0, 1.5], [51.0, 2.0], [1.0, 50.0]]))
+    assert sorted(sorted(group.tolist()) for group in groups) == [[0, 2], [1, 3], [4]]
 
 
 def test_a_way_on_which_an_echo_lies_on_an_earlier_one_is_worth_that_echo():
@@ -97,12 +150,24 @@ def test_a_speed_is_kept_in_map_or_in_base_link_or_ends():
         assert (np.hypot(*(speeds - kept).T) < 0.2).mean() > least
 
 
-def test_ways_are_drawn_anew_as_often_as_they_are_believed():
-    ways = ways_of(1, count=1000)
-    ways = ways._replace(nats=np.where(np.arange(1000) < 10, 0.0, -50.0))
+def test_ways_of_one_place_are_drawn_anew_as_often_as_they_are_believed():
+    rng = np.random.RandomState(1)
+    ways = Ways(rng.uniform(0.1, 1.9, (1000, 4, 2)), rng.normal(size=(1000, 2)), np.full(1000, -50.0))
+    ways.nats[:10] = 0.0
     again = ways.resampled(np.random.RandomState(0))
     assert {tuple(end) for end in again.paths[:, -1]} == {tuple(end) for end in ways.paths[:10, -1]}
-    np.testing.assert_array_equal(again.nats, np.zeros(1000))
+    np.testing.assert_allclose(again.nats, np.zeros(1000), atol=1e-9)
+
+
+def test_a_place_believed_little_keeps_its_belief_and_more_ways_than_that():
+    paths = np.full((1000, 2, 2), 1.0)
+    paths[:10, 1] = [31.0, 1.0]
+    ways = Ways(paths, np.zeros((1000, 2)), np.where(np.arange(1000) < 10, 0.0, -0.5 * np.arange(1000)))
+    ways.nats[10] = np.log(990.0)
+    again = ways.resampled(np.random.RandomState(0))
+    far = again.paths[:, -1, 0] > 30.0
+    assert again.shares[far].sum() == pytest.approx(ways.shares[:10].sum(), rel=0.1)
+    assert far.mean() > 5.0 * ways.shares[:10].sum()
 
 
 def test_ways_that_all_count_are_not_drawn_anew():

@@ -1,6 +1,6 @@
 """How much echoes speak for ways: those that lie on what the same way heard before."""
 
-from typing import Tuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,17 @@ _GATE = 8.0  # m that two echoes may be apart on the mean path, besides twice th
 _AT_ONCE = 200  # ways whose echoes are placed together: as many as fit into a processor's cache
 
 
+class Nearby(NamedTuple):
+    """targets: that any source may lie on. sources, rows: (m,) pairs of a source and the row of such a target.
+
+    Pairs stand in the order of their sources.
+    """
+
+    targets: WayEchoes
+    sources: np.ndarray
+    rows: np.ndarray
+
+
 def nats_of(ways: Ways, sources: WayEchoes, targets: WayEchoes, kernel: SolverKernel) -> np.ndarray:
     """Return how much (n,) sources, heard between the ways' newest nodes, speak for n ways.
 
@@ -25,36 +36,36 @@ def nats_of(ways: Ways, sources: WayEchoes, targets: WayEchoes, kernel: SolverKe
     """
     if not len(sources) or not len(targets):
         return np.zeros(len(ways.nats))
-    candidates, rows = candidates_of(ways, sources, targets)
-    targets = targets.selected(rows)
-    if kernel.resolved is SolverKernel.NUMPY:
-        return _nats(ways, sources, targets, candidates)
-    from mlsm_manager.multi_view.compiled.compiled_ways import way_nats
-
-    of_targets, own = np.nonzero(candidates.T)
-    starts = np.searchsorted(of_targets, np.arange(len(targets) + 1))
-    return way_nats(
-        np.ascontiguousarray(ways.paths), starts, np.ascontiguousarray(own), _columns(sources), sources.nats,
-        targets.nodes, _columns(targets), FARTHEST,
-    )  # fmt: skip
+    return nats_among(ways, sources, nearby_of(ways, sources, targets), kernel)
 
 
-def candidates_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Tuple[np.ndarray, np.ndarray]:
-    """Return (s, t) bool, which of t targets each of s sources may lie on, and the rows (t,) of these targets.
-
-    They are of one kind, face one way, and are not too far off.
-    """
+def nearby_of(ways: Ways, sources: WayEchoes, targets: WayEchoes) -> Nearby:
+    """Return which targets each source may lie on: of the same kind, facing the same way, and not too far off."""
     mean, last = ways.mean(), ways.paths.shape[1] - 2
     heard, earlier = sources.places(mean, int(sources.nodes[0]) - last), targets.places(mean, 0)
     gate = _GATE + 2.0 * ways.paths[:, -1].std(axis=0).max()
-    around = (earlier > heard.min(axis=0) - gate) & (earlier < heard.max(axis=0) + gate)
-    rows = np.flatnonzero(around.all(axis=1))
-    targets, apart = targets.selected(rows), heard[:, np.newaxis] - earlier[rows]
-    near = np.hypot(apart[..., 0], apart[..., 1]) < gate
-    near &= sources.lone[:, np.newaxis] == targets.lone
-    near &= sources.lone[:, np.newaxis] | (sources.normals @ targets.normals.T > FACING)
-    met = near.any(axis=0)
-    return near[:, met], rows[met]
+    reached = np.flatnonzero(((earlier > heard.min(axis=0) - gate) & (earlier < heard.max(axis=0) + gate)).all(axis=1))
+    targets, apart = targets.selected(reached), np.abs(heard[:, np.newaxis] - earlier[reached])
+    own, others = np.nonzero((apart[..., 0] < gate) & (apart[..., 1] < gate))
+    facing = np.einsum("na,na->n", sources.normals[own], targets.normals[others]) > FACING
+    near = np.hypot(apart[own, others, 0], apart[own, others, 1]) < gate
+    near &= (sources.lone[own] == targets.lone[others]) & (sources.lone[own] | facing)
+    some, rows = np.unique(others[near], return_inverse=True)
+    return Nearby(targets.selected(some), own[near], rows)
+
+
+def nats_among(ways: Ways, sources: WayEchoes, nearby: Nearby, kernel: SolverKernel) -> np.ndarray:
+    """Return how much (n,) sources speak for n ways, each by what it may lie on."""
+    if kernel.resolved is SolverKernel.NUMPY:
+        return _nats(ways, sources, nearby)
+    from mlsm_manager.multi_view.compiled.compiled_ways import way_nats
+
+    order = np.argsort(nearby.rows, kind="stable")
+    starts = np.searchsorted(nearby.rows[order], np.arange(len(nearby.targets) + 1))
+    return way_nats(
+        np.ascontiguousarray(ways.paths), starts, nearby.sources[order], _columns(sources), sources.nats,
+        nearby.targets.nodes, _columns(nearby.targets), FARTHEST,
+    )  # fmt: skip
 
 
 def _columns(echoes: WayEchoes) -> np.ndarray:
@@ -66,24 +77,25 @@ def _columns(echoes: WayEchoes) -> np.ndarray:
     return np.ascontiguousarray(np.column_stack([echoes.arms, echoes.shares, across, along]))
 
 
-def _nats(ways: Ways, sources: WayEchoes, targets: WayEchoes, candidates: np.ndarray) -> np.ndarray:
+def _nats(ways: Ways, sources: WayEchoes, nearby: Nearby) -> np.ndarray:
     parts = np.array_split(ways.paths, max(1, len(ways.paths) // _AT_ONCE))
-    return np.concatenate([_nats_of_some(paths, sources, targets, candidates) for paths in parts])
+    return np.concatenate([_nats_of_some(paths, sources, nearby) for paths in parts])
 
 
-def _nats_of_some(paths: np.ndarray, sources: WayEchoes, targets: WayEchoes, candidates: np.ndarray) -> np.ndarray:
+def _nats_of_some(paths: np.ndarray, sources: WayEchoes, nearby: Nearby) -> np.ndarray:
     total, last = np.zeros(len(paths)), paths.shape[1] - 2
     heard = sources.places(paths, int(sources.nodes[0]) - last).transpose(2, 1, 0)
-    earlier = np.ascontiguousarray(targets.places(paths, 0).transpose(2, 1, 0))
-    for source, rows in enumerate(map(np.flatnonzero, candidates)):
+    earlier = np.ascontiguousarray(nearby.targets.places(paths, 0).transpose(2, 1, 0))
+    for source in range(len(sources)):
+        rows = nearby.rows[nearby.sources == source]
         if len(rows):
             x, y = (own[source] - others[rows] for own, others in zip(heard, earlier))
-            squared = _squared(x, y, targets.normals[rows], bool(sources.lone[source])).min(axis=0)
+            squared = squared_deviations(x, y, nearby.targets.normals[rows], bool(sources.lone[source])).min(axis=0)
             total += sources.nats[source] * np.where(squared < FARTHEST, np.exp(-0.5 * squared), 0.0)
     return total
 
 
-def _squared(x: np.ndarray, y: np.ndarray, normals: np.ndarray, is_lone: bool) -> np.ndarray:
+def squared_deviations(x: np.ndarray, y: np.ndarray, normals: np.ndarray, is_lone: bool) -> np.ndarray:
     """Return squared deviations (m, n) of offsets x, y (m, n) [m] from m points with `normals` (m, 2)."""
     if is_lone:
         return (x**2 + y**2) / AROUND**2

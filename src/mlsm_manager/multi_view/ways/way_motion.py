@@ -5,13 +5,15 @@ import numpy as np
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.multi_view.ways.ways import HELD_SPEED, Draw, Ways
 
-_CHANGE = 0.3  # chance that the speed changes within a part of a turn: on average it is kept for 18 s
+_CHANGE = 0.2  # chance that the speed jumps within a part of a turn: on average once in 27 s
 _STOP = 0.4  # of these changes end at rest
 _NEW_SPEED = 0.4  # m/s: deviation of a speed in each direction after a change
 _WALK = 0.07  # m/s: by which a speed that is kept strays within a part
+_ACCELERATE = 0.3  # share of the speeds that do not jump but change gradually,
+_ACCELERATION = 0.35  # m/s: by so much within a part, as of a vehicle that takes ten seconds to start and to stop
 _ROUGH = 0.05  # m: by which steps stray besides
 _GUIDED = 0.25  # share of the ways that are led to where an echo that stands alone meets an earlier one
-_FASTEST = 1.0  # m/s: of ways that are led
+_FASTEST = 1.3  # m/s: of ways that are led
 _LEAST_SHARE = 0.15  # of a part: an echo heard sooner tells too little of the speed
 
 
@@ -22,7 +24,8 @@ def drawn(ways: Ways, duration: float, turn: float, rng: np.random.RandomState) 
     """
     count = len(ways.nats)
     with_heading = rng.rand(count, 1) < 0.5
-    kept = np.where(with_heading, _turned(ways.speeds, turn), ways.speeds) + _WALK * rng.normal(size=(count, 2))
+    strays = np.where(rng.rand(count, 1) < _ACCELERATE, _ACCELERATION, _WALK)
+    kept = np.where(with_heading, _turned(ways.speeds, turn), ways.speeds) + strays * rng.normal(size=(count, 2))
     new = np.where(rng.rand(count, 1) < _STOP, HELD_SPEED, _NEW_SPEED) * rng.normal(size=(count, 2))
     changes, before = rng.rand(count, 1) < _CHANGE, duration * rng.rand(count, 1)
     speeds = np.where(changes, new, kept)

@@ -12,9 +12,9 @@ from mlsm_manager.multi_view.measured.run_log import RunLog
 from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
 from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
 from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
-from mlsm_manager.multi_view.ways.way_comparisons import nats_of
 from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
 from mlsm_manager.multi_view.ways.way_motion import drawn, led
+from mlsm_manager.multi_view.ways.way_weighing import weighed
 from mlsm_manager.multi_view.ways.ways import Ways, begun
 
 _COUNT = 6000  # ways: with 1000 one simulated tour of two is lost
@@ -79,7 +79,7 @@ class WaySearch:
         draw = draw if targets is None else led(before, draw, sources, targets, duration, rng)
         ways = before.continued(*draw, longest=longest + 1)
         if targets is not None:
-            ways = ways.believed(nats_of(ways, sources, targets, self.parameters.kernel)).resampled(rng)
+            ways = weighed(ways, sources, targets, duration, self.parameters.kernel, rng).resampled(rng)
         ways = Ways(ways.paths[:, -longest:], ways.speeds, ways.nats)
         echoes = (*self.echoes, sources)[-(longest - 1) :]
         return replace(self, scans=scan + 1, echoes=echoes, ways=ways)
