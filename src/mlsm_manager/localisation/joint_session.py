@@ -92,7 +92,8 @@ class JointSession:
         return [
             *self._going_on(turns.times),
             recent_agreement(heard.times, heard.agreements, _CHECKED_SCANS),
-            *(told_deviation(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[-1:]),
+            # from the second turn on: the first one alone does not tell its own speed
+            *(told_deviation(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[1:2]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
             *in_one_map(turns.times, turns.apart),
         ]

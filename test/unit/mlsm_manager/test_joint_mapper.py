@@ -116,6 +116,11 @@ def test_a_run_says_whether_it_can_be_trusted():
     assert [verdict.fires for verdict in localiser.verdicts()] == [False, False]
 
 
+def test_the_first_turn_is_not_doubted_for_a_speed_that_only_the_second_tells():
+    names = [[verdict.name for verdict in localiser_after(turns)[0].verdicts()] for turns in (1, 2)]
+    assert ["told deviation" in of_turns for of_turns in names] == [False, True]
+
+
 def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
     localiser = PARAMETERS.changed({"odometry": OdometryKind.HEADING}).build_localiser(SONAR_IN_BASE)
     for scan in tour(22).scans:
