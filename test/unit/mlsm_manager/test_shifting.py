@@ -16,6 +16,7 @@ from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.multi_view.judge.missed_echoes import MissedEchoes
 from mlsm_manager.multi_view.shifting.echo_agreement import agreement, shift_gains
 from mlsm_manager.multi_view.shifting.shift_search import ShiftSearch
+from mlsm_manager.multi_view.shifting.stretched_mean import stretched_mean
 from mlsm_manager.multi_view.solve.batch_solver import settled
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.solver_kernel import SolverKernel
@@ -109,6 +110,19 @@ def test_paths_that_went_wrong_twice_are_led_back():
     best = search.climbed([wrong])[0]
     assert np.hypot(*(best.path - TRUE).T).mean() < 1.5
     assert best.nats > search.judged(wrong).nats + 10.0
+
+
+def test_a_path_that_is_too_short_becomes_longer():
+    short = TRUE * [0.96, 1.0]
+    search = ShiftSearch(HEARD, TURN * np.arange(SCANS + 1.0), 1, refit=lambda path: path)
+    found = stretched_mean(search, short)
+    assert np.hypot(*(found.path - TRUE).T).mean() < 0.5 * np.hypot(*(short - TRUE).T).mean()
+    assert found.nats > search.judged(short).nats
+
+
+def test_a_path_stays_where_fits_of_it_go_wrong():
+    search = ShiftSearch(HEARD, TURN * np.arange(SCANS + 1.0), 1, refit=lambda path: path * [0.5, 1.0])
+    assert stretched_mean(search, TRUE).path is TRUE
 
 
 def test_shifts_that_no_vehicle_goes_are_not_tried():

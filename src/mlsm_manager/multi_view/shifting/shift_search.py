@@ -70,6 +70,12 @@ class ShiftSearch:
                 break
         return found
 
+    def least_known_axis(self) -> np.ndarray:
+        """Return the direction (2,) that the surfaces of the run tell least of."""
+        worth = self.echoes.nats * ~self.echoes.lone
+        known = np.einsum("n,na,nb->ab", worth, self.echoes.normals, self.echoes.normals)
+        return np.linalg.eigh(known)[1][:, 0]
+
     def _neighbours(self, start: JudgedPath) -> Iterator[JudgedPath]:
         """Yield the fits of the paths that the most promising shifts lead to."""
         for scan, shift in self._promising(start.path):
@@ -80,7 +86,7 @@ class ShiftSearch:
 
     def _promising(self, path: np.ndarray) -> Iterator[tuple]:
         """Yield the scans and the shifts (2,) [m] that promise most."""
-        axis = self._least_known_axis()
+        axis = self.least_known_axis()
         lengths = np.arange(-_REACH, _REACH + _STEP / 2.0, _STEP)
         gains = shift_gains(self.echoes, path, axis, lengths)
         options = _chosen(gains, lengths, _ANY, _WEIGHED_ANY, [])
@@ -90,12 +96,6 @@ class ShiftSearch:
         for number in np.argsort(-promise, kind="stable")[:_FITTED]:
             scan, length = options[number]
             yield scan, lengths[length] * axis
-
-    def _least_known_axis(self) -> np.ndarray:
-        """Return the direction (2,) that the surfaces of the run tell least of."""
-        worth = self.echoes.nats * ~self.echoes.lone
-        known = np.einsum("n,na,nb->ab", worth, self.echoes.normals, self.echoes.normals)
-        return np.linalg.eigh(known)[1][:, 0]
 
     def _shifted(self, path: np.ndarray, scan: int, shift: np.ndarray, turns: int) -> np.ndarray:
         """Return the path moved by `shift` (2,) [m] after `scan`, evenly within so many turns around its beginning."""

@@ -7,6 +7,7 @@ import numpy as np
 
 from mlsm_manager.multi_view.placing.estimate import misfit_covariance
 from mlsm_manager.multi_view.shifting.shift_search import ShiftSearch
+from mlsm_manager.multi_view.shifting.stretched_mean import stretched_mean
 from mlsm_manager.multi_view.solve.batch_solver import BatchResult, settled, solved
 from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.multi_view.unknowns.state import State
@@ -61,7 +62,8 @@ def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], lea
     climbed = search.climbed([_path(live, fit.state) for fit in fits])
     if climbed[0].nats < least:
         return []
-    return [solved(live, start=_on_path(live, one.path), keeps_steps=True) for one in climbed]
+    best = [stretched_mean(search, climbed[0].path), *climbed[1:]]
+    return [solved(live, start=_on_path(live, one.path), keeps_steps=True) for one in best]
 
 
 def _on_path(live: LiveSolver, path: np.ndarray) -> State:
