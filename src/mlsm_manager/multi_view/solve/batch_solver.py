@@ -101,14 +101,15 @@ def solved(
     live: LiveSolver,
     parameters: Optional[MultiViewParameters] = None,
     start: Optional[State] = None,
-    keeps_steps: bool = False,
+    told: Optional[State] = None,
 ) -> BatchResult:
     """Return the fit of all scans that `live` has taken; its own state stays as it is.
 
-    parameters, start: others than those of `live`, with the same odometry. keeps_steps: see `settled`.
+    parameters, start: others than those of `live`, with the same odometry. told: unknowns whose
+    steps are known to _TOLD_STEP; None where none are.
     """
     parameters, start = parameters or live.parameters, start or live.state
-    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy(), keeps_steps=keeps_steps)
+    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy(), told=told)
     steps, converged = problem.converge()
     poses, run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(live, problem.state))
@@ -120,7 +121,7 @@ def settled(live: LiveSolver, start: State) -> State:
 
     Where next to nothing tells the way along a wall, a fit that is not told creeps to a standstill there.
     """
-    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, start.copy(), keeps_steps=True)
+    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, start.copy(), told=start)
     problem.converge()
     return problem.state
 
@@ -154,13 +155,13 @@ class _Batch:
         parameters: MultiViewParameters,
         state: State,
         loops: Sequence[Loop] = (),
-        keeps_steps: bool = False,
+        told: Optional[State] = None,
     ) -> None:
         self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
         self._islands = islands
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
-        self._loops, self._start, self._keeps_steps = list(loops), state.copy(), keeps_steps
+        self._loops, self._start, self._told = list(loops), state.copy(), told
         self._solution = None
         self._move = np.zeros(self._layout.size)
         self._comparing = Comparing.by(parameters.kernel)
@@ -203,8 +204,8 @@ class _Batch:
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
-        if self._keeps_steps:
-            now, told = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._start))
+        if self._told is not None:
+            now, told = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._told))
             add_told_steps(equations, self._layout, now, told, _TOLD_STEP)
         return equations
 

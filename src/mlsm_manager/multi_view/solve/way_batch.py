@@ -63,7 +63,8 @@ def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], lea
     if climbed[0].nats < least:
         return []
     best = [stretched_mean(search, climbed[0].path), *climbed[1:]]
-    return [solved(live, start=_on_path(live, one.path), keeps_steps=True) for one in best]
+    starts = [_on_path(live, one.path) for one in best]
+    return [solved(live, start=start, told=start) for start in starts]
 
 
 def _on_path(live: LiveSolver, path: np.ndarray) -> State:
