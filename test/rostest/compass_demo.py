@@ -10,7 +10,7 @@ import unittest
 import numpy as np
 import rospy
 import rostest
-from followed_vehicle import followed, stamps_and_places
+from fixes_and_truth import followed, stamps_and_places
 from graph import PACKAGE, Inbox
 from nav_msgs.msg import Odometry
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import rospy
 import rostest
-from followed_vehicle import followed
+from fixes_and_truth import followed
 from graph import PACKAGE
 
 LEAST_SHARE = 0.8  # of the fixes that are as near as they say: three deviations hold for nearly all
