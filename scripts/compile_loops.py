@@ -2,7 +2,7 @@
 
 import sys
 
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.surface_map.block_shapes import box_maker
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel

@@ -17,13 +17,13 @@ from benchmarks.path_figures import figures_of
 from benchmarks.solver_input import solver_input
 from benchmarks.twins.parameters import TWINS
 from benchmarks.twins.recording import twin_of
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.batch_solver import solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
 from mlsm_manager.offline.evaluation import positions_at

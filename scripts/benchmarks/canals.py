@@ -13,9 +13,9 @@ from benchmarks.twins.odometry import lasting, reported
 from benchmarks.twins.parameters import TwinParameters
 from benchmarks.twins.sonar import heard
 from benchmarks.twins.water import RESOLUTION, Water, water_of
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 from node_support.geometry.planar import matrices

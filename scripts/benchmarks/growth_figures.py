@@ -14,8 +14,8 @@ import numpy as np
 from benchmarks.long_run import tour_scans
 from benchmarks.map_figures import RESOLUTION, grown_map, scan
 from benchmarks.table import Row, median_seconds
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters

@@ -16,11 +16,11 @@ from benchmarks.path_figures import PathFigures, figures_of
 from benchmarks.tour_scans import BEAMS_AT_ONCE, ROOT, START_NS
 from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.batch_solver import solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import Recording, scans_of

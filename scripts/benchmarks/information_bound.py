@@ -11,15 +11,15 @@ from typing import Sequence
 import numpy as np
 
 from benchmarks.world_distance import distances, nearest_shape
+from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.joint_solver.measured.surface_points import points_per_echo
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.joint_solver.parameters import SonarCalibration
+from mlsm_manager.joint_solver.priors import add_belief, run_deviations, run_mean
+from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations, solution_of
+from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS, Layout
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.measured.odometry_timeline import OdometryTimeline
-from mlsm_manager.multi_view.measured.surface_points import points_per_echo
-from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.multi_view.parameters import SonarCalibration
-from mlsm_manager.multi_view.priors import add_belief, run_deviations, run_mean
-from mlsm_manager.multi_view.unknowns.normal_equations import NormalEquations, solution_of
-from mlsm_manager.multi_view.unknowns.state import POSE_COLUMNS, RUN_COLUMNS, Layout
 from node_support.geometry.planar import inverse, transformed
 from sonar_simulator.world.world import World
 

@@ -4,9 +4,9 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.motion.odometry_motion import as_complex
-from mlsm_manager.multi_view.solve.batch_solver import BatchResult
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.motion.odometry_motion import as_complex
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 
 
 class PathFigures(NamedTuple):

@@ -14,11 +14,11 @@ from benchmarks.matching_scans import SonarKind
 from benchmarks.solver_input import solver_input
 from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.solve.way_batch import solved_best
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.solve.way_batch import solved_best
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 

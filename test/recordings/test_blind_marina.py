@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import scans_of

@@ -4,6 +4,8 @@ from typing import Optional
 
 import numpy as np
 
+from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
+from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.matching.problem.fading import Fading
@@ -11,8 +13,6 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, Pri
 from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
 from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
-from mlsm_manager.multi_view.placing.estimate import LiveEstimate
-from mlsm_manager.multi_view.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from node_support.geometry.planar import composed, inverse, wrapped
 
 PATH_POINTS = 17

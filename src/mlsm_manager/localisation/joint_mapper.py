@@ -5,6 +5,8 @@ from typing import List, Mapping, Optional
 
 import numpy as np
 
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.joint_belief import (
     belief_at,
     belief_of,
@@ -28,8 +30,6 @@ from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, pre
 from mlsm_manager.matching.problem.result import MatchResult
 from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.matching.problem.state import POSE
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer

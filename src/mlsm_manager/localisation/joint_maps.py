@@ -4,12 +4,12 @@ from typing import Dict, Mapping, Optional
 
 import numpy as np
 
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.multi_view.parameters import MultiViewParameters
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 

@@ -5,16 +5,16 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
+from mlsm_manager.joint_solver.placing.turns import Turns
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.pauses import scans_of_pause
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.multi_view.judge.continuity import shares_heard_before
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.placing.estimate import LiveEstimate
-from mlsm_manager.multi_view.placing.turns import Turns
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.self_check.continuity import scans_go_on
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell

@@ -6,18 +6,18 @@ from typing import Any, Callable, Dict
 
 import numpy as np
 
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
-from mlsm_manager.multi_view.motion.odometry_parameters import (
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.motion.odometry_parameters import (
     DvlOdometry,
     HeadingOdometry,
     ThrusterOdometry,
     UnaidedOdometry,
 )
-from mlsm_manager.multi_view.motion.thruster_factors import ThrusterFactors
-from mlsm_manager.multi_view.motion.unaided_factors import UnaidedFactors
+from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
+from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
+from mlsm_manager.matching.problem.prediction import OdometryErrors
 from node_support.parameters import ParameterSet, parameter
 
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.

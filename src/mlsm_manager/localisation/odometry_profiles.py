@@ -4,9 +4,9 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 
 import yaml
 
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
 
 
 class Setting(NamedTuple):

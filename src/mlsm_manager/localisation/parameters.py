@@ -6,6 +6,7 @@ from typing import Any, Dict, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
 from mlsm_manager.localisation.localiser import Localiser
@@ -18,7 +19,6 @@ from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from node_support.headers import StampParameters

@@ -5,11 +5,11 @@ from typing import Protocol
 
 import numpy as np
 
+from mlsm_manager.joint_solver.measured.run_log import RunLog
+from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.placing.drawing import corrected_path, drawn
+from mlsm_manager.joint_solver.unknowns.state import DELAY, State
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.multi_view.measured.run_log import RunLog
-from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
-from mlsm_manager.multi_view.placing.drawing import corrected_path, drawn
-from mlsm_manager.multi_view.unknowns.state import DELAY, State
 from node_support.geometry.planar import transformed
 
 

@@ -5,12 +5,12 @@ from typing import Any, Dict, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.motion.odometry_model import HELD_DEVIATION
-from mlsm_manager.multi_view.placing.estimate import LiveEstimate
-from mlsm_manager.multi_view.priors import run_deviations, run_mean
-from mlsm_manager.multi_view.solve.batch_solver import BatchResult, PartResult
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.unknowns.state import DELAY, RANGE_SCALE, RUN_COLUMNS
+from mlsm_manager.joint_solver.motion.odometry_model import HELD_DEVIATION
+from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
+from mlsm_manager.joint_solver.priors import run_deviations, run_mean
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, PartResult
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, RUN_COLUMNS
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.parameters import describe
 from sonar_processing.beams.beam_correction import BeamCorrection

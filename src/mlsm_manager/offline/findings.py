@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Any, Dict, Optional, Sequence
 
-from mlsm_manager.multi_view.solve.batch_solver import Closed
+from mlsm_manager.joint_solver.solve.batch_solver import Closed
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed

@@ -4,9 +4,9 @@ from typing import Dict, List
 
 import numpy as np
 
+from mlsm_manager.joint_solver.placing.drawing import drawn
 from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.multi_view.placing.drawing import drawn
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.evaluation import aligned_truth
 from mlsm_manager.offline.findings import Found

@@ -5,15 +5,15 @@ from typing import Mapping, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.placing.path import solved_path
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.solve.way_batch import solved_best
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.placing.path import solved_path
-from mlsm_manager.multi_view.solve.batch_solver import BatchResult, Closed, closed
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.solve.way_batch import solved_best
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 

@@ -5,10 +5,10 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.batch_solver import BatchResult, solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.unknowns.state import POSE, State
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import POSE, State
 from mlsm_manager.self_check.path_spread import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
 

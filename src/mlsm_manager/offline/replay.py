@@ -6,12 +6,12 @@ from typing import Callable, List, Mapping, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.surface_map.files.map_file import StoredMap

@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.parameters import with_defaults
 from recordings.reading.parameters import ReadingParameters
 from sonar_processing.beams.beam_correction import BeamCorrection

@@ -4,11 +4,11 @@ from typing import Optional
 
 import numpy as np
 
-from mlsm_manager.multi_view.judge.continuity import shares_heard_before
-from mlsm_manager.multi_view.placing.path import NodePath
-from mlsm_manager.multi_view.shifting.echo_agreement import agreement
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
+from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.placing.path import NodePath
+from mlsm_manager.joint_solver.shifting.echo_agreement import agreement
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
 from mlsm_manager.self_check.continuity import scans_go_on
 
 _WORTH_TRYING = 0.75

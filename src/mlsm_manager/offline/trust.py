@@ -5,12 +5,12 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.multi_view.judge.continuity import shares_heard_before
-from mlsm_manager.multi_view.motion.odometry_model import OdometryModel
-from mlsm_manager.multi_view.placing.turns import Turns
-from mlsm_manager.multi_view.solve.batch_solver import solved_part
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.unknowns.state import State
+from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.placing.turns import Turns
+from mlsm_manager.joint_solver.solve.batch_solver import solved_part
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed

@@ -1,9 +1,9 @@
 """Scans of a vehicle that has a compass and nothing else, and a solver for them that is quick."""
 
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
 
 PARAMETERS = MultiViewParameters(
     odometry=HeadingFactors(HeadingOdometry()),

@@ -5,8 +5,8 @@ from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.measured.run_log import RunLog
 from node_support.geometry.planar import inverse, rotated, transformed
 
 TURN = 14.0  # s per turn of the head

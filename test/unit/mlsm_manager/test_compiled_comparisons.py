@@ -9,24 +9,24 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
 
-from mlsm_manager.multi_view.compare.association import Pairs
-from mlsm_manager.multi_view.compare.comparing import Comparing
-from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import (
+from mlsm_manager.joint_solver.compare.association import Pairs
+from mlsm_manager.joint_solver.compare.comparing import Comparing
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import (
     DvlOdometry,
     HeadingOdometry,
     ThrusterOdometry,
     UnaidedOdometry,
 )
-from mlsm_manager.multi_view.motion.thruster_factors import ThrusterFactors
-from mlsm_manager.multi_view.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SurfaceMatching
-from mlsm_manager.multi_view.placing.placement import PlacedPoints, place
-from mlsm_manager.multi_view.solve.batch_solver import solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.multi_view.unknowns.state import State
+from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
+from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SurfaceMatching
+from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
+from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 
 pytest.importorskip("numba")
@@ -155,7 +155,7 @@ def test_points_without_a_finite_place_are_refused():
 
 @pytest.mark.parametrize("kernel", ["AUTO", "NUMBA"])
 def test_the_loops_are_compiled_before_the_first_scan(kernel, monkeypatch):
-    module = "mlsm_manager.multi_view.compiled.compiled_search"
+    module = "mlsm_manager.joint_solver.compiled.compiled_search"
     monkeypatch.delitem(sys.modules, module, raising=False)
     ReplayParameters(solver_kernel=kernel).build_localiser()
     assert module in sys.modules

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from made_posts import heard, true_path
 
-from mlsm_manager.multi_view.judge.continuity import shares_heard_before
-from mlsm_manager.multi_view.measured.run_log import RunLog
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.unknowns.state import State
+from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.measured.run_log import RunLog
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
+from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.self_check.continuity import scans_go_on
 
 SECONDS = 14.0

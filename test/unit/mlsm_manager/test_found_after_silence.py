@@ -5,10 +5,10 @@ import pytest
 from made_compass import PARAMETERS, with_heading_only
 from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, tour
 
+from mlsm_manager.joint_solver.compare.islands import MAP
+from mlsm_manager.joint_solver.placing.turns import Turns
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.multi_view.compare.islands import MAP
-from mlsm_manager.multi_view.placing.turns import Turns
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 
 pytestmark = pytest.mark.long
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from made_harbour import tour
 
-from mlsm_manager.multi_view.compare.association import Pairs
-from mlsm_manager.multi_view.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
-from mlsm_manager.multi_view.placing.placement import place
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.compare.association import Pairs
+from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
+from mlsm_manager.joint_solver.placing.placement import place
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from node_support.geometry.planar import transformed
 
 HARBOUR = tour(4)

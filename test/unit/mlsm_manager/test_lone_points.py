@@ -4,14 +4,14 @@ import numpy as np
 import pytest
 from made_posts import SPEED, cluttered, heard, true_path
 
+from mlsm_manager.joint_solver.measured.lone_points import crowds, lone_points
+from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.measured.lone_points import crowds, lone_points
-from mlsm_manager.multi_view.measured.surface_points import SurfacePoints
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.multi_view.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
-from mlsm_manager.multi_view.solve.batch_solver import solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 
 pytestmark = pytest.mark.long
 

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
+from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.search.loops import Loop, agreed, loops_of
-from mlsm_manager.multi_view.solve.batch_solver import Closed, closed, solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
 from node_support.geometry.planar import inverse, transformed
 
 pytestmark = pytest.mark.long

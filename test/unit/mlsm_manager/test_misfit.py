@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from made_posts import heard, true_path
 
-from mlsm_manager.multi_view.judge.misfit import misfit_variances
-from mlsm_manager.multi_view.measured.run_log import RunLog
-from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry, HeadingOdometry
-from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.unknowns.state import State
+from mlsm_manager.joint_solver.judge.misfit import misfit_variances
+from mlsm_manager.joint_solver.measured.run_log import RunLog
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry, HeadingOdometry
+from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.unknowns.state import State
 
 TURNS = 4
 

@@ -4,8 +4,8 @@ import sys
 
 import pytest
 
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
 from node_support.parameters import ParameterError
 
 
@@ -40,5 +40,5 @@ def test_parts_of_turns_without_any_heading_are_refused():
 
 
 def test_without_numba_numpy_compares(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mlsm_manager.multi_view.compiled.compiled_search", None)
+    monkeypatch.setitem(sys.modules, "mlsm_manager.joint_solver.compiled.compiled_search", None)
     assert SolverKernel.AUTO.resolved is SolverKernel.NUMPY

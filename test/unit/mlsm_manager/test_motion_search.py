@@ -4,15 +4,15 @@ import numpy as np
 import pytest
 from made_harbour import ahead, logged, tour
 
-from mlsm_manager.multi_view.motion.dvl_factors import DvlFactors
-from mlsm_manager.multi_view.motion.heading_factors import HeadingFactors
-from mlsm_manager.multi_view.motion.odometry_parameters import DvlOdometry, HeadingOdometry, UnaidedOdometry
-from mlsm_manager.multi_view.motion.transition import Transition
-from mlsm_manager.multi_view.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.placing.path import NodePath
-from mlsm_manager.multi_view.search.motion_search import searched_node
-from mlsm_manager.multi_view.unknowns.state import YAW, State
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry, HeadingOdometry, UnaidedOdometry
+from mlsm_manager.joint_solver.motion.transition import Transition
+from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
+from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.placing.path import NodePath
+from mlsm_manager.joint_solver.search.motion_search import searched_node
+from mlsm_manager.joint_solver.unknowns.state import YAW, State
 
 FAR = np.array([3.0, -5.0])
 HEADING = HeadingFactors(HeadingOdometry())

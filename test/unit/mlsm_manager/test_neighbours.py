@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlsm_manager.multi_view.compare.comparing import Comparing
-from mlsm_manager.multi_view.compare.neighbours import TIE
-from mlsm_manager.multi_view.placing.placement import PlacedPoints
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
+from mlsm_manager.joint_solver.compare.comparing import Comparing
+from mlsm_manager.joint_solver.compare.neighbours import TIE
+from mlsm_manager.joint_solver.placing.placement import PlacedPoints
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 
 SCANS = np.repeat(np.arange(6), 15)
 BLOCK_SCANS = 3

@@ -7,18 +7,18 @@ import numpy as np
 import pytest
 from made_harbour import CANAL, SONAR_IN_BASE, ahead, along_canal, tour
 
+from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.placing.estimate import scale_covariance
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
+from mlsm_manager.joint_solver.unknowns.state import Layout
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.measured.odometry_timeline import OdometryTimeline
-from mlsm_manager.multi_view.motion.odometry_motion import Motion
-from mlsm_manager.multi_view.placing.estimate import scale_covariance
-from mlsm_manager.multi_view.solve.batch_solver import solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.unknowns.normal_equations import NormalEquations
-from mlsm_manager.multi_view.unknowns.state import Layout
 from node_support.geometry.planar import composed, inverse, transformed
 
 pytestmark = pytest.mark.long

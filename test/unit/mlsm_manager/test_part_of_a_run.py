@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.batch_solver import solved, solved_part
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.unknowns.state import DELAY, RUN_COLUMNS
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.batch_solver import solved, solved_part
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import DELAY, RUN_COLUMNS
 
 pytestmark = pytest.mark.long
 FIRST = 8

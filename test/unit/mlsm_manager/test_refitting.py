@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.multi_view.parameters import MultiViewParameters
-from mlsm_manager.multi_view.solve.batch_solver import solved
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.offline.refitting import displaced, other_settings, refitted_verdicts
 from node_support.geometry.planar import inverse, transformed
 

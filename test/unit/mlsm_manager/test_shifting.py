@@ -8,22 +8,22 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_harbour import CANAL, SONAR_IN_BASE, along_canal, tour
 
+from mlsm_manager.joint_solver.judge.missed_echoes import MissedEchoes
+from mlsm_manager.joint_solver.shifting.echo_agreement import agreement, shift_gains
+from mlsm_manager.joint_solver.shifting.shift_search import ShiftSearch
+from mlsm_manager.joint_solver.shifting.stretched_mean import stretched_mean
+from mlsm_manager.joint_solver.solve.batch_solver import settled
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
+from mlsm_manager.joint_solver.ways.way_comparisons import nats_of
+from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
+from mlsm_manager.joint_solver.ways.way_nodes import on_path
+from mlsm_manager.joint_solver.ways.ways import Ways
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.multi_view.judge.missed_echoes import MissedEchoes
-from mlsm_manager.multi_view.shifting.echo_agreement import agreement, shift_gains
-from mlsm_manager.multi_view.shifting.shift_search import ShiftSearch
-from mlsm_manager.multi_view.shifting.stretched_mean import stretched_mean
-from mlsm_manager.multi_view.solve.batch_solver import settled
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.multi_view.ways.way_comparisons import nats_of
-from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
-from mlsm_manager.multi_view.ways.way_nodes import on_path
-from mlsm_manager.multi_view.ways.ways import Ways
 
 ALONG = np.array([1.0, 0.0])
 TURN = 16.0  # s; each is one scan here

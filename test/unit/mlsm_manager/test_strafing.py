@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
 
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.solve.way_batch import solved_best
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.multi_view.solve.live_solver import LiveSolver
-from mlsm_manager.multi_view.solve.way_batch import solved_best
 from mlsm_manager.offline.strafing import may_strafe, strafes
 from node_support.errors import RefusedInput
 

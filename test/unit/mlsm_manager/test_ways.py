@@ -7,18 +7,18 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.joint_solver.motion.heading_factors import AHEAD, ASIDE
+from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.solver_kernel import SolverKernel
+from mlsm_manager.joint_solver.ways.way_comparisons import nats_of, nearby_of
+from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
+from mlsm_manager.joint_solver.ways.way_motion import drawn, led
+from mlsm_manager.joint_solver.ways.way_nodes import on_path
+from mlsm_manager.joint_solver.ways.way_pulls import pulled, pulls_of
+from mlsm_manager.joint_solver.ways.way_weighing import groups_of, weighed
+from mlsm_manager.joint_solver.ways.ways import Ways, begun
 from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.multi_view.measured.odometry_timeline import OdometryTimeline
-from mlsm_manager.multi_view.motion.heading_factors import AHEAD, ASIDE
-from mlsm_manager.multi_view.motion.odometry_motion import Motion
-from mlsm_manager.multi_view.solver_kernel import SolverKernel
-from mlsm_manager.multi_view.ways.way_comparisons import nats_of, nearby_of
-from mlsm_manager.multi_view.ways.way_echoes import WayEchoes
-from mlsm_manager.multi_view.ways.way_motion import drawn, led
-from mlsm_manager.multi_view.ways.way_nodes import on_path
-from mlsm_manager.multi_view.ways.way_pulls import pulled, pulls_of
-from mlsm_manager.multi_view.ways.way_weighing import groups_of, weighed
-from mlsm_manager.multi_view.ways.ways import Ways, begun
 
 PART = 5.0  # s
 

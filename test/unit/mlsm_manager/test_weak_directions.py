@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.multi_view.compare.weak_directions import WeakDirections
-from mlsm_manager.multi_view.parameters import SurfaceMatching
-from mlsm_manager.multi_view.placing.placement import PlacedPoints
-from mlsm_manager.multi_view.unknowns.state import BEFORE_THE_RUN
+from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
+from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.placing.placement import PlacedPoints
+from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN
 
 MATCHING = SurfaceMatching(normal_deviation=0.2)
 SCANS = 5

@@ -1,0 +1,108 @@
+"""How much the echoes of a whole run speak for a path, and for paths that are shifted from some moment on."""
+
+from typing import NamedTuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.joint_solver.ways.way_comparisons import ACROSS, ALONG, AROUND, FACING, FARTHEST
+from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
+
+_FARTHEST_ALONG = ALONG * FARTHEST**0.5  # m: echoes farther apart tell nothing of each other
+
+
+class _Pairs(NamedTuple):
+    """p echoes with earlier ones. sources, targets: (p,) rows. offsets: (p, 2) m from targets, along the axis and to
+    its left. normals: (p, 2) of the targets, the same way.
+    """
+
+    sources: np.ndarray
+    targets: np.ndarray
+    offsets: np.ndarray
+    normals: np.ndarray
+
+
+def agreement(echoes: WayEchoes, path: np.ndarray) -> float:
+    """Return how much [nats] `echoes` of all scans speak for a path (k, 2) [m] in map through all nodes.
+
+    Each echo counts as far as it lies on one of an earlier scan, as it does for each way of a WaySearch.
+    """
+    if not len(echoes):
+        return 0.0
+    places, best = echoes.places(path, 0), np.zeros(len(echoes))
+    near = cKDTree(places).query_pairs(_FARTHEST_ALONG, output_type="ndarray")
+    later = np.where(echoes.nodes[near[:, 0]] > echoes.nodes[near[:, 1]], 0, 1)
+    rows = np.arange(len(near))
+    pairs = _comparable(echoes, places, near[rows, later], near[rows, 1 - later], np.array([1.0, 0.0]))
+    np.maximum.at(best, pairs.sources, _nearness(echoes, pairs, 0.0))
+    return float(echoes.nats @ best)
+
+
+def shift_gains(echoes: WayEchoes, path: np.ndarray, axis: np.ndarray, shifts: np.ndarray) -> np.ndarray:
+    """Return (s, m), what is gained [nats] if `path` is shifted by each of `shifts` (m,) [m] from each of s scans on.
+
+    axis: (2,) unit vector along which it is shifted. A shift changes the path at once, so that the scans within which
+    the vehicle goes that far count a little wrong.
+    """
+    pairs = _in_order(_pairs_within(echoes, echoes.places(path, 0), axis, float(np.abs(shifts).max())))
+    scans = len(path) - 1
+    present = _by_scan(echoes, pairs, 0.0, scans)
+    after = np.maximum.accumulate(present[:, ::-1], axis=1)[:, ::-1]
+    is_shifted = echoes.nodes[:, np.newaxis] >= np.arange(1, scans)
+    gains = np.zeros((scans, len(shifts)))
+    for number, shift in enumerate(shifts):
+        before = np.maximum.accumulate(_by_scan(echoes, pairs, float(shift), scans), axis=1)
+        best = np.maximum(before[:, :-1], after[:, 1:]) - after[:, :1]
+        gains[1:, number] = echoes.nats @ (best * is_shifted)
+    return gains
+
+
+def _by_scan(echoes: WayEchoes, pairs: _Pairs, shift: float, scans: int) -> np.ndarray:
+    """Return how near (n, scans) each echo, shifted [m] along the axis, is to the nearest one of each earlier scan."""
+    first, last = np.searchsorted(pairs.offsets[:, 0], [-shift - _FARTHEST_ALONG, -shift + _FARTHEST_ALONG])
+    some = _Pairs(*(array[first:last] for array in pairs))
+    nearness, result = _nearness(echoes, some, shift), np.zeros(len(echoes) * scans)
+    near = np.flatnonzero(nearness)
+    np.maximum.at(result, some.sources[near] * scans + echoes.nodes[some.targets[near]], nearness[near])
+    return result.reshape(len(echoes), scans)
+
+
+def _nearness(echoes: WayEchoes, pairs: _Pairs, shift: float) -> np.ndarray:
+    """Return (p,) 1 for sources on their targets to 0 for those too far, after they are shifted [m] along the axis."""
+    along, left = pairs.offsets[:, 0] + shift, pairs.offsets[:, 1]
+    ahead, aside = pairs.normals[:, 0], pairs.normals[:, 1]
+    across, beside = along * ahead + left * aside, left * ahead - along * aside
+    on_surface = (across / ACROSS) ** 2 + (beside / ALONG) ** 2
+    squared = np.where(echoes.lone[pairs.sources], (along**2 + left**2) / AROUND**2, on_surface)
+    return np.where(squared < FARTHEST, np.exp(-0.5 * squared), 0.0)
+
+
+def _pairs_within(echoes: WayEchoes, places: np.ndarray, axis: np.ndarray, reach: float) -> _Pairs:
+    """Return the pairs that meet if sources are shifted along the axis by `reach` [m] at most."""
+    found, (x, y) = [np.empty((2, 0), dtype=np.int64)], axis
+    for scan in np.unique(echoes.nodes):
+        own, earlier = np.flatnonzero(echoes.nodes == scan), np.flatnonzero(echoes.nodes < scan)
+        offset = places[own, np.newaxis] - places[earlier]
+        near = np.abs(offset[..., 1] * x - offset[..., 0] * y) < _FARTHEST_ALONG
+        near &= np.abs(offset[..., 0] * x + offset[..., 1] * y) < reach + _FARTHEST_ALONG
+        sources, targets = np.nonzero(near)
+        found.append(np.stack([own[sources], earlier[targets]]))
+    return _comparable(echoes, places, *np.concatenate(found, axis=1), axis)
+
+
+def _comparable(
+    echoes: WayEchoes, places: np.ndarray, sources: np.ndarray, targets: np.ndarray, axis: np.ndarray
+) -> _Pairs:
+    """Return the pairs of different scans and of one kind that, on surfaces, face the same way."""
+    lone = echoes.lone[sources]
+    facing = np.einsum("na,na->n", echoes.normals[sources], echoes.normals[targets]) > FACING
+    kept = (echoes.nodes[sources] > echoes.nodes[targets]) & (lone == echoes.lone[targets]) & (lone | facing)
+    sources, targets = sources[kept], targets[kept]
+    to_axis = np.array([[axis[0], -axis[1]], [axis[1], axis[0]]])
+    return _Pairs(sources, targets, (places[sources] - places[targets]) @ to_axis, echoes.normals[targets] @ to_axis)
+
+
+def _in_order(pairs: _Pairs) -> _Pairs:
+    """Return the pairs in the order of their offset along the axis."""
+    order = np.argsort(pairs.offsets[:, 0])
+    return _Pairs(*(array[order] for array in pairs))

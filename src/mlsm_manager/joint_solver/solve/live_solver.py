@@ -1,0 +1,246 @@
+"""Follows the vehicle scan by scan: the newest nodes are free, what is older stays where it was found."""
+
+from dataclasses import replace
+from typing import Dict, List, Mapping, Optional, Sequence
+
+import numpy as np
+
+from mlsm_manager.joint_solver.compare.islands import Islands
+from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.judge.misfit import misfit_variances
+from mlsm_manager.joint_solver.measured.run_log import RunLog
+from mlsm_manager.joint_solver.measured.scan_parts import parts_of
+from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
+from mlsm_manager.joint_solver.priors import run_mean
+from mlsm_manager.joint_solver.search.motion_search import searched_node
+from mlsm_manager.joint_solver.search.place_search import Whereabouts, island_place, silent_scans, whereabouts
+from mlsm_manager.joint_solver.solve.live_window import LiveWindow
+from mlsm_manager.joint_solver.solve.solved_nodes import SolvedNodes
+from mlsm_manager.joint_solver.solve.stacking import stacked, unstacked
+from mlsm_manager.joint_solver.unknowns.state import RUN_COLUMNS, State
+from mlsm_manager.joint_solver.ways.way_nodes import nodes_on_ways
+from mlsm_manager.joint_solver.ways.way_search import WaySearch, needs_ways
+from mlsm_manager.matching.problem.scan import Scan
+from node_support.errors import RefusedInput
+
+_ESTIMATE = "estimate."
+_UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
+_CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
+
+
+class LiveSolver:
+    """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
+
+    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan of the log. state: of all nodes.
+    islands: which scans are compared with each other. search: what came of the search for the newest scans in the map
+    after scans that heard nothing; None where none was needed.
+    """
+
+    def __init__(
+        self,
+        parameters: MultiViewParameters,
+        sonar_in_base: np.ndarray,
+        start: Optional[np.ndarray] = None,
+        known: Optional[KnownSurfaces] = None,
+    ) -> None:
+        """`start`: (3,) standard deviations of the first pose in the map, m, m, rad; None: it defines the map.
+
+        `known`: surfaces that the map has already.
+        """
+        self.parameters = parameters
+        self.log = RunLog(sonar_in_base)
+        self.odometry = parameters.odometry
+        self.estimates: List[LiveEstimate] = []
+        self._nodes = SolvedNodes(self.odometry.first_node(), run_mean(parameters.sonar))
+        self._start, self._known = start, known
+        self.islands = Islands(np.empty(0))
+        self.search: Optional[Whereabouts] = None
+        self._ways = WaySearch(parameters) if needs_ways(self.odometry, parameters.matching) else None
+
+    def stored(self) -> Dict[str, np.ndarray]:
+        """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
+        return {
+            "odometry": _name_of(self.odometry),
+            **self._nodes.stored(),
+            "start": np.empty(0) if self._start is None else self._start,
+            "known": np.empty((0, 2)) if self._known is None else self._known.places,
+            "islands": self.islands.numbers,
+            **({} if self._ways is None else self._ways.stored()),
+            **stacked(self.estimates, _ESTIMATE),
+        }
+
+    @classmethod
+    def resumed(
+        cls,
+        parameters: MultiViewParameters,
+        sonar_in_base: np.ndarray,
+        scans: Sequence[Scan],
+        stored: Mapping[str, np.ndarray],
+    ) -> "LiveSolver":
+        """Return a solver that goes on after `scans` as the one did that took them and was `stored` then.
+
+        Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
+        """
+        if not np.array_equal(stored["odometry"], _name_of(parameters.odometry)):
+            name = stored["odometry"].tobytes().decode("ascii", "replace")
+            raise ValueError(
+                f"it was stored with another odometry profile: {name}, not {type(parameters.odometry).__name__}"
+            )
+        start, known = stored["start"], stored["known"]
+        solver = cls(
+            parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None
+        )
+        for scan in scans:
+            solver._append(scan)
+        solver._nodes.restore(stored, solver.log.scan_count)
+        solver.islands = Islands(stored["islands"])
+        solver._ways = None if solver._ways is None else solver._ways.resumed(solver.log, stored)
+        solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
+        for name, found in (("estimates", solver.estimates), ("islands", stored["islands"])):
+            if len(found) != solver.log.scan_count:
+                raise ValueError(f"{len(found)} {name} for {solver.log.scan_count} scans")
+        return solver
+
+    @property
+    def state(self) -> State:
+        """The unknowns as they are known now; a view that the next scan makes invalid."""
+        return self._nodes.state
+
+    def add(self, scan: Scan) -> LiveEstimate:
+        """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
+
+        It may be cut into parts (`scan_parts`), each of which then is a scan of the log with an estimate of its own.
+
+        Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
+        the fit has no finite solution.
+        """
+        scans, before, ways = self.log.scan_count, self.state.copy(), self._ways
+        try:
+            with np.errstate(over="ignore", invalid="ignore"):
+                self._append(scan)
+                self.estimates += self._solved()
+        except RefusedInput:
+            raise
+        except (np.linalg.LinAlgError, ValueError) as error:
+            # numpy and scipy raise a ValueError where they meet what is not finite.
+            self._nodes.take_back(before)
+            self._ways = ways
+            self._shorten(scans)
+            text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
+            raise RefusedInput("scans without a solution", text) from error
+        return self.estimates[-1]
+
+    @property
+    def _parts(self) -> int:
+        return self.parameters.matching.scan_parts
+
+    def _append(self, scan: Scan) -> None:
+        """Append the parts of a scan to the log, all or none."""
+        scans = self.log.scan_count
+        try:
+            for part in parts_of(scan, self._parts, self.log.node_times[-1] if scans else None):
+                self.log.append(part, self.parameters.window.lookahead)
+                self.islands.append()
+        except RefusedInput:
+            self._shorten(scans)
+            raise
+
+    def _shorten(self, scans: int) -> None:
+        """Keep the oldest `scans` of the log."""
+        while self.log.scan_count > scans:
+            self.log.remove_newest()
+        self.islands.shorten(scans)
+
+    def _solved(self) -> List[LiveEstimate]:
+        """Return what is known of the scans of the log that have no estimates yet."""
+        for node in range(len(self._nodes), self.log.scan_count + 1):
+            motion = self.log.node_motion(np.array([node - 1, node]))
+            self._nodes.extend(self.odometry.advanced(self.state.nodes[-1:], motion[:1], motion[1:]))
+        self.search = None
+        self._search()
+        window = self._fitted()
+        if self.islands.is_apart and self._join(window.estimates(1)[0]):
+            window = self._fitted()
+        estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
+        self._nodes.covariances.replace_from(window.oldest, covariances)
+        variance = self._misfit_variance()
+        return [replace(estimate, misfit_variance=variance) for estimate in estimates]
+
+    def _misfit_variance(self) -> float:
+        """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
+        first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
+        newest = misfit_variances(self.log, self.odometry, self.state, self.parameters.matching, first)
+        self._nodes.misfits.replace_from(first, newest)
+        return float(self._nodes.misfits.values.sum()) + (0.0 if self._ways is None else self._ways.variance)
+
+    def _fitted(self) -> LiveWindow:
+        """Return the newest nodes' problem after they were moved to its solution."""
+        window = LiveWindow(
+            self.log, self.odometry, self.parameters, self.state, self.estimates, self._nodes.covariances.values,
+            self._start, self._known, self.islands,
+        )  # fmt: skip
+        cut = self.parameters.matching.wide_cut
+        for _ in range(self.parameters.window.live_iterations):
+            window.step(cut)
+            cut = max(self.parameters.matching.cut, _CUT_FACTOR * cut)
+        return window
+
+    @property
+    def found(self) -> str:
+        """How the vehicle was found again with the newest scan after a silence; empty where it was not."""
+        return self.search.line() if self.search is not None and self.search.is_certain else ""
+
+    def _search(self) -> None:
+        """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin an island."""
+        if self._parts > 1:
+            self._search_by_parts()
+            return
+        silent = silent_scans(self.log)
+        if len(self.estimates) <= silent:
+            return
+        covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+        matching = self.parameters.matching
+        if silent:
+            self.search = whereabouts(
+                self.log, self.odometry, self.state, self.islands, covariance, silent, matching, self._known
+            )
+        if self.search is not None and self.search.is_certain and not self.islands.is_apart:
+            self._move(self.search.moves)
+        elif self.search is not None and self.search.reach > matching.wide_cut:
+            self.islands.begin()
+        else:
+            self._search_beside_scan_before(covariance)
+
+    def _search_by_parts(self) -> None:
+        """Put the newest nodes onto the ways that are believed most."""
+        if self._ways is not None:
+            self._ways = self._ways.followed(self.log)
+            is_told = self._known is not None or self._start is not None
+            self._nodes.replace_newest(nodes_on_ways(self._ways, self.log, self.state.nodes, self.parameters, is_told))
+
+    def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
+        """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
+        first = self.islands.start
+        self.state.nodes[-1] = searched_node(
+            self.log, self.odometry, self.state, covariance, self.parameters.matching, first
+        )
+
+    def _join(self, estimate: LiveEstimate) -> bool:
+        """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""
+        covariance, matching = estimate.covariance[:2, :2], self.parameters.matching
+        self.search = island_place(self.log, self.odometry, self.state, self.islands, covariance, matching, self._known)
+        if self.search.is_certain:
+            self._move(self.search.moves)
+            self.islands.join()
+        return self.search.is_certain
+
+    def _move(self, moves: np.ndarray) -> None:
+        """Move the newest nodes by `moves` (k, width)."""
+        self.state.nodes[-len(moves) :] += moves
+
+
+def _name_of(odometry: OdometryModel) -> np.ndarray:
+    """Return the name of a model (n,) uint8, as a map's file keeps it: models of equal width mean other unknowns."""
+    return np.frombuffer(type(odometry).__name__.encode(), dtype=np.uint8)

@@ -1,0 +1,202 @@
+"""The problem of one scan: the newest nodes against each other and against the frozen map."""
+
+from typing import Iterator, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.joint_solver.compare.association import Neighbours, Pairs, pairs_of
+from mlsm_manager.joint_solver.compare.comparing import Comparing
+from mlsm_manager.joint_solver.compare.comparisons import add_comparisons
+from mlsm_manager.joint_solver.compare.islands import Islands
+from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.compare.lone_comparisons import LoneComparisons
+from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
+from mlsm_manager.joint_solver.judge.agreement import agreement, surfaces_met
+from mlsm_manager.joint_solver.measured.run_log import RunLog
+from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel, frozen_deviations
+from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
+from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.priors import add_belief, run_deviations, run_mean
+from mlsm_manager.joint_solver.solve.frozen_map import joint_covariance, nearest_blocks
+from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations
+from mlsm_manager.joint_solver.unknowns.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
+from node_support.geometry.planar import composed, inverse
+
+_FORGOTTEN_DELAY = 2.0
+"""Factor of the delay's deviation as it was known before the window. Comparisons follow where points go, and what is
+frozen keeps what it was frozen with, so that they tell less than they seem to: taken at their word, windows 41 scans
+apart kept a delay of their own each, in turn 0.68 and 0.86 s, where the whole run says 1.00 s."""
+_MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
+
+
+class LiveWindow:
+    """Moves the free nodes of `state` and its run's unknowns in place.
+
+    estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
+    standard deviations of the first node's pose, None where it defines the map. known: what was in the map before.
+    islands: which scans are compared with each other.
+    """
+
+    def __init__(
+        self, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, state: State,
+        estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
+        known: Optional[KnownSurfaces], islands: Islands,
+    ) -> None:  # fmt: skip
+        self._islands = islands
+        self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
+        self._comparing = Comparing.by(parameters.kernel)
+        last = log.scan_count
+        first = max(0, last - parameters.window.free_nodes)
+        self._scans_per_block = parameters.matching.block_scans
+        self._recent = first // self._scans_per_block * self._scans_per_block
+        around = log.node_poses(last)[:2] + state.nodes[last, :2]
+        self._frozen = nearest_blocks(
+            log, odometry, state, first // self._scans_per_block, around, parameters, self._comparing.placed
+        )
+        self._layout = Layout(first, last, odometry.width, self._groups(first))
+        self._held_covariance = self._covariance_of_frozen(covariances, first)
+        self._anchor = estimates[first - 1] if first else None
+        self._motion = log.node_motion(np.arange(first, last + 1))
+        self._start, self._known = start, known
+        self._solution: Optional[DenseSolution] = None
+        self._comparisons = 0
+        self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
+        self._met = ()
+        self._lone = self._lone_comparisons()
+
+    def _lone_comparisons(self) -> LoneComparisons:
+        """Return those with the frozen blocks and with the scans since."""
+        blocks = self._frozen.numbers[:, np.newaxis] * self._scans_per_block + np.arange(self._scans_per_block)
+        recent = np.arange(self._recent, self._layout.last)
+        importance = np.repeat(self._frozen.block_importance, self._scans_per_block)
+        scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
+        same = self._islands.numbers[scans] == self._islands.newest
+        scans, importance = scans[same], importance[same]
+        return LoneComparisons(self._log, self._odometry, self._parameters.matching, scans, importance)
+
+    def _groups(self, first: int) -> np.ndarray:
+        """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
+        group_of_block = np.full(first // self._scans_per_block + 1, -1)
+        group_of_block[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
+        group_of_block[-1] = len(self._frozen.numbers)
+        return group_of_block[np.arange(first) // self._scans_per_block]
+
+    def _covariance_of_frozen(self, covariances: np.ndarray, first: int) -> np.ndarray:
+        """Return (3 g, 3 g) of the groups' poses."""
+        if not first:
+            return np.zeros((0, 0))
+        middles = self._frozen.numbers * self._scans_per_block + self._scans_per_block // 2
+        return joint_covariance(covariances[np.append(middles, first)])
+
+    def step(self, cut: float) -> None:
+        """Take one Gauss-Newton step with points up to `cut` [m] apart."""
+        equations = NormalEquations(self._layout.size, len(self._held_covariance), self._comparing.scattered)
+        self._add_beliefs(equations)
+        free = self._state.nodes[self._layout.first :]
+        self._odometry.add_steps(equations, self._layout, free, self._motion)
+        self._comparisons = self._add_surfaces(equations, cut)
+        self._comparisons += self._lone.add(equations, self._layout, self._state, cut)
+        self._solution = DenseSolution(equations)
+        self._move(self._solution.step)
+
+    def _add_beliefs(self, equations: NormalEquations) -> None:
+        mean, deviations, run, of_run = self._beliefs()
+        add_belief(equations, 0, self._state.nodes[self._layout.first], mean, deviations)
+        add_belief(equations, self._layout.run_start, self._state.run, run, of_run)
+        if self._anchor is not None:
+            own = np.arange(POSE_COLUMNS)
+            held = self._layout.size + len(self._held_covariance) - POSE_COLUMNS + own
+            weight = deviations[POSE] ** -2.0
+            cross = np.zeros((POSE_COLUMNS, 2, 2))
+            cross[:, 0, 1] = cross[:, 1, 0] = -weight
+            equations.add_blocks(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
+
+    def _beliefs(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return mean and deviations of the first free node and of the run's unknowns.
+
+        Of a frozen node it is what was known when it was the newest: the window's scans are not in that.
+        """
+        sonar = self._parameters.sonar
+        if self._anchor is None:
+            deviations = self._odometry.first_deviations()
+            if self._start is not None:
+                deviations[POSE] = self._start
+            return self._odometry.first_node(), deviations, run_mean(sonar), run_deviations(sonar)
+        pose = self._state.nodes[self._layout.first, POSE]
+        mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
+        deviations = frozen_deviations(self._anchor.node_deviations)
+        of_run = self._anchor.run_deviations
+        of_run[DELAY] *= _FORGOTTEN_DELAY
+        return mean, deviations, self._anchor.run, of_run
+
+    def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
+        """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
+        matching = self._parameters.matching
+        rows = self._log.rows(self._recent, self._layout.last)
+        recent = place(self._log, self._odometry, self._state, rows, self._comparing.placed)
+        frozen = self._frozen.moved_by_run(self._state.run)
+        weak = WeakDirections.of((frozen, recent), matching)
+        frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
+        sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
+        to_frozen, to_recent = self._compared(sources, (frozen, recent), cut)
+        met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
+        summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
+        if self._known is not None:
+            to_known, known = self._known.compared(sources, cut, matching)
+            known = weak.without(known, sources.scans[to_known.rows])
+            to_known = self._islands.within(to_known, sources, known)
+            met.insert(0, (to_known, sources, known))
+            summed.insert(1, met[0])
+        self._met = tuple(met)
+        by = self._comparing.summed
+        return sum(add_comparisons(equations, self._layout, *some, matching, cut, by) for some in summed)
+
+    def _compared(
+        self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
+    ) -> Iterator[Pairs]:
+        """Compare `sources` with frozen and recent points, whose neighbours are looked up once for all steps."""
+        matching = self._parameters.matching
+        if self._lists is None:
+            self._lists = tuple(self._comparing.neighbours(targets, matching.block_scans) for targets in surfaces)
+        for lists, targets in zip(self._lists, surfaces):
+            pairs = pairs_of(lists, sources, targets, cut, matching, self._comparing.weighed)
+            yield self._islands.within(pairs, sources, targets)
+
+    def _move(self, step: np.ndarray) -> None:
+        nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)
+        self._state.nodes[self._layout.first :] += nodes
+        for column, most in _MOST_RUN_STEP.items():
+            self._state.run[column] += np.clip(step[self._layout.run_start + column], -most, most)
+
+    @property
+    def oldest(self) -> int:
+        """The oldest free node."""
+        return self._layout.first
+
+    def covariances_of_oldest(self, count: int) -> np.ndarray:
+        """Return the pose covariances (count + 1, 3, 3) of the oldest free nodes, the next ones to be frozen."""
+        columns = self._layout.pose_columns(self._layout.first + np.arange(count + 1))
+        return np.stack([self._solution.covariance(own, self._held_covariance) for own in columns])
+
+    def estimates(self, count: int) -> List[LiveEstimate]:
+        """Return what is known of the newest `count` nodes, oldest first."""
+        return [self._estimate(node) for node in range(self._layout.last - count + 1, self._layout.last + 1)]
+
+    def _estimate(self, number: int) -> LiveEstimate:
+        """Return what is known of node `number`, at the end of the scan before it."""
+        own = self._layout.node_start(number) + np.arange(self._layout.width)
+        unknowns = np.append(own, self._layout.run_start + np.arange(RUN_COLUMNS))
+        T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
+        T_map_base = T_odom_base + node[POSE]
+        share, distance = agreement(self._met, number - 1, self._parameters.matching)
+        return LiveEstimate(
+            time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
+            T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
+            covariance=self._solution.covariance(unknowns, self._held_covariance),
+            own_covariance=self._solution.covariance(unknowns, np.zeros_like(self._held_covariance)),
+            world_scale_deviation=self._parameters.sonar.world_scale_deviation,
+            reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
+            drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
+            agreement=share, distance=distance, surfaces=surfaces_met(self._met, number - 1),
+        )  # fmt: skip

@@ -1,0 +1,184 @@
+"""The joint solver, live and batch, on a simulated tour."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, tour
+
+from mlsm_manager.joint_solver.motion.dvl_factors import DIRECTION, DvlFactors
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration
+from mlsm_manager.joint_solver.placing.path import solved_path
+from mlsm_manager.joint_solver.solve.batch_solver import solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import DELAY
+from mlsm_manager.matching.problem.scan import Scan, Track
+from node_support.errors import RefusedInput
+from node_support.geometry.planar import composed
+
+DIRECTION_ERROR, LATE = 0.12, 0.6
+DEFAULTS = MultiViewParameters()
+SHORT_WINDOW = MultiViewParameters(window=SolverWindow(free_nodes=6))
+
+
+def followed(scans, parameters=DEFAULTS):
+    solver = LiveSolver(parameters, SONAR_IN_BASE)
+    for scan in scans:
+        solver.add(scan)
+    return solver
+
+
+@pytest.fixture(scope="module")
+def made():
+    return tour(24, direction=DIRECTION_ERROR, delay=LATE)
+
+
+@pytest.fixture(scope="module")
+def live(made):
+    return followed(made.scans)
+
+
+@pytest.fixture(scope="module")
+def batch(live):
+    return solved(live)
+
+
+def distances(path, truth, times):
+    there = truth.at(times)[:, :2]
+    return np.hypot(*(path[:, :2] - path[0, :2] - (there - there[0])).T)
+
+
+def test_live_follows_a_vehicle_whose_odometry_goes_astray(made, live):
+    ends = np.array([estimate.time for estimate in live.estimates])
+    path = np.array([estimate.T_map_base for estimate in live.estimates])
+    error = np.hypot(*(path[:, :2] - made.truth.at(ends)[:, :2]).T)
+    astray = np.hypot(*(made.odometry.at(ends) - made.truth.at(ends))[:, :2].T)
+    assert astray.max() > 2.0
+    assert error[-10:].max() < 0.4
+
+
+def test_direction_and_delay_are_found(live, batch):
+    assert live.estimates[-1].node[DIRECTION] == pytest.approx(DIRECTION_ERROR, abs=0.03)
+    assert live.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.2)
+    assert batch.state.run[DELAY] == pytest.approx(LATE, abs=0.2)
+
+
+def test_batch_is_closer_to_the_truth_than_live(made, live, batch):
+    ends = np.array([estimate.time for estimate in live.estimates])
+    known = np.array([estimate.T_map_base for estimate in live.estimates])
+    fitted = solved_path(made.odometry, live.odometry, batch.node_times, batch.state.nodes, ends)
+    assert distances(fitted, made.truth, ends).mean() < 0.3
+    assert distances(fitted, made.truth, ends).mean() < distances(known, made.truth, ends).mean()
+
+
+def test_told_deviations_cover_the_errors_and_are_not_idle(made, live):
+    ends = np.array([estimate.time for estimate in live.estimates])
+    error = np.array([estimate.T_map_base for estimate in live.estimates])[:, :2] - made.truth.at(ends)[:, :2]
+    covariances = np.array([estimate.pose_covariance[:2, :2] for estimate in live.estimates])
+    nees = np.einsum("na,nab,nb->n", error, np.linalg.inv(covariances), error)
+    assert 0.01 < nees.mean() / 2.0 < 2.0
+
+
+def test_the_frozen_map_s_own_error_counts(made):
+    newest = followed(made.scans, SHORT_WINDOW).estimates[-1]
+    assert np.trace(newest.covariance[:2, :2]) > np.trace(newest.own_covariance[:2, :2])
+
+
+def test_the_frozen_map_s_own_error_counts_in_the_calibration_too(made):
+    newest = followed(made.scans, SHORT_WINDOW).estimates[-1]
+    assert (newest.run_deviations > 1.001 * np.sqrt(np.diag(newest.own_covariance)[-2:])).all()
+
+
+def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(made):
+    wrong = SonarCalibration(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1)
+    solver = followed(made.scans, MultiViewParameters(sonar=wrong, window=SolverWindow(free_nodes=4)))
+    assert solver.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.3)
+
+
+def test_the_same_scans_give_the_same_bytes(made, live, batch):
+    again = followed(made.scans)
+    assert again.state.nodes.tobytes() == live.state.nodes.tobytes()
+    assert solved(again).state.nodes.tobytes() == batch.state.nodes.tobytes()
+
+
+def test_points_moved_by_a_nanometre_move_the_path_by_less_than_a_millimetre(made, live, batch):
+    rng = np.random.RandomState(3)
+    moved = [replace(scan, points=scan.points + rng.choice([-1e-9, 1e-9], scan.points.shape)) for scan in made.scans]
+    other = followed(moved)
+    found, known = ([e.node for e in solver.estimates] for solver in (other, live))
+    np.testing.assert_allclose(found, known, atol=1e-6)
+    np.testing.assert_allclose(solved(other).state.nodes, batch.state.nodes, atol=1e-6)
+
+
+def test_a_scan_that_is_not_newer_is_refused_and_changes_nothing(made):
+    solver = followed(made.scans[:3])
+    before = solver.state.nodes.copy()
+    with pytest.raises(RefusedInput, match="the one before"):
+        solver.add(made.scans[1])
+    np.testing.assert_array_equal(solver.state.nodes, before)
+
+
+def with_wild_odometry(scan):
+    poses = scan.track.poses.copy()
+    poses[::2] = 1e200
+    return replace(scan, track=Track(scan.track.times, poses))
+
+
+def test_a_scan_without_a_solution_is_refused_and_changes_nothing(made):
+    solver, undisturbed = followed(made.scans[:6]), followed(made.scans[:6])
+    with pytest.raises(RefusedInput, match="ends at"):
+        solver.add(with_wild_odometry(made.scans[6]))
+    for scan in made.scans[6:8]:
+        solver.add(scan)
+        undisturbed.add(scan)
+    found, expected = solver.estimates[-1], undisturbed.estimates[-1]
+    np.testing.assert_allclose(solver.state.nodes, undisturbed.state.nodes, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(found.covariance, expected.covariance, rtol=0.0, atol=1e-9)
+
+
+def test_a_first_scan_without_a_solution_is_forgotten(made):
+    solver = LiveSolver(DEFAULTS, SONAR_IN_BASE)
+    with pytest.raises(RefusedInput, match="ends at"):
+        solver.add(with_wild_odometry(made.scans[0]))
+    for scan in made.scans[:2]:
+        solver.add(scan)
+    np.testing.assert_allclose(solver.state.nodes, followed(made.scans[:2]).state.nodes, rtol=0.0, atol=1e-9)
+
+
+def test_the_second_scan_is_compared_with_the_first(live):
+    assert [estimate.comparisons > 0 for estimate in live.estimates[:3]] == [False, True, True]
+
+
+def test_scans_without_echoes_are_bridged_by_the_odometry(made):
+    deaf = [without_points(scan) if 8 <= number < 14 else scan for number, scan in enumerate(made.scans)]
+    solver = followed(deaf)
+    last = solver.estimates[-1]
+    assert np.hypot(*(last.T_map_base - made.truth.at(last.time))[:2]) < 0.6
+    assert solver.estimates[13].pose_covariance[0, 0] > solver.estimates[7].pose_covariance[0, 0]
+
+
+def test_a_run_that_begins_deaf_starts_at_the_odometry(made):
+    solver = LiveSolver(MultiViewParameters(), SONAR_IN_BASE)
+    estimate = solver.add(without_points(made.scans[0]))
+    np.testing.assert_allclose(estimate.T_map_base, estimate.T_odom_base, atol=1e-9)
+    assert estimate.comparisons == 0
+
+
+def test_correction_and_pose_agree(live):
+    estimate = live.estimates[-1]
+    np.testing.assert_allclose(composed(estimate.T_map_odom, estimate.T_odom_base), estimate.T_map_base)
+
+
+def test_scans_agree_with_the_map_they_made_and_not_with_another(made, live):
+    assert min(estimate.agreement for estimate in live.estimates[5:]) > 0.8
+    scan = made.scans[10]
+    strange = replace(scan, points=scan.points + np.array([1.9, 1.9, 0.0, 0.0]))
+    solver = followed(made.scans[:10])
+    sure = replace(solver.parameters, odometry=DvlFactors(DvlOdometry(position_walk=0.001, direction_deviation=0.001)))
+    solver = followed(tour(10).scans, sure)
+    assert solver.add(strange).agreement < 0.5
+
+
+def without_points(scan):
+    return Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), scan.track, scan.reference_time)

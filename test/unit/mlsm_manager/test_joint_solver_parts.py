@@ -1,0 +1,252 @@
+"""Parts of the joint solver: derivatives, weights that fade out, the bounded frozen map."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from made_harbour import logged, tour
+
+from mlsm_manager.joint_solver.compare.association import Pairs, pairs_of
+from mlsm_manager.joint_solver.compare.comparisons import linearised, weights
+from mlsm_manager.joint_solver.compare.neighbours import NeighbourLists
+from mlsm_manager.joint_solver.measured.growing import GrowingArray
+from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
+from mlsm_manager.joint_solver.placing.placement import place
+from mlsm_manager.joint_solver.solve.frozen_map import fading, joint_covariance, nearest_blocks
+from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations, SparseSolution
+from mlsm_manager.joint_solver.unknowns.state import RANGE_SCALE, Layout, State
+from mlsm_manager.matching.problem.scan import Track
+
+STEP = 1e-6
+DVL = DvlFactors(DvlOdometry())
+TIMES = np.array([0.0, 14.0, 28.0])
+POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
+MOTION = Motion(TIMES, POSES, np.column_stack([TIMES, 0.3 * TIMES]))
+
+
+@pytest.fixture(scope="module")
+def log():
+    return logged(tour(3, direction=0.1, delay=0.3).scans)
+
+
+def some_state(log):
+    nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, 5))
+    return State(nodes, np.array([0.01, 0.3]))
+
+
+def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
+    placed = place(log, DVL, some_state(log), log.rows(0, 3))
+    pairs = pairs_of(NeighbourLists(placed, 5), placed, placed, 2.0, SurfaceMatching())
+    assert len(pairs.rows) > 100
+    assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
+
+
+@pytest.mark.parametrize("unknown", range(2))
+def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown):
+    rows, state = log.rows(0, 3), some_state(log)
+    placed = place(log, DVL, state, rows)
+    moved = state.copy()
+    step = 0.01  # delays within one step of the odometry: its path is a polygon
+    moved.run[unknown] += step
+    change = (place(log, DVL, moved, rows).places - placed.places) / step
+    np.testing.assert_allclose(change, placed.by_run[..., unknown], atol=0.5)
+    np.testing.assert_allclose(np.median(np.abs(change - placed.by_run[..., unknown])), 0.0, atol=0.03)
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
+    state = some_state(log)
+    pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
+    rows = log.rows(0, 3)
+    placed = place(log, DVL, state, rows)
+    before, jacobian = linearised(pairs, placed, placed)
+    moved = state.copy()
+    moved.nodes[0, column] += STEP
+    after = place(log, DVL, moved, rows)
+    turned = place(log, DVL, state, rows)
+    change = np.einsum(
+        "na,na->n", after.places[pairs.rows] - turned.places[pairs.rows], placed.normals[pairs.neighbours]
+    )
+    np.testing.assert_allclose(change / STEP, jacobian[:, column], atol=1e-4)
+    assert np.isfinite(before).all()
+
+
+def test_a_world_that_is_larger_altogether_fits_as_well(log):
+    """Ranges and odometry scaled alike leave the residual per unit of scale, and so the fit, as it is."""
+    placed = place(log, DVL, some_state(log), log.rows(0, 3))
+    pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
+    residual, jacobian = linearised(pairs, placed, placed)
+    difference = placed.by_run[pairs.rows] - placed.by_run[pairs.neighbours]
+    plain = np.einsum("nar,na->nr", difference, placed.normals[pairs.neighbours])[:, RANGE_SCALE]
+    np.testing.assert_allclose(jacobian[:, -2], plain - residual)
+
+
+def test_odometry_that_went_as_expected_pulls_at_nothing():
+    factors = DvlFactors(DvlOdometry(direction=0.2, scale=0.05))
+    nodes = [factors.first_node()]
+    for node in range(2):
+        after = factors.advanced(nodes[-1][np.newaxis], MOTION[node : node + 1], MOTION[node + 1 : node + 2])
+        nodes.append(after[0])
+    equations = NormalEquations(Layout(0, 2, factors.width).size)
+    factors.add_steps(equations, Layout(0, 2, factors.width), np.array(nodes), MOTION)
+    np.testing.assert_allclose(equations.gradient, 0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("column", range(4))
+def test_odometry_residuals_and_derivatives_agree(column):
+    factors, layout = DVL, Layout(0, 2, DVL.width)
+    nodes = np.random.RandomState(2).normal(0.0, 0.05, (3, 5))
+    nodes[:, 4] = 0.0  # about scale 0, residuals per unit of scale and residuals are the same
+
+    def equations_at(values):
+        found = NormalEquations(layout.size)
+        factors.add_steps(found, layout, values, MOTION)
+        return found
+
+    moved = nodes.copy()
+    moved[1, column] += STEP
+    cost = (equations_at(moved).cost - equations_at(nodes).cost) / STEP / 2.0
+    expected = equations_at(nodes).gradient[factors.width + column]
+    assert cost == pytest.approx(expected, rel=1e-3, abs=1e-3)
+
+
+@given(st.lists(st.floats(0.0, 1e3), min_size=1, max_size=60), st.integers(1, 20))
+def test_at_most_so_many_blocks_count(distances, most):
+    factors = fading(np.array(distances), most)
+    assert (factors > 0.0).sum() <= most or len(distances) <= most
+    assert ((factors >= 0.0) & (factors <= 1.0)).all()
+
+
+def test_a_scan_is_compared_with_the_nearest_blocks_only(log):
+    few = replace(
+        MultiViewParameters(), matching=SurfaceMatching(block_scans=1), window=SolverWindow(max_frozen_blocks=2)
+    )
+    near = nearest_blocks(log, DVL, some_state(log), 3, np.array([12.0, 0.0]), few)
+    assert 1 <= len(near.numbers) <= 2
+    assert set(near.points.scans) == set(near.numbers)
+    assert len(near.importance) == len(near.points)
+
+
+def test_a_vehicle_that_stays_keeps_blocks_to_compare_with():
+    assert (fading(np.full(50, 3.0) + 5.0 * np.arange(50) / 50, 20) > 0.0).sum() >= 15
+
+
+def test_a_block_fades_out_before_it_is_left_out():
+    distances = np.arange(1.0, 12.0)
+    nudged = distances + 1e-9
+    np.testing.assert_allclose(fading(distances, 5), fading(nudged, 5), atol=1e-8)
+
+
+@given(st.lists(st.floats(0.01, 9.0), min_size=1, max_size=8))
+def test_frozen_places_have_a_covariance_that_is_possible(deviations):
+    covariances = np.array([np.diag([d**2, d**2, 1e-4]) for d in deviations])
+    joint = joint_covariance(covariances)
+    np.testing.assert_allclose(joint[:3, :3], covariances[0], rtol=1e-9)
+    assert np.linalg.eigvalsh(joint).min() > -1e-9 * joint.max()
+
+
+def test_dense_and_sparse_solutions_agree():
+    rng = np.random.RandomState(5)
+    equations = NormalEquations(8)
+    columns = rng.randint(0, 8, (40, 3))
+    equations.add(columns, rng.normal(size=(40, 3)), rng.normal(size=40), rng.uniform(0.5, 2.0, 40))
+    np.testing.assert_allclose(DenseSolution(equations).step, SparseSolution(equations).step, rtol=1e-6)
+
+
+def test_an_error_of_what_is_held_passes_on_to_what_hangs_on_it():
+    equations = NormalEquations(1, held=1)
+    equations.add(np.array([[0, 1]]), np.array([[1.0, -1.0]]), np.zeros(1), np.array([4.0]))
+    solution = DenseSolution(equations)
+    assert solution.covariance(np.array([0]), np.array([[9.0]]))[0, 0] == pytest.approx(0.25 + 9.0)
+
+
+def test_a_doubtful_point_weighs_less_and_never_nothing():
+    matching = SurfaceMatching()
+    sure, aslant, far = weights(np.array([0.0, 0.0, 9.0]), np.array([0.0, 20.0, 0.0]), np.zeros(3), matching, 2.0)
+    assert sure > aslant > 0.0
+    assert sure > far > 0.0
+
+
+def wall(count=30):
+    return np.column_stack([np.full(count, 10.0), np.linspace(-6.0, 6.0, count)])
+
+
+def test_the_normal_of_a_wall_is_square_to_it():
+    normals, qualities = surface_normals(wall(), np.full(30, 2.3))
+    np.testing.assert_allclose(np.abs(normals[:, 0]), 1.0, atol=1e-9)
+    assert qualities.min() > 0.9
+
+
+def test_a_coarse_head_s_points_on_a_far_wall_are_still_a_surface():
+    step = np.radians(3.0)
+    bearings = np.arange(-8, 9) * step
+    wall_points = 40.0 * np.column_stack([np.ones(17), np.tan(bearings)])
+    reach = reaches(np.arange(17.0), bearings, np.hypot(*wall_points.T))
+    assert surface_normals(wall_points, reach)[1][4:13].min() == 1.0
+
+
+def test_a_beam_that_heard_nothing_does_not_change_the_reach():
+    bearings = np.radians(3.0) * np.arange(40)
+    heard = np.delete(np.arange(40), [5, 6, 21])
+    whole = reaches(np.arange(40.0), bearings, np.full(40, 30.0))
+    np.testing.assert_allclose(reaches(heard * 1.0, bearings[heard], np.full(37, 30.0)), whole[heard])
+
+
+def test_points_all_along_one_echo_share_its_weight():
+    times, ranges = np.array([2.0, 1.0, 2.0, 2.0, 1.0, 2.0]), np.array([11.0, 5.0, 10.0, 12.0, 40.0, 30.0])
+    np.testing.assert_array_equal(points_per_echo(times, ranges), [3.0, 1.0, 3.0, 3.0, 1.0, 1.0])
+
+
+@given(st.lists(st.tuples(st.integers(0, 3), st.floats(0.0, 50.0)), max_size=20), st.randoms())
+def test_points_per_echo_do_not_depend_on_their_order(points, random):
+    shuffled = points[:]
+    random.shuffle(shuffled)
+    counts = [
+        dict(zip(some, points_per_echo(*np.array(some, dtype=float).reshape(-1, 2).T))) for some in (points, shuffled)
+    ]
+    assert counts[0].keys() == counts[1].keys()
+    np.testing.assert_allclose([counts[0][point] for point in points], [counts[1][point] for point in points])
+
+
+def test_a_heap_of_points_is_no_surface():
+    heap = np.random.RandomState(0).normal(0.0, 0.3, (10, 2))
+    assert surface_normals(heap, np.full(10, 2.3))[1].max() < 0.6
+
+
+def test_qualities_do_not_jump_when_points_move_a_little():
+    points = wall() + np.random.RandomState(4).normal(0.0, 0.5, (30, 2))
+    nudged = points + np.random.RandomState(6).choice([-1e-9, 1e-9], points.shape)
+    before, after = (surface_normals(some, np.full(30, 2.3))[1] for some in (points, nudged))
+    np.testing.assert_allclose(before, after, atol=1e-6)
+
+
+def test_normals_point_away_from_the_sonar(log):
+    points = log.points(log.rows(0, 3))
+    sight = np.column_stack([np.cos(points.bearings), np.sin(points.bearings)])
+    assert isinstance(points, SurfacePoints)
+    assert (np.einsum("na,na->n", sight, points.normals) > 0.0).all()
+
+
+@given(st.lists(st.integers(0, 400), max_size=6))
+def test_an_array_keeps_what_was_appended(counts):
+    grown, expected = GrowingArray(2), np.empty((0, 2))
+    for number, count in enumerate(counts):
+        rows = np.full((count, 2), float(number))
+        grown.extend(rows)
+        expected = np.vstack([expected, rows])
+    np.testing.assert_array_equal(grown.values, expected)
+
+
+def test_tracks_that_overlap_make_one_path_without_a_turn_in_its_yaw():
+    whole = OdometryTimeline()
+    whole.extend(Track(np.arange(0.0, 5.0), np.column_stack([np.arange(5.0), np.zeros(5), np.full(5, 3.1)])), 3.0)
+    whole.extend(Track(np.arange(2.0, 8.0), np.column_stack([np.arange(2.0, 8.0), np.zeros(6), np.full(6, -3.1)])), 9.0)
+    np.testing.assert_allclose(whole.at(np.array([1.0, 3.5, 6.5]))[:, 0], [1.0, 3.5, 6.5])
+    assert np.ptp(whole.at(np.arange(0.0, 7.0, 0.5))[:, 2]) < 0.2
