@@ -5,6 +5,7 @@ import logging
 import shutil
 import tempfile
 from functools import lru_cache
+from typing import Any, Callable
 
 HOW_TO_INSTALL = "apt install python3-numba"
 ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
@@ -43,6 +44,18 @@ def prepare_cache() -> None:
     except OSError as error:
         raise ImportError(f"no temporary folder for compiled loops: {error}; {ADVICE}, or use NUMPY") from None
     atexit.register(shutil.rmtree, config.CACHE_DIR, ignore_errors=True)
+
+
+def compiled(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
+    """Return numba's decorator for a loop that stays compiled in the cache on disk, see `prepare_cache`.
+
+    signature, options: as numba.njit takes them; with a signature the loop is compiled where it is defined, otherwise
+    when it is called first with arguments of new types.
+    """
+    prepare_cache()
+    from numba import njit
+
+    return njit(*signature, cache=True, **options)
 
 
 def _probe() -> None:

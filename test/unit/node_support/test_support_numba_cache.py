@@ -30,18 +30,25 @@ def _output(program, folder, **environment):
 
 
 def test_without_a_folder_loops_are_compiled_into_a_temporary_one_and_one_line_says_what_to_do(tmp_path):
-    program = """
-from numba import config, njit
-for _ in range(2):
-    prepare_cache()
+    loops = """
+from node_support.numba_cache import compiled
+@compiled()
 def one():
     return 1
-print(njit(one)(), has_cache(), config.CACHE_DIR)
+@compiled("i8()")
+def two():
+    return 2
+"""
+    (tmp_path / "loops.py").write_text(loops)
+    program = """
+from loops import one, two
+from numba import config
+print(one() + two(), has_cache(), config.CACHE_DIR)
 """
     warning, result = _output(program, tmp_path, TMPDIR=str(tmp_path))
     assert "set NUMBA_CACHE_DIR to a folder that can be written to" in warning
-    one, has_cache, folder = result.split()
-    assert (one, has_cache) == ("1", "False")
+    three, has_cache, folder = result.split()
+    assert (three, has_cache) == ("3", "False")
     assert Path(folder).parent == tmp_path
     assert not Path(folder).exists()
 
