@@ -23,11 +23,11 @@ from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
 from mlsm_manager.offline.evaluation import positions_at
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.scan_matching.scan import Scan
 from recordings.reading.reader import Request
 
 Change = Callable[[MultiViewParameters], MultiViewParameters]

@@ -15,9 +15,9 @@ from benchmarks.twins.sonar import heard
 from benchmarks.twins.water import RESOLUTION, Water, water_of
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import matrices
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam

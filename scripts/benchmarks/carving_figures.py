@@ -10,11 +10,11 @@ import numpy as np
 from benchmarks.table import Row
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
 from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.scan_matching.scan import Scan
 
 ROOT = Path(__file__).resolve().parents[2]
 NAME = "marina_first.bag"

@@ -20,11 +20,11 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.planar import matrices, wrapped
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam

@@ -19,7 +19,7 @@ from mlsm_manager.joint_solver.parameters import SonarCalibration
 from mlsm_manager.joint_solver.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations, solution_of
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS, Layout
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.planar import inverse, transformed
 from sonar_simulator.world.world import World
 

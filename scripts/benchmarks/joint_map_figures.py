@@ -12,8 +12,8 @@ from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap

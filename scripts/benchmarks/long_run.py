@@ -10,7 +10,7 @@ from benchmarks.command_line import benchmark_parser
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.planar import inverse, rotated, transformed
 
 SCANS = 10_000

@@ -11,8 +11,8 @@ from benchmarks.table import Row
 from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.mapper import Mapper
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Scan, Track
 from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 SEEDS = 30

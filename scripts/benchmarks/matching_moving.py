@@ -9,9 +9,9 @@ from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, still
 from benchmarks.table import Row
 from mlsm_manager.localisation.mapper import Mapper
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.result import MatchResult
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.planar import wrapped
 
 SEEDS = 30

@@ -8,7 +8,7 @@ from typing import Callable, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.matrices import pose_matrix
 from node_support.geometry.planar import rotated
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes

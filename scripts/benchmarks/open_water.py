@@ -8,11 +8,11 @@ import numpy as np
 from benchmarks.command_line import benchmark_parser
 from benchmarks.table import Row, print_table
 from mlsm_manager.localisation.joint_parameters import Estimator
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.matrices import pose_matrix
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam

@@ -13,8 +13,8 @@ from benchmarks.matching_starts import tour_map, tour_stops
 from benchmarks.table import Row
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.result import Prior
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.result import Prior
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry.planar import composed, inverse, matrices, wrapped
 

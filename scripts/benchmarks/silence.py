@@ -19,7 +19,6 @@ from benchmarks.twins.odometry import reported
 from benchmarks.twins.parameters import TwinParameters
 from benchmarks.without_dvl import HEAD
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
@@ -27,6 +26,7 @@ from mlsm_manager.offline.odometry_kind import with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import composed, inverse, matrices
 from recordings.reading.reader import Request
 

@@ -4,13 +4,13 @@ from typing import List, Tuple
 
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.odometry_kind import with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Scan
 
 
 def solver_input(recording: Recording, kind: OdometryKind, shape: EchoShape) -> Tuple[List[Scan], MultiViewParameters]:

@@ -18,9 +18,9 @@ from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solve.way_batch import solved_best
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour", "harbour_tour", "basin_tour")
 HEAD = SonarKind(500, 0.15, 0.3)  # the demo's

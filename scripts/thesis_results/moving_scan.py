@@ -20,8 +20,8 @@ from benchmarks.recorded import ROOT
 from matplotlib.axes import Axes
 
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
-from mlsm_manager.matching.problem.result import MatchResult, corrected_points
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.result import MatchResult, corrected_points
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry.planar import inverse, transformed
 from sonar_simulator.world.world_file import load_world
 from thesis_results.markdown import joined, prose, table

@@ -18,8 +18,8 @@ from benchmarks.recorded import ROOT
 from matplotlib.axes import Axes
 
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
-from mlsm_manager.matching.problem.result import MatchResult, corrected_points
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.result import MatchResult, corrected_points
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world

@@ -19,7 +19,7 @@ from graph import PACKAGE_ROOT
 from marina import replayed
 from resumed_vehicle import Fate, Kill, Mission, ResumedVehicle
 
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 
 sys.path.append(os.path.join(str(PACKAGE_ROOT), "test", "unit", "mlsm_manager"))
 

@@ -18,7 +18,7 @@ from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
 from mlsm_manager.localisation.resumption import StoredPlace
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import cells_of
 from mlsm_manager.surface_map.files.map_file import read_map
 from sonar_processing.cloud import IntensityCloud

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from benchmarks.twins.parameters import TwinParameters
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import rotated
 
 _HEADING_TIME = 300.0  # s, of the slow compass error

@@ -3,7 +3,7 @@
 import numpy as np
 
 from benchmarks.twins.parameters import PathForm, TwinParameters
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import rotated
 
 _STRAIGHT_ON = 0.45  # share of the run after which END_FIRST begins

@@ -10,8 +10,8 @@ from benchmarks.twins.parameters import TwinParameters
 from benchmarks.twins.paths import true_path
 from benchmarks.twins.sonar import heard
 from benchmarks.twins.water import Water, ebbed, made_water, with_ship
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import matrices
 from sonar_processing.beams.placed_beam import PlacedBeam
 

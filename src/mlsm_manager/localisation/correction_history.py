@@ -7,7 +7,7 @@ from typing import Deque, Optional
 import numpy as np
 
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import composed, inverse, transformed
 
 # A cloud comes within a scan or two of its own; eight turns of a head are two minutes.

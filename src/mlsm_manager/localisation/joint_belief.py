@@ -8,11 +8,10 @@ from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.map_updates import ScanUpdate
-from mlsm_manager.matching.problem.fading import Fading
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, Prior, prior_of
-from mlsm_manager.matching.problem.result import MatchResult, MatchStatus
-from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.matching.problem.state import ERRORS, MOTION, POSE, RATE, STATES
+from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, Prior, prior_of
+from mlsm_manager.scan_matching.result import MatchResult, MatchStatus
+from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from node_support.geometry.planar import composed, inverse, wrapped
 
 PATH_POINTS = 17

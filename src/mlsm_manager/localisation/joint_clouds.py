@@ -11,7 +11,7 @@ from mlsm_manager.localisation.keyframe_map import Drawn, KeyframeMap
 from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED, CloudUpdate
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.localisation.uncarved_clouds import UncarvedClouds
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import composed, transformed
 
 

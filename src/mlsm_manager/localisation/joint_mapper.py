@@ -26,10 +26,10 @@ from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.stored_run import StoredRun
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted
-from mlsm_manager.matching.problem.result import MatchResult
-from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.state import POSE
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer

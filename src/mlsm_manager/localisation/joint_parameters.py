@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.odometry_choice import OdometryChoice, OdometryKind
-from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterError, parameter
 

@@ -14,7 +14,7 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.pauses import scans_of_pause
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.continuity import scans_go_on
 from mlsm_manager.self_check.map_agreement import recent_agreement
 from mlsm_manager.self_check.observability import surfaces_tell

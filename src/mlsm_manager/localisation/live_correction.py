@@ -7,10 +7,9 @@ from typing import Deque, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.fading import Fading
-from mlsm_manager.matching.problem.prediction import Belief, advanced, advanced_path
-from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.state import POSE, RATE
+from mlsm_manager.scan_matching.prediction import Belief, Fading, advanced, advanced_path
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan_path import POSE, RATE
 from node_support.geometry.planar import composed, inverse, wrapped
 from node_support.usual_interval import UsualInterval
 

@@ -15,7 +15,7 @@ from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.localisation.shared_map import SharedMap
 from mlsm_manager.localisation.standing_correction import StandingCorrection
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.running_copy import finished

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import List, Optional
 
-from mlsm_manager.matching.problem.prediction import Belief
-from mlsm_manager.matching.problem.result import MatchResult
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.prediction import Belief
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.free_space.carving import CarveReport
 

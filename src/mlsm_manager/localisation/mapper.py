@@ -11,10 +11,10 @@ from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.localisation.uncarved_clouds import UncarvedClouds
 from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
-from mlsm_manager.matching.problem.result import MatchResult, corrected_points
-from mlsm_manager.matching.problem.scan import Scan, Track
-from mlsm_manager.matching.problem.state import ERRORS
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
+from mlsm_manager.scan_matching.result import MatchResult, corrected_points
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan_path import ERRORS
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer

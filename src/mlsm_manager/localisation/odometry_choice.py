@@ -17,7 +17,7 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import (
 )
 from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
 from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.parameters import ParameterSet, parameter
 
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.

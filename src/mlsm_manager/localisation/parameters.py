@@ -18,7 +18,7 @@ from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.localisation.scan_mapper import ScanMapper
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from node_support.headers import StampParameters

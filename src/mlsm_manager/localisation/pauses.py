@@ -4,7 +4,7 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 
 _LONGEST_PAUSE = 2.0
 """Usual durations of a scan between two scans: fewer may be a turn that was lost."""

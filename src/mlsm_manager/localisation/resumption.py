@@ -5,9 +5,9 @@ from typing import Dict, Mapping, Optional
 
 import numpy as np
 
-from mlsm_manager.matching.problem.prediction import Belief
-from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.state import POSE, STATES
+from mlsm_manager.scan_matching.prediction import Belief
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan_path import POSE, STATES
 from node_support.geometry.planar import composed, inverse
 
 # m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
 

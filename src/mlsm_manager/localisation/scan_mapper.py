@@ -7,9 +7,9 @@ import numpy as np
 from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors
-from mlsm_manager.matching.problem.result import MatchResult
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer

@@ -10,7 +10,7 @@ from typing import Callable, Dict, List, Mapping, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import ROW_WIDTH
 from mlsm_manager.surface_map.overlay import Covered
 from node_support.errors import RefusedInput

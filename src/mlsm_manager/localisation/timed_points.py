@@ -5,7 +5,7 @@ from typing import Sequence
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,6 @@ import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
@@ -25,6 +24,7 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED, FURTHER_COLORS, ODOMETRY, REFINED, Run
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
 from mlsm_manager.offline.strafing import may_strafe, strafes
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import StoredMap

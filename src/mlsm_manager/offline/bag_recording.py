@@ -5,8 +5,8 @@ from typing import Dict, List, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.scan_matching.scan import Track
 from recordings.beams.found_beams import FoundBeams
 from recordings.errors import RecordingError
 from recordings.reading.reader import Request, read

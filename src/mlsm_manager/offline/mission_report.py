@@ -6,13 +6,13 @@ import numpy as np
 
 from mlsm_manager.joint_solver.placing.drawing import drawn
 from mlsm_manager.localisation.map_updates import ScanUpdate
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.evaluation import aligned_truth
 from mlsm_manager.offline.findings import Found
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.run_files import COLORS, LABELS, ODOMETRY, TRUTH_COLOR, Run
 from mlsm_manager.report.mission import Mission, Path, ScanRecord, Uncertainty
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry.planar import composed, inverse, transformed
 
 

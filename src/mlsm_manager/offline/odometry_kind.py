@@ -6,8 +6,8 @@ import numpy as np
 
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Track
 
 _STANDS = (
     0.05  # m: a reported position that stays within this never changed; rounding, and lever arms of a tilting base

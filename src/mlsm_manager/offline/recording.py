@@ -5,7 +5,7 @@ from typing import Iterator, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed, inverse, matrices, transformed
 from sonar_processing.beams.beam_correction import BeamCorrection

@@ -11,9 +11,9 @@ from mlsm_manager.localisation.joint_mapper import JointMapper
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.localisation.scan_mapper import ScanMapper
-from mlsm_manager.matching.problem.scan import Scan, Track
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed

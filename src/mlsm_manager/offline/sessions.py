@@ -9,12 +9,12 @@ from typing import Callable, Dict, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED
 from mlsm_manager.report.mission import Path as Way
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from recordings.errors import RecordingError
 from sonar_processing.beams.beam_correction import BeamCorrection

@@ -5,8 +5,8 @@ import rospy
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
 from nav_msgs.msg import Odometry, Path
 
-from mlsm_manager.matching.problem.result import MatchResult
-from mlsm_manager.matching.problem.state import POSE
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan_path import POSE
 from node_support import topics
 from node_support.ros.conversions import pose_from_matrix
 from sonar_processing.ros.conversions import header

@@ -11,14 +11,14 @@ from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_turn, report_verdicts
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Scan
 from mlsm_manager.ros.autosave import Autosave
 from mlsm_manager.ros.fix_publisher import FixPublisher
 from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import MapServices
 from mlsm_manager.ros.map_transform import MapTransform
 from mlsm_manager.ros.odometry_track import OdometryTrack
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput

@@ -4,7 +4,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 from node_support.errors import RefusedInput
 from node_support.headers import DAY
 from node_support.health import Health

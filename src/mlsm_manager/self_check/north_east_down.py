@@ -5,7 +5,7 @@ from typing import List, Optional, Sequence
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry.planar import composed, inverse
 

@@ -3,7 +3,7 @@
 from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
 from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 PARAMETERS = MultiViewParameters(
     odometry=HeadingFactors(HeadingOdometry()),

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.planar import rotated
 
 _WALLS = np.array(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 SPEED = 0.3  # m/s along +x
 POSTS = np.array([[5.0, 4.0], [17.0, -6.0], [30.0, 5.0], [41.0, -4.0], [55.0, 6.0], [70.0, -5.0], [82.0, 3.0]])

@@ -6,7 +6,7 @@ from made_compass import PARAMETERS, with_heading_only
 from made_harbour import HARBOUR, SONAR_IN_BASE, ahead, tour
 
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 
 HEARD, SILENT, AFTER = 6, 8, 2
 EDGE = 5.0

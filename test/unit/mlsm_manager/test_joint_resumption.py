@@ -9,7 +9,7 @@ from made_harbour import SONAR_IN_BASE, TURN, tour
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
 from node_support.geometry.planar import composed, transformed
 

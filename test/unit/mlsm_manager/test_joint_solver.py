@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.placing.path import solved_path
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import DELAY
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed
 

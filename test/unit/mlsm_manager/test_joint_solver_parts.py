@@ -22,7 +22,7 @@ from mlsm_manager.joint_solver.placing.placement import place
 from mlsm_manager.joint_solver.solve.frozen_map import fading, joint_covariance, nearest_blocks
 from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations, SparseSolution
 from mlsm_manager.joint_solver.unknowns.state import RANGE_SCALE, Layout, State
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 
 STEP = 1e-6
 DVL = DvlFactors(DvlOdometry())

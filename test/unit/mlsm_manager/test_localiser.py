@@ -8,7 +8,7 @@ from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.parameters import LocaliserParameters, MlsmCoreParameters
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.result import MatchStatus
+from mlsm_manager.scan_matching.result import MatchStatus
 from node_support.errors import RefusedInput
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)

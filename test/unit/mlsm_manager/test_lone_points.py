@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
 from mlsm_manager.joint_solver.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = pytest.mark.long
 

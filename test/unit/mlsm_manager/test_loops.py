@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry.planar import inverse, transformed
 
 pytestmark = pytest.mark.long

@@ -11,9 +11,8 @@ from made_scans import at_velocity, still
 from mlsm_manager.localisation.correction_history import CorrectionHistory
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.matching.problem.fading import Fading
-from mlsm_manager.matching.problem.prediction import Belief
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.prediction import Belief, Fading
+from mlsm_manager.scan_matching.scan import Track
 
 TIMES = np.arange(0.0, 10.0, 0.1)
 

@@ -9,9 +9,9 @@ from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.result import MatchStatus
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.result import MatchStatus
+from mlsm_manager.scan_matching.scan import Scan
 
 SETTINGS = MapSettings(0.5, 0.5, 1e4, 100, 15)
 

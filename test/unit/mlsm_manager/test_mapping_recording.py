@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import matrices
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_correction import BeamCorrection

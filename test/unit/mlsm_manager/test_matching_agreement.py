@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_scans import harbour, wall
 
-from mlsm_manager.matching.judge.agreement import agreement
+from mlsm_manager.scan_matching.judgement import agreement
 
 HERE = np.zeros(2)
 

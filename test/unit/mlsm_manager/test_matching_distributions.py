@@ -8,7 +8,7 @@ from made_scans import DEVIATIONS, at_velocity, harbour, map_of, prior_of_pose, 
 
 from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.result import MatchStatus, corrected_points
+from mlsm_manager.scan_matching.result import MatchStatus, corrected_points
 
 FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 

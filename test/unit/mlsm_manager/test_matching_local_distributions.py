@@ -3,7 +3,7 @@
 import numpy as np
 from made_scans import map_of, wall
 
-from mlsm_manager.matching.fit.distributions import LocalDistributions
+from mlsm_manager.scan_matching.distributions import LocalDistributions
 
 
 def directions(distributions):

@@ -6,9 +6,8 @@ from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, scan_of, still
 from scipy.spatial import cKDTree
 
-from mlsm_manager.matching.problem.prediction import Belief, OdometryErrors, predicted, prior_of
-from mlsm_manager.matching.problem.scan_path import PlanarMotion
-from mlsm_manager.matching.problem.state import STATES
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of
+from mlsm_manager.scan_matching.scan_path import STATES, PlanarMotion
 
 STATE = st.tuples(
     *[st.floats(-20.0, 20.0)] * 2, st.floats(-3.0, 3.0), *[st.floats(-0.3, 0.3)] * 2, st.floats(-0.03, 0.03),

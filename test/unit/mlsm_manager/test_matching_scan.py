@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity
 
-from mlsm_manager.matching.problem.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 

@@ -6,12 +6,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
-from mlsm_manager.matching.matchers.closest_blocks import ClosestBlocks
 from mlsm_manager.matching.matchers.parameters import SegmentsMatcherParameters
-from mlsm_manager.matching.matchers.segments import translate_segments
 from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
-from mlsm_manager.matching.problem.result import MatchStatus
+from mlsm_manager.scan_matching.result import MatchStatus
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.thesis_matching.registration import ClosestBlocks, translate_segments
 
 POSTS = np.array([[4.0, 0.0], [0.0, 6.0], [-5.0, -1.0], [2.0, -7.0], [8.0, 8.0]])
 OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)

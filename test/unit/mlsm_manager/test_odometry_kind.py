@@ -9,11 +9,11 @@ from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import PROFILES, profile_values, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.update_report import report_turn
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Track
 from node_support.health import Health
 
 TIMES = np.linspace(0.0, 100.0, 50)

@@ -17,8 +17,8 @@ from mlsm_manager.joint_solver.unknowns.state import Layout
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.matching.problem.prediction import OdometryErrors
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import composed, inverse, transformed
 
 pytestmark = pytest.mark.long

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry.planar import composed, matrices
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam

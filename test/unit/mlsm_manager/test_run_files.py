@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from made_blocks import blocks_of
 
-from mlsm_manager.matching.problem.scan import Track
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, Run, errors_of, trajectory_csv, write_run, write_summary
+from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.storage import read_ply
 

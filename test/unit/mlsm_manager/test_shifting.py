@@ -23,7 +23,7 @@ from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.matching.problem.prediction import OdometryErrors
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 
 ALONG = np.array([1.0, 0.0])
 TURN = 16.0  # s; each is one scan here

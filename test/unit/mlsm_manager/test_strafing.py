@@ -10,8 +10,8 @@ from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.matching.problem.prediction import OdometryErrors
 from mlsm_manager.offline.strafing import may_strafe, strafes
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.errors import RefusedInput
 
 pytestmark = pytest.mark.long

@@ -18,7 +18,7 @@ from mlsm_manager.joint_solver.ways.way_nodes import on_path
 from mlsm_manager.joint_solver.ways.way_pulls import pulled, pulls_of
 from mlsm_manager.joint_solver.ways.way_weighing import groups_of, weighed
 from mlsm_manager.joint_solver.ways.ways import Ways, begun
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 
 PART = 5.0  # s
 

@@ -4,7 +4,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints, points_per_echo, ramp, reaches, sights
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from sonar_processing.filters.echo_extraction import height_threshold
 
 _COUNTED = 6  # nearest points that are counted, the point included; more are no small thing

@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimelin
 from mlsm_manager.joint_solver.measured.point_table import PointTable
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
 from mlsm_manager.joint_solver.motion.odometry_motion import Motion
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
 _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end

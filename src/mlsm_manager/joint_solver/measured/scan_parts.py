@@ -4,7 +4,7 @@ from typing import List, Optional
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 
 _SHORTEST_TURN = 1.0  # s: a first scan without points still needs a beginning before its end
 

@@ -6,7 +6,7 @@ from typing import Sequence, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry.planar import inverse, rotated, transformed, wrapped
 
 _NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall

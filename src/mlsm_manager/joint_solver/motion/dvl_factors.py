@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.joint_solver.motion.odometry_terms import add_compass, add_walk, turned
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import YAW, Layout
-from mlsm_manager.matching.problem.fading import Fading
+from mlsm_manager.scan_matching.prediction import Fading
 
 DIRECTION, SCALE = 3, 4
 _ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not divide by zero

@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import Layout
-from mlsm_manager.matching.problem.fading import Fading
+from mlsm_manager.scan_matching.prediction import Fading
 
 FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
 HELD_DEVIATION = 1e-6  # stands for a deviation of zero

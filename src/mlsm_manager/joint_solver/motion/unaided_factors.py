@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import UnaidedOdometry
 from mlsm_manager.joint_solver.motion.odometry_terms import add_forgetting
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import YAW
-from mlsm_manager.matching.problem.fading import Fading
+from mlsm_manager.scan_matching.prediction import Fading
 
 TURN_RATE = 6
 

@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.motion.odometry_motion import Motion, as_complex, product
 from mlsm_manager.joint_solver.motion.odometry_terms import turned
 from mlsm_manager.joint_solver.unknowns.state import YAW
-from mlsm_manager.matching.problem.scan import Track
+from mlsm_manager.scan_matching.scan import Track
 
 
 class NodePath:

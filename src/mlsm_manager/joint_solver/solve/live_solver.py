@@ -22,7 +22,7 @@ from mlsm_manager.joint_solver.solve.stacking import stacked, unstacked
 from mlsm_manager.joint_solver.unknowns.state import RUN_COLUMNS, State
 from mlsm_manager.joint_solver.ways.way_nodes import nodes_on_ways
 from mlsm_manager.joint_solver.ways.way_search import WaySearch, needs_ways
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
 _ESTIMATE = "estimate."

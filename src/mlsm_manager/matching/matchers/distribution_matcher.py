@@ -6,17 +6,14 @@ from typing import List, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.fit.distributions import LocalDistributions
-from mlsm_manager.matching.fit.gauss_newton import Fit, PriorState, Refiner
-from mlsm_manager.matching.judge.agreement import agreement
-from mlsm_manager.matching.judge.significance import lead_along, significance
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
-from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.matching.problem.scan_path import PlanarMotion
-from mlsm_manager.matching.problem.state import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW
-from mlsm_manager.matching.search.correlative_search import YAW_STEP, SearchWindow, search, separation
-from mlsm_manager.matching.search.score_field import ScoreField
+from mlsm_manager.scan_matching.correlative_search import YAW_STEP, ScoreField, SearchWindow, search, separation
+from mlsm_manager.scan_matching.distributions import LocalDistributions
+from mlsm_manager.scan_matching.gauss_newton import Fit, PriorState, Refiner
+from mlsm_manager.scan_matching.judgement import agreement, lead_along, significance
+from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
+from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from node_support.geometry.planar import wrapped
 

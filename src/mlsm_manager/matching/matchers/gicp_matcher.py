@@ -9,11 +9,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from mlsm_manager.matching.fit.distributions import LocalDistributions
 from mlsm_manager.matching.matchers.parameters import GicpMatcherParameters
-from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
-from mlsm_manager.matching.problem.scan import Scan
-from mlsm_manager.matching.problem.state import POSE
+from mlsm_manager.scan_matching.distributions import LocalDistributions
+from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
+from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 from node_support.open3d_library import HOW_TO_INSTALL

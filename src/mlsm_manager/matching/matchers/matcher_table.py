@@ -12,8 +12,8 @@ from mlsm_manager.matching.matchers.parameters import (
     SegmentsMatcherParameters,
 )
 from mlsm_manager.matching.matchers.segments_matcher import SegmentsMatcher
-from mlsm_manager.matching.problem.result import MatchResult, Prior
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.result import MatchResult, Prior
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.parameters import ParameterSet
 

@@ -9,12 +9,11 @@ import time
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.closest_blocks import ClosestBlocks
 from mlsm_manager.matching.matchers.parameters import SegmentsMatcherParameters
-from mlsm_manager.matching.matchers.segments import SegmentFit, translate_segments
-from mlsm_manager.matching.problem.result import MatchResult, MatchStatus, Prior
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
+from mlsm_manager.thesis_matching.registration import ClosestBlocks, SegmentFit, translate_segments
 from node_support.geometry.planar import composed, transformed, wrapped
 
 # The same as a line through times needs.

@@ -5,7 +5,7 @@ from enum import Enum
 
 import numpy as np
 
-from mlsm_manager.matching.problem.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry.planar import composed, inverse, transformed, wrapped
 
 

@@ -22,7 +22,7 @@ from typing import Callable, Tuple
 import numpy as np
 from scipy.linalg import eigh
 
-from mlsm_manager.matching.problem.state import POSE, STATES
+from mlsm_manager.scan_matching.scan_path import POSE, STATES
 
 # CR2 divides by the root of one minus the leverage, which must not vanish.
 _GREATEST_LEVERAGE = 0.95

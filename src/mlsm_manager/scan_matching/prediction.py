@@ -1,15 +1,14 @@
 """Carries what is known of pose and odometry errors from scan to scan (an extended Kalman filter's prediction)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.matching.problem.fading import Fading
-from mlsm_manager.matching.problem.result import Prior
-from mlsm_manager.matching.problem.scan import Track
-from mlsm_manager.matching.problem.state import (
+from mlsm_manager.scan_matching.result import Prior
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan_path import (
     DIRECTION,
     ERRORS,
     MOTION,
@@ -29,10 +28,28 @@ from mlsm_manager.matching.problem.state import (
 from node_support.geometry.planar import composed, inverse, rotated, wrapped
 from node_support.parameters import ParameterSet, parameter
 
-# Times at which the odometry is read between two scans, about one a second.
-_NODES = 17
-# Of each state, for differences: small against a bend of the path, large against rounding.
-_DIFFERENCE = 1e-6
+_NODES = 17  # times at which the odometry is read between two scans, about one a second
+_DIFFERENCE = 1e-6  # of each state: small against a bend of the path, large against rounding
+
+
+@dataclass(frozen=True)
+class Fading:
+    """Errors of speed and turn rate return to what is usual (the mean of an Ornstein-Uhlenbeck process).
+
+    usual: (3,) m/s, m/s, rad/s in base_link. times: (3,) s within which their differences from it fall to a third;
+    infinity where they stay.
+    """
+
+    usual: np.ndarray
+    times: np.ndarray
+
+    def after(self, rates: np.ndarray, seconds: float) -> np.ndarray:
+        """Return the errors (3,) that are expected `seconds` after they were `rates` (3,)."""
+        return self.usual + np.exp(-seconds / self.times) * (rates - self.usual)
+
+    def to_a_stop(self) -> "Fading":
+        """Return one with which the vehicle comes to rest."""
+        return replace(self, usual=np.zeros_like(self.usual))
 
 
 @dataclass(frozen=True)

@@ -7,9 +7,8 @@ from typing import Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.matching.fit.distributions import LocalDistributions
-from mlsm_manager.matching.problem.scan_path import PlanarMotion
-from mlsm_manager.matching.problem.state import POSITION, STATES
+from mlsm_manager.scan_matching.distributions import LocalDistributions
+from mlsm_manager.scan_matching.scan_path import POSITION, STATES, PlanarMotion
 from node_support.geometry.planar import rotated
 
 # Standard deviations: of a planar Gaussian, 99 % lie within three.

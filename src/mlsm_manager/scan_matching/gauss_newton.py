@@ -4,11 +4,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlsm_manager.matching.fit.distributions import LocalDistributions
-from mlsm_manager.matching.fit.normal_equations import Normal, PointEquations, log_likelihood_gain
-from mlsm_manager.matching.fit.residual_covariance import PointEvidence, residual_covariance
-from mlsm_manager.matching.problem.scan_path import PlanarMotion
-from mlsm_manager.matching.problem.state import POSE
+from mlsm_manager.scan_matching.distributions import LocalDistributions
+from mlsm_manager.scan_matching.point_equations import Normal, PointEquations, log_likelihood_gain
+from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
+from mlsm_manager.scan_matching.scan_path import POSE, PlanarMotion
 
 # Standard deviations at which the robust kernel bends: wide enough for a start one search cell off, narrow at the end.
 SCALES = (8.0, 4.0, 2.5)

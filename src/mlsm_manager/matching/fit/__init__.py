@@ -1,1 +1,0 @@
-"""Fit of a pose and its covariance."""

@@ -1,1 +1,0 @@
-"""Checks of whether a fit can be trusted."""

@@ -1,1 +1,0 @@
-"""What is matched: a scan, its path, what is known beforehand, and the result."""

@@ -1,1 +1,0 @@
-"""Search for the poses at which a fit may start."""
