@@ -8,7 +8,7 @@ from setuptools import find_packages, setup
 
 HERE = Path(__file__).resolve().parent
 NAME = "underwater_map_construction"
-# What the simulator needs beside the modules; node_support/package_folder.py finds it.
+# What the simulator needs beside the modules; node_support/files.py finds it.
 SHARED = ("package.xml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*")
 
 

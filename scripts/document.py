@@ -13,8 +13,7 @@ from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from node_support.node_description import NodeDescription
-from node_support.node_table import NODES
+from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
 from ping360_driver.emulator.parameters import EmulatorParameters as Ping360EmulatorParameters

@@ -6,7 +6,7 @@ import numpy as np
 import rosbag
 
 from benchmarks.graph import ROOT
-from node_support.ros.conversions import matrix_from_message
+from node_support.ros.transforms import matrix_from_message
 from underwater_map_construction.msg import SonarScanLine
 
 

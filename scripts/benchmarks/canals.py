@@ -18,7 +18,7 @@ from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import matrices
+from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 

@@ -25,7 +25,7 @@ from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import matrices, wrapped
+from node_support.geometry import matrices, wrapped
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_simulator.simulation.simulation_setup import Settings, Setup, make_setup

@@ -20,7 +20,7 @@ from mlsm_manager.joint_solver.priors import add_belief, run_deviations, run_mea
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations, solution_of
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS, Layout
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import inverse, transformed
+from node_support.geometry import inverse, transformed
 from sonar_simulator.world.world import World
 
 _HEARD = 1.5  # m from a surface within which an echo is one of it, and no speckle

@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import inverse, rotated, transformed
+from node_support.geometry import inverse, rotated, transformed
 
 SCANS = 10_000
 BEAMS = 60

@@ -13,7 +13,7 @@ from mlsm_manager.scan_matching.result import Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 SCANS = 250
 _SIGMAS = 4.0

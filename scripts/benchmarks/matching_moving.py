@@ -12,7 +12,7 @@ from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import MatchResult
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import wrapped
+from node_support.geometry import wrapped
 
 SEEDS = 30
 TURNS = 5

@@ -9,8 +9,7 @@ from typing import Callable, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.matrices import pose_matrix
-from node_support.geometry.planar import rotated
+from node_support.geometry import pose_matrix, rotated
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
 from sonar_simulator.echoes.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.rays.beam_pattern import BeamPattern

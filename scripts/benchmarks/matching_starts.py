@@ -15,7 +15,7 @@ from mlsm_manager.matching.matchers.parameters import DistributionMatcherParamet
 from mlsm_manager.scan_matching.result import MatchResult, Prior
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.planar import composed, inverse, wrapped
+from node_support.geometry import composed, inverse, wrapped
 from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 
 STARTS = 100

@@ -16,7 +16,7 @@ from mlsm_manager.matching.matchers.parameters import DistributionMatcherParamet
 from mlsm_manager.scan_matching.result import Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks
-from node_support.geometry.planar import composed, inverse, matrices, wrapped
+from node_support.geometry import composed, inverse, matrices, wrapped
 
 STARTS = 20
 OFFSETS = ((1.0, 5.0), (3.0, 20.0))  # m and degrees between the expected and the true pose

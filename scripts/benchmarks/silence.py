@@ -27,7 +27,7 @@ from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import composed, inverse, matrices
+from node_support.geometry import composed, inverse, matrices
 from recordings.reading.reader import Request
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour")

@@ -8,7 +8,7 @@ from full_scan import ANGLES, RANGES, WORLDS, differences
 
 from benchmarks.table import Row, median_seconds
 from benchmarks.tank_recording import BEAMS_PER_TURN, Beams, distances, recording, simulated
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters

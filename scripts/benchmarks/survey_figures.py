@@ -12,7 +12,7 @@ from benchmarks.table import Row
 from benchmarks.world_distance import distances, nearest_shape
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.health import Health
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.placed_beam import PlacedBeam

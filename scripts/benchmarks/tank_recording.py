@@ -6,7 +6,7 @@ import numpy as np
 import yaml
 
 from benchmarks.recorded import ROOT, recorded, recorded_beams
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters

@@ -22,7 +22,7 @@ from matplotlib.axes import Axes
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.scan_matching.result import MatchResult, corrected_points
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry.planar import inverse, transformed
+from node_support.geometry import inverse, transformed
 from sonar_simulator.world.world_file import load_world
 from thesis_results.markdown import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure, to_scale

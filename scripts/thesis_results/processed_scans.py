@@ -9,7 +9,7 @@ from benchmarks.recorded import ROOT
 from benchmarks.shape_figures import WallErrors, wall_errors
 from benchmarks.world_distance import distances
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.shapes.lines import LineDetectorParameters
 from sonar_simulator.world.world import World

@@ -6,7 +6,7 @@ from typing import Tuple
 import numpy as np
 from benchmarks.recorded import ROOT
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters

@@ -8,7 +8,7 @@ from benchmarks.recorded import ROOT
 from benchmarks.survey_figures import FAN_BEAM, NO_CHANGES, RESOLUTION, Survey, block_errors
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.block_views import draw_in_space

@@ -8,9 +8,8 @@ import numpy as np
 
 from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
 from node_support.errors import RefusedInput
-from node_support.geometry.matrices import yaw_of
-from node_support.geometry.planar import rotated, wrapped
-from node_support.usual_interval import UsualInterval
+from node_support.geometry import rotated, wrapped, yaw_of
+from node_support.timing import UsualInterval
 
 JUMP_BACK = 1.0
 """Headings whose stamps go back by more than this [s] mean that time jumped; then the vehicle starts anew."""

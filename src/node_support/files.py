@@ -1,4 +1,4 @@
-"""Files that are written whole or not at all."""
+"""Where files of this package lie, and files that are written whole or not at all."""
 
 import errno
 import fcntl
@@ -8,6 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Iterator, Tuple
 
+PACKAGE = "underwater_map_construction"
+_MARK = f"<name>{PACKAGE}</name>"
 _PART = ".umc_part"
 
 
@@ -89,3 +91,20 @@ def _took_lock(handle: int) -> bool:
 def _flush(path: Path) -> None:
     with path.open("rb") as file:
         os.fsync(file.fileno())
+
+
+def package_folder() -> Path:
+    """Return the folder of the package: a checkout, or share/ of what catkin or pip has installed.
+
+    Raises FileNotFoundError where these modules were copied without it.
+    """
+    for folder in Path(__file__).resolve().parents:
+        for candidate in (folder, folder / "share" / PACKAGE):
+            if _is_package(candidate):
+                return candidate
+    raise FileNotFoundError(2, "the package's folder is not beside its modules; install the whole package", PACKAGE)
+
+
+def _is_package(folder: Path) -> bool:
+    description = folder / "package.xml"
+    return description.is_file() and _MARK in description.read_text(encoding="utf-8")

@@ -1,9 +1,44 @@
 """What docs/nodes.md and --help say of every node besides its parameters: its purpose, topics and services."""
 
-from typing import Dict
+from dataclasses import dataclass
+from enum import Enum
+from typing import Dict, Tuple
 
 from node_support import topics
-from node_support.node_description import Interface, NodeDescription, Role
+
+
+class Role(Enum):
+    """What a node does with a topic, a transform or a service."""
+
+    INPUT = "subscribes"
+    OUTPUT = "publishes"
+    SERVICE = "serves"
+
+
+@dataclass(frozen=True)
+class Interface:
+    """One topic, transform or service; names are relative to the node's namespace unless they begin with / or ~."""
+
+    role: Role
+    name: str
+    type: str
+    text: str
+
+
+@dataclass(frozen=True)
+class NodeDescription:
+    """A node's purpose in Markdown and its interfaces, in the order in which they are listed."""
+
+    summary: str
+    interfaces: Tuple[Interface, ...]
+
+
+@dataclass(frozen=True)
+class HostDescription:
+    """A node that runs other nodes in its process: its purpose in Markdown and the names of those nodes."""
+
+    summary: str
+    hosted: Tuple[str, ...]
 
 
 def _subscribes(name: str, kind: str, text: str) -> Interface:
@@ -246,5 +281,25 @@ NODES: Dict[str, NodeDescription] = {
             _DRIVER_JOINTS_IN,
             _publishes(topics.BEAMS, "SonarScanLine", "beams"),
         ),
+    ),
+}
+
+
+_PROCESSING = (
+    "sonar_to_cloud", "thresholder", "outlier_remover", "echo_extractor", "line_detector", "circle_detector",
+    "sonar_image",
+)  # fmt: skip
+
+HOSTS: Dict[str, HostDescription] = {
+    "sonar_processing": HostDescription(
+        "Turns beams into clean clouds, with all stages in one process: clouds are handed on without being copied, and "
+        "a topic is serialised only while somebody subscribes to it. See [sonar_processing](sonar_processing.md).",
+        _PROCESSING,
+    ),
+    "mapping": HostDescription(
+        "Turns beams into a map, with all stages in one process: clouds are handed on without being copied, and "
+        "a topic is serialised only while somebody subscribes to it. See [sonar_processing](sonar_processing.md) "
+        "and [matching](matching.md).",
+        (*_PROCESSING, "mlsm_core"),
     ),
 }

@@ -23,7 +23,7 @@ from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay import Replayed, replay
-from node_support.geometry.planar import composed, wrapped
+from node_support.geometry import composed, wrapped
 from recordings.reading.reader import Request
 from sonar_processing.beams.beam_correction import BeamCorrection
 

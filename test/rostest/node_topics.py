@@ -12,8 +12,7 @@ from graph import Inbox, wait_until
 from sensor_msgs.msg import Image
 
 from mlsm_manager.ros.map_messages import has_octomap_messages
-from node_support.node_description import Role
-from node_support.node_table import NODES
+from node_support.node_table import NODES, Role
 
 PACKAGE = "underwater_map_construction"
 # What every node has through rospy, tf and dynamic_reconfigure.

@@ -19,7 +19,7 @@ sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
 
 from document import LIVE_NODES
 
-from node_support.host_table import HOSTS
+from node_support.node_table import HOSTS
 from node_support.parameters import describe
 
 # Beyond what dynamic_reconfigure itself refuses to send: an integer has 32 bits there.

@@ -15,7 +15,7 @@ from graph import nodes_of, wait_for_links
 from rosgraph_msgs.msg import Clock
 
 from node_support import topics
-from node_support.pace import Pace
+from node_support.timing import Pace
 from recordings.ros.bag_player import read_messages
 
 # Of a burst after a stop of this process no message may be lost.

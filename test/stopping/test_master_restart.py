@@ -12,11 +12,11 @@ from stopwatch import ROOT, START_TIMEOUT, STOP_TIMEOUT, free_port
 from imagenex_852_driver.logs.log_file import LogWriter
 from imagenex_852_driver.logs.log_record import LoggedPing
 from imagenex_852_driver.protocol import Reply, ReplyKind
-from node_support.ros.master_watch import PERIOD
+from node_support.ros.node import MASTER_PERIOD
 
 NODES = ("thresholder", "mapping", "imagenex_852_driver", "gazebo_sonar", "play_852")
 # Long enough for a node to ask the absent master more often than a new master has to be asked.
-AWAY = 4.0 * PERIOD
+AWAY = 4.0 * MASTER_PERIOD
 
 
 class Master:

@@ -9,9 +9,8 @@ import pytest
 from document import LIVE_NODES, START_UP_NODES
 from programs import ROOT, run_program
 
-from node_support.host_table import HOSTS
-from node_support.node_help import WIDTH
-from node_support.node_table import NODES
+from node_support.help import WIDTH
+from node_support.node_table import HOSTS, NODES
 from sonar_simulator.simulation.simulation_setup import GROUPS
 
 EXECUTABLES = sorted(path.name for path in (ROOT / "nodes").iterdir())

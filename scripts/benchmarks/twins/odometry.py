@@ -5,7 +5,7 @@ from scipy.signal import lfilter
 
 from benchmarks.twins.parameters import TwinParameters
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 _HEADING_TIME = 300.0  # s, of the slow compass error
 _SPEED_TIME = 12.0  # s, of the speed error

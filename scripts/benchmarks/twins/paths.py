@@ -4,7 +4,7 @@ import numpy as np
 
 from benchmarks.twins.parameters import PathForm, TwinParameters
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 _STRAIGHT_ON = 0.45  # share of the run after which END_FIRST begins
 

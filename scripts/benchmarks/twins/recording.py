@@ -12,7 +12,7 @@ from benchmarks.twins.sonar import heard
 from benchmarks.twins.water import Water, ebbed, made_water, with_ship
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import matrices
+from node_support.geometry import matrices
 from sonar_processing.beams.placed_beam import PlacedBeam
 
 _MOMENT = 7.0  # s for which a ship is taken to stand still

@@ -10,7 +10,7 @@ import numpy as np
 
 from benchmarks.twins.parameters import TwinParameters
 from benchmarks.twins.water import Water
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 BINS, BIN = 500, 0.1  # of the recorded head: 50 m
 _OFFSETS = np.radians([-4.0, -3.0, -2.0, -1.0, 0.0, 1.0, 2.0, 3.0, 4.0])  # rays across the beam

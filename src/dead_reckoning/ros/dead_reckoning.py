@@ -18,10 +18,9 @@ from dead_reckoning.parameters import DeadReckoningParameters, DepthType, Headin
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame
-from node_support.ros.conversions import matrix_of_quaternion, pose_from_matrix
-from node_support.ros.node import guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.tf_buffer import TfBuffer
+from node_support.ros.transforms import TfBuffer, matrix_of_quaternion, pose_from_matrix
 
 QUEUE_SIZE = 100  # a second of a fast AHRS
 _REFUSED_HEADINGS = "headings refused"

@@ -5,7 +5,7 @@ import math
 from typing import List
 
 from node_support import topics
-from node_support.command_line import CommandLine
+from node_support.help import CommandLine
 
 
 def play_arguments(arguments: List[str]) -> argparse.Namespace:

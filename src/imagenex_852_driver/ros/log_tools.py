@@ -24,7 +24,8 @@ from node_support.errors import RefusedInput
 from node_support.files import whole_file
 from node_support.headers import check_stamp
 from node_support.parameters import ParameterError
-from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError
 from underwater_map_construction.msg import SonarScanLine
 
 _WAIT_STEP = 0.05  # s: soon enough for a person

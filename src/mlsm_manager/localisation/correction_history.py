@@ -8,7 +8,7 @@ import numpy as np
 
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import composed, inverse, transformed
+from node_support.geometry import composed, inverse, transformed
 
 # A cloud comes within a scan or two of its own; eight turns of a head are two minutes.
 _MOST_STRETCHES = 8

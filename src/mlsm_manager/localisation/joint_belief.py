@@ -12,7 +12,7 @@ from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors
 from mlsm_manager.scan_matching.result import MatchResult, MatchStatus
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
-from node_support.geometry.planar import composed, inverse, wrapped
+from node_support.geometry import composed, inverse, wrapped
 
 PATH_POINTS = 17
 """Points of the path within a scan: about one per second of a slow head's revolution."""

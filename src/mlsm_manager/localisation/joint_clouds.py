@@ -12,7 +12,7 @@ from mlsm_manager.localisation.map_updates import MOST_WAITING, NOTHING_INSERTED
 from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.localisation.uncarved_clouds import UncarvedClouds
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import composed, transformed
+from node_support.geometry import composed, transformed
 
 
 class JointClouds:

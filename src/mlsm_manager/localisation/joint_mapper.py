@@ -34,7 +34,7 @@ from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.planar import composed, transformed
+from node_support.geometry import composed, transformed
 
 
 class JointMapper(ShowsMaps):

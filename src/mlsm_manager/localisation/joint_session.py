@@ -21,7 +21,7 @@ from mlsm_manager.self_check.observability import surfaces_tell
 from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.self_check.wholeness import in_one_map
-from node_support.geometry.planar import composed, transformed
+from node_support.geometry import composed, transformed
 
 _AGREES = 0.5  # share of a scan's points on surfaces of others from which on it agrees with them
 _CHECKED_SCANS = 20

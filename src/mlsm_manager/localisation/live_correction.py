@@ -10,8 +10,8 @@ import numpy as np
 from mlsm_manager.scan_matching.prediction import Belief, Fading, advanced, advanced_path
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.scan_matching.scan_path import POSE, RATE
-from node_support.geometry.planar import composed, inverse, wrapped
-from node_support.usual_interval import UsualInterval
+from node_support.geometry import composed, inverse, wrapped
+from node_support.timing import UsualInterval
 
 # Of the odometry: a minute at 60 per second, longer than a scan and its match take.
 _MOST_SAMPLES = 4000

@@ -21,7 +21,7 @@ from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
 from mlsm_manager.surface_map.free_space.carving import CarveReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.planar import composed, transformed
+from node_support.geometry import composed, transformed
 
 
 class Mapper(ShowsMaps):

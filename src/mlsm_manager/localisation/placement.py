@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.placing.drawing import corrected_path, drawn
 from mlsm_manager.joint_solver.unknowns.state import DELAY, State
 from mlsm_manager.localisation.timed_points import TimedPoints
-from node_support.geometry.planar import transformed
+from node_support.geometry import transformed
 
 
 class Placement(Protocol):

@@ -10,7 +10,7 @@ from mlsm_manager.scan_matching.result import MatchResult, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import YAW, X, Y
 from mlsm_manager.surface_map.blocks import BlockSource, all_of
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 # Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
 # A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.

@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.scan_matching.scan_path import POSE, STATES
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 # m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
 _STRAYED = np.array([1.0, 1.0, 0.1])

@@ -6,7 +6,7 @@ from typing import List
 
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.export.formats import ENDINGS
-from node_support.command_line import CommandLine
+from node_support.help import CommandLine
 
 _MAPS = "a map (.mlsm, or a .ply of this package)"
 _OUT = f"file to write, ending with one of {' '.join(ENDINGS)}"

@@ -9,7 +9,7 @@ from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from node_support.command_line import CommandLine
+from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import ParameterError
 from recordings.reading.arguments import add_reading_arguments, request_of

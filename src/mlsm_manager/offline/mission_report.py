@@ -13,7 +13,7 @@ from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.run_files import COLORS, LABELS, ODOMETRY, TRUTH_COLOR, Run
 from mlsm_manager.report.mission import Mission, Path, ScanRecord, Uncertainty
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry.planar import composed, inverse, transformed
+from node_support.geometry import composed, inverse, transformed
 
 
 def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Mission:

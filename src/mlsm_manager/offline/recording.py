@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed, inverse, matrices, transformed
+from node_support.geometry import composed, inverse, matrices, transformed
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters

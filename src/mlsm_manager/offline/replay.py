@@ -16,7 +16,7 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed
+from node_support.geometry import composed
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
 from mlsm_manager.surface_map.storage import write_ply
 from node_support.files import write_whole
-from node_support.geometry.planar import wrapped
+from node_support.geometry import wrapped
 
 ODOMETRY = "dead_reckoning"
 CORRECTED = "corrected"

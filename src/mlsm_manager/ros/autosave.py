@@ -11,7 +11,7 @@ from mlsm_manager.ros.map_services import load_into, stored_map
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from node_support.health import Health
 from node_support.parameters import ParameterError
-from node_support.ros.node import every
+from node_support.ros.callbacks import every
 
 
 class Autosave:

@@ -8,7 +8,7 @@ from nav_msgs.msg import Odometry, Path
 from mlsm_manager.scan_matching.result import MatchResult
 from mlsm_manager.scan_matching.scan_path import POSE
 from node_support import topics
-from node_support.ros.conversions import pose_from_matrix
+from node_support.ros.transforms import pose_from_matrix
 from sonar_processing.ros.conversions import header
 
 # m^2 and rad^2: what a filter such as robot_localization takes for "not measured".

@@ -19,8 +19,7 @@ from mlsm_manager.surface_map.export.rasters import occupancy
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.health import Health
-from node_support.ros.node import guarded
-from node_support.ros.on_change import on_change
+from node_support.ros.callbacks import guarded, on_change
 from sonar_processing.ros.conversions import header
 
 # Share of the time that may go into sending the whole map on one topic again and again.

@@ -13,7 +13,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.ros.map_messages import map_cloud
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.files.map_file import StoredMap
-from node_support.geometry.planar import wrapped
+from node_support.geometry import wrapped
 from underwater_map_construction.srv import (
     GetRegion,
     GetRegionRequest,

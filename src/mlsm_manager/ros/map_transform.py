@@ -10,7 +10,7 @@ from geometry_msgs.msg import TransformStamped
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.headers import check_stamp
 from node_support.health import Health
-from node_support.ros.clock_timer import every_clock_period
+from node_support.ros.callbacks import every_clock_period
 
 
 class MapTransform:

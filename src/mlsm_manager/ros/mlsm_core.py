@@ -22,8 +22,8 @@ from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import matrices
-from node_support.ros.node import guarded, make_health
+from node_support.geometry import matrices
+from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message

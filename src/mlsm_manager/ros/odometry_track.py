@@ -8,7 +8,7 @@ from mlsm_manager.scan_matching.scan import Track
 from node_support.errors import RefusedInput
 from node_support.headers import DAY
 from node_support.health import Health
-from node_support.ros.tf_buffer import TfBuffer, stamp_of
+from node_support.ros.transforms import TfBuffer, stamp_of
 
 # s that tf remembers: three slow turns of the head.
 _CACHE = 180.0

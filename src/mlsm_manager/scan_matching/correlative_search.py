@@ -8,7 +8,7 @@ from scipy.ndimage import gaussian_filter
 
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION, RATE_YAW, YAW, PlanarMotion
 from mlsm_manager.surface_map.blocks import Blocks
-from node_support.geometry.planar import rotated, wrapped
+from node_support.geometry import rotated, wrapped
 
 YAW_STEP = np.radians(2.75)
 """rad: a point 20 m away moves by two search cells of 0.5 m."""

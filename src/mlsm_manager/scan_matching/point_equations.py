@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.scan_path import POSITION, STATES, PlanarMotion
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 # Standard deviations: of a planar Gaussian, 99 % lie within three.
 INLIER = 3.0

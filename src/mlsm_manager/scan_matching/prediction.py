@@ -25,7 +25,7 @@ from mlsm_manager.scan_matching.scan_path import (
     X,
     Y,
 )
-from node_support.geometry.planar import composed, inverse, rotated, wrapped
+from node_support.geometry import composed, inverse, rotated, wrapped
 from node_support.parameters import ParameterSet, parameter
 
 _NODES = 17  # times at which the odometry is read between two scans, about one a second

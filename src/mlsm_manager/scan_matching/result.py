@@ -6,7 +6,7 @@ from enum import Enum
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry.planar import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, inverse, transformed, wrapped
 
 
 class MatchStatus(Enum):

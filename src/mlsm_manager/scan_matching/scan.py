@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 
 @dataclass(frozen=True)

@@ -21,7 +21,7 @@ from typing import Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry.planar import composed, inverse, rotated
+from node_support.geometry import composed, inverse, rotated
 
 X, Y, YAW, RATE_X, RATE_Y, RATE_YAW, SCALE, DIRECTION = range(8)
 STATES = 8

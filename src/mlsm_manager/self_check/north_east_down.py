@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.verdict import Verdict
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
 _CLIMB = 2.0

@@ -1,4 +1,4 @@
-"""How all nodes start, guard their callbacks and publish diagnostics."""
+"""How all nodes start, publish diagnostics, and end: by Ctrl-C or when a new ROS master does not know them."""
 
 import logging
 import os
@@ -6,19 +6,22 @@ import signal
 import sys
 import threading
 import time
-import traceback
+import xmlrpc.client
 from contextlib import suppress
 from typing import Any, Callable, NoReturn, Protocol, Sequence
 
+import rosgraph
 import rospy
 from diagnostic_updater import DiagnosticStatusWrapper, Updater
 
-from node_support.errors import RefusedInput
 from node_support.health import Health
 from node_support.parameters import ParameterError
-from node_support.ros.master_watch import MasterWatch
+from node_support.ros.callbacks import every
 
 DIAGNOSTICS_PERIOD = 1.0  # s: as often as diagnostic aggregators expect it
+MASTER_PERIOD = 2.0  # s: soon enough for a respawn, seldom enough to cost nothing
+_ENOUGH = 2  # answers of the master in a row: the first one may come while the node itself registers
+_SUCCESS = 1  # status of the XML-RPC interface of ROS; others mean that the node is unknown
 _SPIN_STEP = 0.05  # s: soon enough to end a node at once, seldom enough to cost nothing
 _UNKNOWN_TO_MASTER = (
     "the ROS master was restarted and does not know this node, so that nobody can connect to it; the node ends. "
@@ -108,50 +111,6 @@ def _end(status: int) -> NoReturn:
     os._exit(status)
 
 
-def make_health(name: str) -> Health:
-    """Return a Health whose warnings go to the node's log."""
-    return Health(name, lambda line: rospy.logwarn("%s", line))
-
-
-def guarded(health: Health, callback: Callable[..., None]) -> Callable[..., None]:
-    """Wrap a callback so that no message can end or silence the node: refusals and failures are counted and logged."""
-
-    def call(*arguments: Any) -> None:
-        try:
-            callback(*arguments)
-        except RefusedInput as refused:
-            health.problem(refused.kind, str(refused))
-        except rospy.ROSInterruptException:
-            pass
-        except Exception as error:
-            if rospy.core.is_shutdown_requested():
-                return
-            health.problem("internal errors", f"{type(error).__name__}: {error}; please report this")
-            rospy.logerr_throttle(10.0, traceback.format_exc())
-
-    return call
-
-
-def every(period: float, callback: Callable[[], None], health: Health) -> threading.Thread:
-    """Call back every `period` seconds of wall time until shutdown.
-
-    Wall time, because diagnostics and displays must go on while a simulated clock stands still or jumps.
-    """
-    call = guarded(health, callback)
-
-    def loop() -> None:
-        next_call = time.monotonic()
-        while not rospy.core.is_shutdown_requested():
-            next_call = max(next_call + period, time.monotonic())
-            while not rospy.core.is_shutdown_requested() and time.monotonic() < next_call:
-                time.sleep(min(0.1, max(next_call - time.monotonic(), 0.0)))
-            call()
-
-    thread = threading.Thread(target=loop, daemon=True)
-    thread.start()
-    return thread
-
-
 def publish_diagnostics(healths: Sequence[Health]) -> None:
     """Publish what a process's stages report on /diagnostics once a second, each as "node: stage"."""
     updater = Updater()
@@ -170,3 +129,31 @@ def _filler(health: Health) -> Callable[[DiagnosticStatusWrapper], DiagnosticSta
         return status
 
     return fill
+
+
+class MasterWatch:
+    """Asks the master every `MASTER_PERIOD` seconds whether it knows this node.
+
+    A master that gives no answer may only be away for a while, and the node runs on. A new master, which answers that
+    it does not know the node, has neither its topics nor its parameters: nobody will ever connect to the node again.
+    """
+
+    def __init__(self) -> None:
+        """Begin to watch; the node has to be initialised."""
+        self.is_lost = False
+        self._master = xmlrpc.client.ServerProxy(rosgraph.get_master_uri())
+        threading.Thread(target=self._watch, daemon=True).start()
+
+    def _watch(self) -> None:
+        unknown = 0
+        while unknown < _ENOUGH:
+            time.sleep(MASTER_PERIOD)
+            unknown = unknown + 1 if self._does_not_know_us() else 0
+        self.is_lost = True
+
+    def _does_not_know_us(self) -> bool:
+        try:
+            status, _, uri = self._master.lookupNode(rospy.get_name(), rospy.get_name())
+        except (OSError, xmlrpc.client.Error):
+            return False
+        return status != _SUCCESS or uri != rospy.get_node_uri()

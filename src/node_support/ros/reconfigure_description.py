@@ -5,9 +5,9 @@ from typing import Type
 
 from dynamic_reconfigure.parameter_generator_catkin import ParameterGenerator, bool_t, double_t, int_t, str_t
 
+from node_support.files import PACKAGE
 from node_support.parameters import ParameterSet, describe
 
-PACKAGE = "underwater_map_construction"
 _TYPES = {float: double_t, int: int_t, bool: bool_t, str: str_t}
 
 

@@ -5,7 +5,7 @@ import sys
 from pathlib import Path
 from typing import List
 
-from node_support.command_line import CommandLine
+from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values
 from node_support.parameters import ParameterError
 from recordings.conversion.converted_bag import write_converted

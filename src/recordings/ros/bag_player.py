@@ -11,8 +11,9 @@ import rospy
 from rosgraph_msgs.msg import Clock
 
 from node_support import topics
-from node_support.pace import Pace
-from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError
+from node_support.timing import Pace
 from recordings.ros.upright import turn_up
 
 _CLOCK_PERIOD = 0.01  # s of wall time: as rosbag play does

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node_support.geometry.planar import FULL_TURN
+from node_support.geometry import FULL_TURN
 from recordings.transforms.rotations import between, normalized, rotation_matrices
 
 

@@ -2,7 +2,7 @@
 
 from typing import List, Tuple
 
-from node_support.geometry.matrices import quaternion_of
+from node_support.geometry import quaternion_of
 from recordings.beams.found_beams import FoundBeams
 from recordings.transforms.frame_tree import FrameTree
 from recordings.transforms.pose_track import PoseTrack

@@ -9,9 +9,10 @@ import rospy
 from node_support import topics
 from node_support.headers import check_stamp
 from node_support.parameters import ParameterSet
-from node_support.ros.joint_angle import JointAngle
-from node_support.ros.node import StartError, guarded
+from node_support.ros.callbacks import guarded
+from node_support.ros.node import StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from node_support.ros.transforms import JointAngle
 from sonar_driver.line.device import LineDevice
 from sonar_driver.line.driver_health import DriverHealth, Problem
 from sonar_driver.line.port import PortError

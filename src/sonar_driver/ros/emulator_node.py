@@ -8,7 +8,8 @@ from typing import Any, Callable, Optional, Type
 import rospkg
 import rospy
 
-from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError, every, make_health
+from node_support.ros.callbacks import every, make_health
+from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FixedPattern, HeadServer, ServedLine
 from sonar_driver.emulator.parameters import EchoSourceKind, EmulatedHeadParameters

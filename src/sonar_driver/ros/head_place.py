@@ -5,7 +5,7 @@ from typing import Callable, Optional
 import numpy as np
 
 from node_support.health import Health
-from node_support.ros.tf_buffer import TfBuffer
+from node_support.ros.transforms import TfBuffer
 
 WORLD_FRAME = "world"
 """Frame of the world file that the emulated head hears."""

@@ -4,7 +4,7 @@ from collections import Counter, deque
 from enum import Enum
 from typing import Deque, Optional
 
-from node_support.geometry.planar import FULL_TURN, wrapped
+from node_support.geometry import FULL_TURN, wrapped
 from sonar_processing.beams.beam import Beam
 
 _SETTLED = 5  # Equal steps after which the head's step is another, and none was lost

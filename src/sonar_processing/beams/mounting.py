@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterSet, parameter
 
 _FARTHEST = 100.0  # m: no sonar hangs farther from its vehicle

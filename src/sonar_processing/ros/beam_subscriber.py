@@ -6,7 +6,7 @@ import rospy
 
 from node_support import topics
 from node_support.health import Health
-from node_support.ros.node import guarded
+from node_support.ros.callbacks import guarded
 from sonar_processing.beams.beam import Beam
 from sonar_processing.messages.parameters import BeamMessageParameters
 from sonar_processing.messages.reader import BeamReader, Reading, beam_type

@@ -6,7 +6,7 @@ from typing import Callable, Deque
 
 import rospy
 
-from node_support.ros.node import guarded
+from node_support.ros.callbacks import guarded
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.shape_detectors import CircleDetectorNode, LineDetectorNode, ShapeDetectorNode
 

@@ -9,7 +9,7 @@ from visualization_msgs.msg import MarkerArray
 
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.ros.node import guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message

@@ -9,9 +9,9 @@ from std_msgs.msg import Float64, UInt32
 
 from node_support import topics
 from node_support.parameters import ParameterError
-from node_support.ros.joint_angle import JointAngle
-from node_support.ros.node import every, make_health
+from node_support.ros.callbacks import every, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from node_support.ros.transforms import JointAngle
 from sonar_processing.beams.beam import Beam
 from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan

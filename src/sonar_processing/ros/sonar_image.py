@@ -9,7 +9,7 @@ import rospy
 from sensor_msgs.msg import CameraInfo, Image
 
 from node_support import topics
-from node_support.ros.node import make_health
+from node_support.ros.callbacks import make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.beams.beam import Beam
 from sonar_processing.ros.beam_subscriber import BeamSubscriber

@@ -7,8 +7,8 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
-from node_support.geometry.matrices import quaternion_of
-from node_support.ros.tf_buffer import TfBuffer
+from node_support.geometry import quaternion_of
+from node_support.ros.transforms import TfBuffer
 from sonar_processing.beams.mounting import MountingParameters
 
 _PATIENCE = 0.5  # s: whoever knows the frame and has started sends it at once, because /tf_static is latched

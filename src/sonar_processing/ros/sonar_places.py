@@ -7,7 +7,7 @@ import numpy as np
 from node_support.errors import RefusedInput
 from node_support.headers import DAY
 from node_support.health import Health
-from node_support.ros.tf_buffer import TfBuffer, stamp_of
+from node_support.ros.transforms import TfBuffer, stamp_of
 
 _CACHE = 300.0  # s: the slowest head takes minutes for a scan
 _PATIENCE = 0.5  # s: transforms come at 2 Hz at least

@@ -3,7 +3,7 @@
 from typing import Optional
 
 from node_support import topics
-from node_support.ros.node import guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.head_watch import HeadWatch

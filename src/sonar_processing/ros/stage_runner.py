@@ -6,7 +6,7 @@ import numpy as np
 
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet
-from node_support.ros.node import guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.emptied_scans import EmptiedScans

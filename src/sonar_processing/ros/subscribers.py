@@ -7,7 +7,7 @@ from geometry_msgs.msg import Twist, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 
 from node_support.health import Health
-from node_support.ros.node import guarded
+from node_support.ros.callbacks import guarded
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays
 from sonar_processing.scans.moving_state import MovingState
 from sonar_processing.scans.parameters import VelocityType

@@ -9,8 +9,8 @@ import rospy
 from node_support.errors import RefusedInput
 from node_support.headers import DAY
 from node_support.health import Health
-from node_support.ros.node import guarded
-from node_support.ros.tf_buffer import JUMP_BACK, TfBuffer
+from node_support.ros.callbacks import guarded
+from node_support.ros.transforms import JUMP_BACK, TfBuffer
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_queue import BeamQueue, Departure
 from sonar_processing.beams.placed_beam import PlacedBeam

@@ -3,7 +3,7 @@
 import bisect
 from typing import List, Optional
 
-from node_support.geometry.planar import FULL_TURN, wrapped
+from node_support.geometry import FULL_TURN, wrapped
 
 _BOTH_ENDS = 2  # a head that reversed twice has swept its sector from end to end
 

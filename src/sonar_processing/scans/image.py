@@ -7,7 +7,7 @@ from typing import Optional
 import numpy as np
 
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import wrapped
+from node_support.geometry import wrapped
 from node_support.parameters import parameter
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_width import beam_width_parameter

@@ -6,7 +6,7 @@ from typing import Tuple
 
 import numpy as np
 
-from node_support.geometry.planar import FULL_TURN, wrapped
+from node_support.geometry import FULL_TURN, wrapped
 from sonar_processing.scans.laser_pick import picked_bins
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan

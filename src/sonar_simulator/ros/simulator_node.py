@@ -11,10 +11,10 @@ from geometry_msgs.msg import Twist
 from std_msgs.msg import Float64
 
 from node_support import topics
-from node_support.pace import Pace
-from node_support.package_folder import package_folder
+from node_support.files import package_folder
 from node_support.parameters import ParameterError
-from node_support.ros.node import guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
+from node_support.timing import Pace
 from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
 from sonar_simulator.ros.true_sonar import TrueSonar
 from sonar_simulator.simulation.moment_messages import map_origin

@@ -5,7 +5,7 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
 
-from node_support.ros.conversions import pose_from_matrix
+from node_support.ros.transforms import pose_from_matrix
 from sonar_simulator.simulation.moment_messages import MAP_FRAME
 
 WORLD_FRAME = "world"

@@ -7,7 +7,7 @@ from typing import List
 
 from tqdm import tqdm
 
-from node_support.package_folder import package_folder
+from node_support.files import package_folder
 from node_support.parameters import ParameterError
 from sonar_simulator.simulation.bag_arguments import parse, settings_of
 from sonar_simulator.simulation.simulated_bag import write_bag

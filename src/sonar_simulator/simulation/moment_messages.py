@@ -5,7 +5,7 @@ from typing import Any, Callable, List, Tuple
 import numpy as np
 
 from node_support import topics
-from node_support.geometry.matrices import quaternion_of, quaternions_of
+from node_support.geometry import quaternion_of, quaternions_of
 from sonar_simulator.simulation.simulation import Instruments, Moment, Ping
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
 

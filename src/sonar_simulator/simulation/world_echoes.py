@@ -5,7 +5,7 @@ from typing import Callable, Optional, Protocol
 
 import numpy as np
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.echoes.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.rays.beam_pattern import BeamPattern

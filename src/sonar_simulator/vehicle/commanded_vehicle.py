@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from node_support.errors import RefusedInput
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 

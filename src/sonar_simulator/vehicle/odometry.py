@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from node_support.geometry.matrices import pose_matrix, yaw_of
-from node_support.geometry.planar import rotated, unwrapped
+from node_support.geometry import pose_matrix, rotated, unwrapped, yaw_of
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 

@@ -6,7 +6,7 @@ from typing import Any, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_simulator.vehicle.movement import VehicleState
 

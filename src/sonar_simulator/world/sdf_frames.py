@@ -6,7 +6,7 @@ from xml.etree.ElementTree import Element
 
 import numpy as np
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 
 _SCOPE_ITSELF = ("", "__model__", "__root__", "world")
 _NAMED = ("model", "link", "frame", "joint", "include")

@@ -9,7 +9,7 @@ from dead_reckoning.dead_reckoner import DeadReckoner
 from dead_reckoning.depth import depth_of_pressure
 from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
 from node_support.errors import RefusedInput
-from node_support.geometry.matrices import pose_matrix, yaw_of
+from node_support.geometry import pose_matrix, yaw_of
 
 SECOND = 10**9
 START = 1000 * SECOND

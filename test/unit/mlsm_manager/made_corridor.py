@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 _WALLS = np.array(
     [[-20, 0], [-16, 6], [-9, 11], [50, -1], [90, -9], [120, -9], [123, -40], [80, -53], [10, -68]], dtype=float

@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import inverse, rotated, transformed
+from node_support.geometry import inverse, rotated, transformed
 
 TURN = 14.0  # s per turn of the head
 BEAMS = 120

@@ -5,7 +5,7 @@ import numpy as np
 from mlsm_manager.scan_matching.result import Prior
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.planar import composed, inverse, transformed
+from node_support.geometry import composed, inverse, transformed
 
 SECONDS = 16.0
 DEVIATIONS = np.array([1.0, 1.0, 0.1, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])

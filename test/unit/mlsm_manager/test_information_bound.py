@@ -5,7 +5,7 @@ import pytest
 from benchmarks.information_bound import bounds
 from made_harbour import HARBOUR, tour
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.world.world import Shape, World
 
 SCANS = 24

@@ -11,7 +11,7 @@ from mlsm_manager.localisation.localiser_settings import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
-from node_support.geometry.planar import composed, transformed
+from node_support.geometry import composed, transformed
 
 pytestmark = pytest.mark.long
 

@@ -15,7 +15,7 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import DELAY
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed
+from node_support.geometry import composed
 
 DIRECTION_ERROR, LATE = 0.12, 0.6
 DEFAULTS = MultiViewParameters()

@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.joint_solver.placing.placement import place
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from node_support.geometry.planar import transformed
+from node_support.geometry import transformed
 
 HARBOUR = tour(4)
 PARAMETERS = MultiViewParameters(sonar=SonarCalibration(sonar_delay_deviation=0.01))

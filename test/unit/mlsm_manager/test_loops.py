@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry.planar import inverse, transformed
+from node_support.geometry import inverse, transformed
 
 pytestmark = pytest.mark.long
 dear = pytest.mark.newest_only("dear; the first loop is looked for and found with every version")

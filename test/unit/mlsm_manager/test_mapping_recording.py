@@ -5,7 +5,7 @@ import pytest
 
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import matrices
+from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.beams.placed_beam import PlacedBeam

@@ -12,7 +12,7 @@ from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.matchers.parameters import GicpMatcherParameters
 from mlsm_manager.scan_matching.result import MatchStatus, corrected_points
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry.planar import composed
+from node_support.geometry import composed
 from node_support.parameters import ParameterError
 
 

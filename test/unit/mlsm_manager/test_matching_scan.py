@@ -8,7 +8,7 @@ from made_scans import at_velocity
 
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
-from node_support.geometry.planar import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, inverse, transformed, wrapped
 
 NUMBERS = st.floats(-100.0, 100.0)
 POSES = st.tuples(NUMBERS, NUMBERS, st.floats(-3.0, 3.0)).map(np.array)

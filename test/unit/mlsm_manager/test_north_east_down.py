@@ -9,7 +9,7 @@ from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
-from node_support.geometry.planar import inverse, transformed
+from node_support.geometry import inverse, transformed
 from recordings.reading.reader import Request
 from recordings.vehicle.motion import MotionNames
 

@@ -19,7 +19,7 @@ from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import composed, inverse, transformed
+from node_support.geometry import composed, inverse, transformed
 
 pytestmark = pytest.mark.long
 

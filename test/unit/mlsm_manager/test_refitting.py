@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.offline.refitting import displaced, other_settings, refitted_verdicts
-from node_support.geometry.planar import inverse, transformed
+from node_support.geometry import inverse, transformed
 
 pytestmark = pytest.mark.long
 PITCH = 2.5  # m, hardly more than the cut within which points are compared

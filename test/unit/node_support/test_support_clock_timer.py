@@ -7,7 +7,7 @@ import pytest
 import rospy
 
 from node_support.health import Health
-from node_support.ros.clock_timer import every_clock_period
+from node_support.ros.callbacks import every_clock_period
 
 PATIENCE = 60.0
 PERIOD = 0.5

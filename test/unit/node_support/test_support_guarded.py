@@ -5,7 +5,7 @@ import rospy
 
 from node_support.errors import RefusedInput
 from node_support.health import Health
-from node_support.ros.node import guarded
+from node_support.ros.callbacks import guarded
 
 
 @pytest.fixture

@@ -7,7 +7,7 @@ import rospy
 from sensor_msgs.msg import JointState
 
 from node_support.health import Health
-from node_support.ros.joint_angle import JointAngle
+from node_support.ros.transforms import JointAngle
 
 
 @pytest.fixture

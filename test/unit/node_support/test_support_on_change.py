@@ -8,8 +8,8 @@ import pytest
 import rospy
 
 from node_support.health import Health
-from node_support.ros import on_change as on_change_module
-from node_support.ros.on_change import on_change
+from node_support.ros import callbacks
+from node_support.ros.callbacks import on_change
 
 PATIENCE = 60.0
 LONG, SHORT = 3600.0, 0.2
@@ -25,7 +25,7 @@ def start(monkeypatch):
         return read[-1]
 
     # A call may come late after the moment that the periods are counted from.
-    monkeypatch.setattr(on_change_module, "time", SimpleNamespace(monotonic=monotonic, sleep=time.sleep))
+    monkeypatch.setattr(callbacks, "time", SimpleNamespace(monotonic=monotonic, sleep=time.sleep))
     monkeypatch.setattr(rospy.core, "is_shutdown_requested", lambda: bool(ended))
 
     def begin(period):

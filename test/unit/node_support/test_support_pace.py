@@ -1,6 +1,6 @@
 import pytest
 
-from node_support.pace import Pace
+from node_support.timing import Pace
 
 
 class Clock:

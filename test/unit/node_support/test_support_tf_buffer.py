@@ -10,7 +10,7 @@ from tf2_msgs.msg import TFMessage
 
 from node_support.errors import RefusedInput
 from node_support.health import Health
-from node_support.ros.tf_buffer import TfBuffer
+from node_support.ros.transforms import TfBuffer
 
 SECOND = 10**9
 CLOCK = 1_700_000_000.0

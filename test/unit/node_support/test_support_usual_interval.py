@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from node_support.usual_interval import UsualInterval
+from node_support.timing import UsualInterval
 
 
 def taken(times):

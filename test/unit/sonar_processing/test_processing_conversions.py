@@ -16,8 +16,8 @@ from sensor_msgs.msg import LaserScan, PointCloud2, PointField
 from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
-from node_support.geometry.matrices import pose_matrix, quaternion_of, quaternions_of
-from node_support.ros.conversions import matrix_from_message
+from node_support.geometry import pose_matrix, quaternion_of, quaternions_of
+from node_support.ros.transforms import matrix_from_message
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.messages.parameters import BeamMessageParameters
 from sonar_processing.messages.reader import BeamReader

@@ -8,8 +8,7 @@ from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node_support.geometry.matrices import pose_matrix
-from node_support.geometry.planar import wrapped
+from node_support.geometry import pose_matrix, wrapped
 from sonar_processing.beams.projection import project_beams
 
 ANGLES = st.floats(-7.0, 7.0)

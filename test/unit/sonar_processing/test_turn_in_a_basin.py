@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from clouds import beam_of
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.ros.conversions import laser_scan_message, point_cloud
 from sonar_processing.scans.laser_scan import planar_laser_scan

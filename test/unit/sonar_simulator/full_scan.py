@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from least_distance import nearest_range
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.beam_pattern import head_turns
 from sonar_simulator.rays.beam_tracer import BeamTracer

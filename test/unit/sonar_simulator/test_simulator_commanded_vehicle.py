@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
-from node_support.geometry.matrices import yaw_of
+from node_support.geometry import yaw_of
 from sonar_simulator.vehicle.commanded_vehicle import CommandedVehicle, VehicleParameters
 
 PARAMETERS = VehicleParameters()

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
 from sonar_simulator.gazebo.beams import GazeboBeams, RayScan

@@ -3,7 +3,7 @@ import math
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.side_lobes import FanWithSideLobes
 from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.beam_tracer import BeamTracer

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from least_distance import nearest_range
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.nearest_surface import NearestSurface
 from sonar_simulator.world.world import Shape, World

@@ -4,7 +4,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix, yaw_of
+from node_support.geometry import pose_matrix, yaw_of
 from sonar_simulator.vehicle.movement import VehicleState
 from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
 from sonar_simulator.vehicle.scripted_vehicle import VehicleScript

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.world.errors import MissingPackageError
 from sonar_simulator.world.world import Shape, World

@@ -3,7 +3,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
 
 CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())

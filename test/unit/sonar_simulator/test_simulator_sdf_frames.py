@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.world.sdf import load_sdf
 from sonar_simulator.world.sdf_frames import Scope, own_pose
 

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.simulation.simulation import Drive
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup

@@ -4,7 +4,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.ray_caster import RayCaster

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from node_support.geometry.matrices import pose_matrix, yaw_of
+from node_support.geometry import pose_matrix, yaw_of
 from sonar_simulator.vehicle.scripted_vehicle import ScriptError, VehicleScript
 
 MOVES = [

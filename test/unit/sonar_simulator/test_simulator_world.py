@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.world.world import Shape, World
 
 FLOOR = Shape("floor", "box", pose_matrix((0, 0, -6)), (122.0, 52.0, 1.0))

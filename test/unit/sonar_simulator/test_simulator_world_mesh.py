@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 
-from node_support.geometry.matrices import pose_matrix
+from node_support.geometry import pose_matrix
 from sonar_simulator.world.materials import MATERIALS
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_mesh import world_triangles

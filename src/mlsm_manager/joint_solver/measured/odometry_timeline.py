@@ -5,7 +5,7 @@ import numpy as np
 from mlsm_manager.joint_solver.measured.growing import GrowingArray
 from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
 

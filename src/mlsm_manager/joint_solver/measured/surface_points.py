@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry.planar import inverse, rotated, transformed, wrapped
+from node_support.geometry import inverse, rotated, transformed, wrapped
 
 _NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
 LEAST_REACH = 2.3  # m: neighbours at short range, and of points that no beam is known of

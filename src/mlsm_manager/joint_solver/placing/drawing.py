@@ -6,7 +6,7 @@ from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, State
-from node_support.geometry.planar import inverse, transformed
+from node_support.geometry import inverse, transformed
 
 
 def drawn(log: RunLog, odometry: OdometryModel, state: State, points: np.ndarray, times: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, YAW, State
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 HALF_SECOND = 0.5
 """s: the velocity of a point is averaged over one second, longer than the odometry's period."""

@@ -21,7 +21,7 @@ from mlsm_manager.joint_solver.priors import add_belief, run_deviations, run_mea
 from mlsm_manager.joint_solver.solve.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
-from node_support.geometry.planar import composed, inverse
+from node_support.geometry import composed, inverse
 
 _FORGOTTEN_DELAY = 2.0
 """Factor of the delay's deviation as it was known before the window. Comparisons follow where points go, and what is

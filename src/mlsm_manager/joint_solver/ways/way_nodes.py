@@ -8,7 +8,7 @@ from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.unknowns.state import YAW
 from mlsm_manager.joint_solver.ways.way_search import WaySearch
-from node_support.geometry.planar import rotated
+from node_support.geometry import rotated
 
 _ASTRAY = 1.0  # m, mean distance of the free nodes from the ways: farther off, they are at a wrong place
 

@@ -15,7 +15,7 @@ from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
-from node_support.geometry.planar import wrapped
+from node_support.geometry import wrapped
 
 # Standard deviations of the prior that the search covers.
 _WINDOW_DEVIATIONS = 3.0

@@ -15,7 +15,7 @@ from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
-from node_support.geometry.planar import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, inverse, transformed, wrapped
 from node_support.open3d_library import HOW_TO_INSTALL
 from node_support.parameters import ParameterError
 

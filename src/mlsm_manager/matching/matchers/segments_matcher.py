@@ -14,7 +14,7 @@ from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from mlsm_manager.thesis_matching.registration import ClosestBlocks, SegmentFit, translate_segments
-from node_support.geometry.planar import composed, transformed, wrapped
+from node_support.geometry import composed, transformed, wrapped
 
 # The same as a line through times needs.
 _FEWEST_POINTS = 3

@@ -1,24 +1,43 @@
-"""What a node answers to --help: its purpose, topics, services and parameters, without a ROS master."""
+"""What nodes and tools answer to --help, without a ROS master: purpose, topics, services and parameters."""
 
+import argparse
 import dataclasses
 import re
+import signal
 import sys
 import textwrap
 from enum import Enum
-from typing import List, Mapping, Type
+from typing import IO, List, Mapping, Optional, Type
 
-from node_support.command_line import write_help
-from node_support.host_table import HOSTS
-from node_support.node_description import Interface, Role
-from node_support.node_table import DIAGNOSTICS, NODES
+from node_support.files import PACKAGE
+from node_support.node_table import DIAGNOSTICS, HOSTS, NODES, Interface, Role
 from node_support.parameters import ParameterSet, describe
 
-PACKAGE = "underwater_map_construction"
 # What the narrowest common terminal shows.
 WIDTH = 80
 _QUESTIONS = ("-h", "--help")
 _LINK = re.compile(r"\[([^]]*)\]\(([^)]*)\)")
 _NOTHING: Mapping[str, Type[ParameterSet]] = {}
+
+
+class CommandLine(argparse.ArgumentParser):
+    """An ArgumentParser that ends quietly when nobody reads the rest of its help."""
+
+    def print_help(self, file: Optional[IO[str]] = None) -> None:
+        """Print the help on `file`, standard output unless told otherwise."""
+        write_help(self.format_help().rstrip("\n"), file or sys.stdout)
+
+
+def write_help(text: str, file: IO[str]) -> None:
+    """Write a text and flush it; a closed pipe ends the process without a word, as it ends other Unix programs.
+
+    Python ignores the signal otherwise, which nodes need for their sockets.
+    """
+    before = signal.signal(signal.SIGPIPE, signal.SIG_DFL)
+    try:
+        print(text, file=file, flush=True)
+    finally:
+        signal.signal(signal.SIGPIPE, before)
 
 
 def answer_help(

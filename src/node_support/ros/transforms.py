@@ -1,4 +1,4 @@
-"""tf as one stage knows it: the only place that talks to tf2."""
+"""Where frames and joints are, as one stage knows them; the only place that talks to tf2."""
 
 import math
 import threading
@@ -10,15 +10,16 @@ import genpy
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import Pose, Quaternion, Transform, TransformStamped, Vector3
+from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
 from node_support import topics
 from node_support.errors import RefusedInput
+from node_support.geometry import quaternion_of
 from node_support.headers import DAY, check_frame, check_stamp
 from node_support.health import Health
-from node_support.ros.conversions import matrix_from_message
-from node_support.ros.node import guarded
+from node_support.ros.callbacks import guarded
 
 JUMP_BACK = 1.0
 """Stamps that go back by more than this [s] mean that time jumped; messages overtake each other by less."""
@@ -155,6 +156,69 @@ class TfBuffer:
         if child not in self._newest_ns and len(self._newest_ns) >= _MOST_FRAMES:
             raise RefusedInput(_KIND, f"{child!r} after {_MOST_FRAMES} other frames; check who publishes so many")
         _check_pose(transform.transform.translation, transform.transform.rotation)
+
+
+class JointAngle:
+    """Remembers the newest angle of a joint, and calls back with it."""
+
+    def __init__(self, joint: str, health: Health, on_angle: Callable[[float], None] = lambda angle: None) -> None:
+        """`joint`: its name in /joint_states; empty where there is none. `on_angle` takes every angle, rad."""
+        self._joint = joint
+        self._health = health
+        self._on_angle = on_angle
+        self._angle: Optional[float] = None
+        if joint:
+            rospy.Subscriber(topics.JOINT_STATES, JointState, guarded(health, self._take), queue_size=10)
+
+    def for_beam(self) -> float:
+        """Return the angle that a beam carries, rad: 0 without a joint, or, which is counted, before it was heard."""
+        if self._joint and self._angle is None:
+            detail = f"joint {self._joint!r} is not in /{topics.JOINT_STATES}; sensorAngle is 0"
+            self._health.problem("beams of unknown tilt", detail)
+        return self._angle or 0.0
+
+    def _take(self, joints: JointState) -> None:
+        angle = dict(zip(joints.name, joints.position)).get(self._joint)
+        if angle is None:
+            return
+        if not math.isfinite(angle):
+            raise RefusedInput("joint states refused", f"{self._joint} at {angle} rad, must be finite")
+        self._angle = angle
+        self._on_angle(angle)
+
+
+def matrix_from_message(transform: Transform) -> np.ndarray:
+    """Return the (4, 4) matrix of a transform; raises RefusedInput when it is not finite or no rotation."""
+    rotation, shift = transform.rotation, transform.translation
+    translation = np.array([shift.x, shift.y, shift.z])
+    if not np.isfinite(translation).all():
+        raise RefusedInput(_KIND, f"translation {translation}, must be finite")
+    quaternion = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
+    matrix = np.eye(4)
+    matrix[:3, :3] = matrix_of_quaternion(quaternion, _KIND)
+    matrix[:3, 3] = translation
+    return matrix
+
+
+def matrix_of_quaternion(quaternion: np.ndarray, kind: str) -> np.ndarray:
+    """Return the (3, 3) rotation of a quaternion (4,), x y z w; raises RefusedInput, as `kind`, when it is none."""
+    norm = np.linalg.norm(quaternion)
+    if not 0.5 < norm < 2.0:
+        raise RefusedInput(kind, f"quaternion {quaternion}, must be of length 1")
+    x, y, z, w = quaternion / norm
+    return np.array([
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ])  # fmt: skip
+
+
+def pose_from_matrix(matrix: np.ndarray) -> Pose:
+    """Return the pose message of a (4, 4) matrix."""
+    pose = Pose()
+    pose.position.x, pose.position.y, pose.position.z = matrix[:3, 3]
+    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = quaternion_of(matrix)
+    return pose
 
 
 def stamp_of(time: float) -> int:

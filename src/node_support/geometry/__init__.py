@@ -1,1 +1,0 @@
-"""Planar and spatial poses as arrays."""
