@@ -58,9 +58,9 @@ def run(scans: List[List[PlacedBeam]], kernel: Kernel, whole: bool) -> Tuple[np.
 
     whole: whether the markers are those of all blocks, as the thesis's and the C++'s, or of what changed, as ours live.
     """
-    assembler, markers = ScanAssembler(SonarToCloudParameters(kernel=kernel)), BlockMarkers(kernel=kernel)
-    thresholder = Thresholder(ThresholderParameters(kernel=kernel))
-    remover = OutlierRemover(OutlierRemoverParameters(kernel=kernel))
+    assembler, markers = ScanAssembler(SonarToCloudParameters()), BlockMarkers(kernel=kernel)
+    thresholder = Thresholder(ThresholderParameters())
+    remover = OutlierRemover(OutlierRemoverParameters())
     surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=kernel)
     seconds, points = np.zeros(len(STAGES)), 0
     for scan in scans:

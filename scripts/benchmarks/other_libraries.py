@@ -3,17 +3,16 @@
 import math
 from importlib import import_module
 from importlib.util import find_spec
-from itertools import product
 from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
 
-from benchmarks.in_turn import OURS, comparison_rows, kernels
+from benchmarks.in_turn import OURS, comparison_rows
 from benchmarks.map_figures import RESOLUTION
 from benchmarks.table import Row
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.kernels import Kernel
-from sonar_processing.filters.outliers import outlier_rules
+from sonar_processing.filters.outliers import radius_inliers, statistical_inliers
 
 NEIGHBORS, DEVIATIONS = 20, 1.0
 RADIUS = 1.0
@@ -47,18 +46,18 @@ def outlier_rows() -> List[Row]:
         return np.asarray(cloud.remove_radius_outlier(NEIGHBORS, RADIUS)[1])
 
     rows: List[Row] = []
-    for count, kernel in product((2_000, 20_000), kernels()):
-        points, rules = np.ascontiguousarray(basin_points(count, 0)[:, :3]), outlier_rules(kernel)
+    for count in (2_000, 20_000):
+        points = np.ascontiguousarray(basin_points(count, 0)[:, :3])
         rows += comparison_rows(
-            f"statistical outlier removal ({kernel.value}), {count:,} points",
+            f"statistical outlier removal, {count:,} points",
             {
-                OURS: lambda r=rules, p=points: r.statistical(p, NEIGHBORS, DEVIATIONS),
+                OURS: lambda p=points: statistical_inliers(p, NEIGHBORS, DEVIATIONS),
                 "Open3D": lambda p=points: statistical(p),
             },
         )
         rows += comparison_rows(
-            f"radius outlier removal ({kernel.value}), {count:,} points",
-            {OURS: lambda r=rules, p=points: r.radius(p, RADIUS, NEIGHBORS), "Open3D": lambda p=points: radius(p)},
+            f"radius outlier removal, {count:,} points",
+            {OURS: lambda p=points: radius_inliers(p, RADIUS, NEIGHBORS), "Open3D": lambda p=points: radius(p)},
         )
     return rows
 

@@ -8,7 +8,6 @@ come in.
 from enum import Enum
 from importlib.util import find_spec
 
-from node_support.numba_cache import HOW_TO_INSTALL
 from node_support.parameters import ParameterError
 
 
@@ -22,4 +21,4 @@ class Kernel(Enum):
 def check_kernel(key: str, kernel: Kernel) -> None:
     """Raise ParameterError, which says what to install, if the parameter `key` asks for numba where it is missing."""
     if kernel is Kernel.NUMBA and find_spec("numba") is None:
-        raise ParameterError(f"{key} = NUMBA: needs numba; install it with: {HOW_TO_INSTALL}")
+        raise ParameterError(f"{key} = NUMBA: needs numba; install it with: apt install python3-numba")

@@ -7,24 +7,20 @@ import tempfile
 from functools import lru_cache
 from typing import Any, Callable
 
-HOW_TO_INSTALL = "apt install python3-numba"
 ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
 
 
 @lru_cache(maxsize=None)
 def has_cache() -> bool:
-    """Return whether numba finds a folder that lasts; the first time that there is none, one line says what to do.
+    """Return whether numba finds a folder that lasts; the first time that there is none, one line says what to do."""
+    from numba import njit
 
-    Raises ImportError, which says what to install, without numba.
-    """
-    try:
-        from numba import njit
-    except ImportError:
-        raise ImportError(f"NUMBA needs numba; install it with: {HOW_TO_INSTALL}") from None
     try:
         njit(cache=True)(_probe)
     except RuntimeError:
-        logging.getLogger(__name__).warning("numba finds no folder to keep compiled loops in: %s", ADVICE)
+        logging.getLogger(__name__).warning(
+            "numba finds no folder to keep compiled loops in and compiles them at every start: %s", ADVICE
+        )
         return False
     return True
 
@@ -33,7 +29,7 @@ def has_cache() -> bool:
 def prepare_cache() -> None:
     """Let numba compile into a temporary folder of this process where it finds none that lasts.
 
-    Called before loops are imported. Raises ImportError without numba, and where no temporary folder can be made.
+    Raises ImportError where no temporary folder can be made.
     """
     if has_cache():
         return
@@ -42,7 +38,7 @@ def prepare_cache() -> None:
     try:
         config.CACHE_DIR = tempfile.mkdtemp(prefix="compiled_loops_")
     except OSError as error:
-        raise ImportError(f"no temporary folder for compiled loops: {error}; {ADVICE}, or use NUMPY") from None
+        raise ImportError(f"no temporary folder for compiled loops: {error}; {ADVICE}") from None
     atexit.register(shutil.rmtree, config.CACHE_DIR, ignore_errors=True)
 
 

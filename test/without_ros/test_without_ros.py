@@ -29,9 +29,9 @@ def bag(tmp_path_factory):
     return folder / "basin.bag"
 
 
-def is_optional(path: Path) -> bool:
-    """Tell whether a module needs ROS, or numba, which is installed where it is wanted."""
-    return "ros" in path.parts or path.name.startswith("compiled_")
+def needs_ros(path: Path) -> bool:
+    """Tell whether a module needs ROS."""
+    return "ros" in path.parts
 
 
 def test_there_is_no_ros(tmp_path):
@@ -41,7 +41,7 @@ def test_there_is_no_ros(tmp_path):
 
 def test_every_core_can_be_imported(tmp_path):
     paths = [path.relative_to(SOURCES).with_suffix("") for path in sorted(SOURCES.rglob("*.py"))]
-    names = [".".join(path.parts) for path in paths if not is_optional(path)]
+    names = [".".join(path.parts) for path in paths if not needs_ros(path)]
     assert run("python", "-c", IMPORT_ALL, *names, folder=tmp_path).split() == [str(len(names)), "False"]
 
 

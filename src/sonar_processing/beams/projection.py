@@ -16,18 +16,14 @@ def project_beams(
     lies on the beam's axis. The points of a beam come ordered by side, then by range. The beams have the same ranges;
     T_target_sonar is (n, 4, 4).
     """
-    headings = bin_headings(beams, dispersed_points, beam_width)
+    angles = np.array([beam.angle for beam in beams])
+    headings = angles[:, np.newaxis] + _offsets(dispersed_points, beam_width)
     poses, strengths = (
         np.repeat(values, dispersed_points, axis=0)
         for values in (T_target_sonar, np.stack([beam.intensities for beam in beams]))
     )
     directions = beam_directions(headings.ravel(), poses)
     return bin_points(poses[:, :3, 3], directions, beams[0].ranges, strengths).reshape(len(beams), -1, 4)
-
-
-def bin_headings(beams: Sequence[Beam], dispersed_points: int, beam_width: float) -> np.ndarray:
-    """Return (n, dispersed_points) directions of the points of each bin, side by side, relative to the sonar, rad."""
-    return np.array([beam.angle for beam in beams])[:, np.newaxis] + _offsets(dispersed_points, beam_width)
 
 
 def beam_directions(headings: np.ndarray, T_target_sonar: np.ndarray) -> np.ndarray:

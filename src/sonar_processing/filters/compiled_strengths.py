@@ -1,9 +1,10 @@
-"""The loops of `strengths`, compiled; the results are the same to the last bit. Needs numba."""
+"""The loops of the threshold over all points of a cloud, compiled: more than twice as fast as numpy."""
 
 import numpy as np
-from numba import float32, float64, int64, njit, types
+from numba import float32, float64, int64, types
 
-from sonar_processing.filters.otsu import EQUAL, HIGHEST_LEVEL
+from node_support.numba_cache import compiled
+from sonar_processing.filters.otsu import HIGHEST_LEVEL
 
 # Read-only is what arrays of messages are; others are taken too.
 _POINTS = types.Array(float32, 2, "C", readonly=True)
@@ -16,7 +17,7 @@ _EXPONENT, _LONG_EXPONENT = np.int32(0x7F800000), np.int64(0x7FF0000000000000)
 _GREATEST, _GREATEST_STAMP = np.finfo(np.float32).max, np.finfo(np.float64).max
 
 
-@njit(cache=True)
+@compiled()
 def _is_finite(points, stamps, point):
     return (
         (abs(points[point, 0]) <= _GREATEST)
@@ -27,7 +28,7 @@ def _is_finite(points, stamps, point):
     )
 
 
-@njit(cache=True)
+@compiled()
 def _are_all_finite(points, stamps):
     """Return whether no bits of an exponent are all set: without a branch many values are looked at together."""
     words, long_words = points.reshape(-1).view(np.int32), stamps.view(np.int64)
@@ -39,7 +40,7 @@ def _are_all_finite(points, stamps):
     return (broken == 0) & (long_broken == 0)
 
 
-@njit(types.Tuple((int64[::1], float32[::1]))(_POINTS, _STAMPS), cache=True)
+@compiled(types.Tuple((int64[::1], float32[::1]))(_POINTS, _STAMPS))
 def count_strengths(points, stamps):
     """Return how many finite points (n, 4) with stamps (n,) have each level, (257,), the last those of strength 0 or
     less; and the lowest and the highest strength, and the lowest above 0, (3,).
@@ -60,7 +61,7 @@ def count_strengths(points, stamps):
     return counts.sum(axis=0), np.array([lowest, highest, weakest], np.float32)
 
 
-@njit(int64[::1](_POINTS, _STAMPS, float32), cache=True)
+@compiled(int64[::1](_POINTS, _STAMPS, float32))
 def strong_points(points, stamps, threshold):
     """Return the numbers (m,) of the finite points (n, 4) with stamps (n,) that are stronger than `threshold`."""
     above, number, finite = np.empty(len(points), np.int64), 0, 0
@@ -71,26 +72,3 @@ def strong_points(points, stamps, threshold):
         above[finite] = above[place]
         finite += _is_finite(points, stamps, above[place])
     return above[:finite].copy()
-
-
-@njit(float64(int64[::1]), cache=True)
-def threshold_of_levels(levels):
-    """Return Otsu's threshold for levels (256,), not all 0; see `otsu.threshold_of_levels`."""
-    number, total = 0, 0
-    for level in range(len(levels)):
-        number += levels[level]
-        total += level * levels[level]
-    between = np.full(len(levels), -1.0)
-    below, sum_below = 0, 0
-    for level in range(len(levels)):
-        below += levels[level]
-        sum_below += level * levels[level]
-        above = number - below
-        if below > 0 and above > 0:
-            difference = sum_below / below - (total - sum_below) / above
-            between[level] = np.float64(below * above) * (difference * difference)
-    limit = between.max() * (1.0 - EQUAL)
-    if limit < 0.0:
-        return np.float64(np.flatnonzero(levels)[0])
-    best = np.flatnonzero(between >= limit)
-    return (best[0] + best[-1]) / 2.0

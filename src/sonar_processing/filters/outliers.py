@@ -2,16 +2,12 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Callable, NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from node_support.kernels import Kernel, check_kernel
-from node_support.numba_cache import prepare_cache
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.open3d_outliers import open3d_statistical_inliers
 
 
 class OutlierMode(Enum):
@@ -37,13 +33,6 @@ class OutlierRemoverParameters(ParameterSet):
     min_neighbors: int = parameter(
         20, "RADIUS: a point with fewer neighbours is removed", low=1, high=10000, thesis_name="minNeighbors"
     )
-    kernel: Kernel = parameter(
-        Kernel.NUMPY, "what runs the loops: NUMBA is two to five times faster and needs python3-numba", tunable=False
-    )
-
-    def check(self) -> None:
-        """Raise ParameterError for a kernel that is not installed."""
-        check_kernel("kernel", self.kernel)
 
 
 class OutlierRemover:
@@ -51,7 +40,6 @@ class OutlierRemover:
 
     def __init__(self, parameters: OutlierRemoverParameters) -> None:
         self.parameters = parameters
-        self._rules = outlier_rules(parameters.kernel)
 
     def __call__(self, cloud: IntensityCloud) -> IntensityCloud:
         """Return the cloud without its outliers."""
@@ -61,56 +49,26 @@ class OutlierRemover:
         keep = cloud.valid
         points = cloud.points[keep, :3]
         if parameters.mode is OutlierMode.STATISTICAL:
-            keep[keep] = self._rules.statistical(points, parameters.mean_k, parameters.stddev_multiplier)
+            keep[keep] = statistical_inliers(points, parameters.mean_k, parameters.stddev_multiplier)
         else:
-            keep[keep] = self._rules.radius(points, parameters.min_radius, parameters.min_neighbors)
+            keep[keep] = radius_inliers(points, parameters.min_radius, parameters.min_neighbors)
         return cloud.select(keep)
-
-
-class OutlierRules(NamedTuple):
-    """The rules by one kernel; they take what statistical_inliers and radius_inliers take."""
-
-    statistical: Callable[[np.ndarray, int, float], np.ndarray]
-    radius: Callable[[np.ndarray, float, int], np.ndarray]
-
-
-def outlier_rules(kernel: Kernel) -> OutlierRules:
-    """Return the rules by a kernel. Raises ImportError for NUMBA without numba."""
-    if kernel is Kernel.NUMPY:
-        return OutlierRules(statistical_inliers, radius_inliers)
-    prepare_cache()
-    from sonar_processing.filters.compiled_outliers import radius_inliers as radius
-    from sonar_processing.filters.compiled_outliers import statistical_inliers as statistical
-
-    return OutlierRules(statistical, radius)
 
 
 def statistical_inliers(points: np.ndarray, mean_k: int, stddev_multiplier: float) -> np.ndarray:
     """Return (n,) bool: whose mean distance to the `mean_k` nearest others is not above mean + multiplier * sd.
 
     points: (n, 3), finite. The standard deviation is the sample's (n - 1), as in pcl::StatisticalOutlierRemoval. With
-    fewer than `mean_k` others, all others count; fewer than three points have no outlier. Open3D decides for large
-    clouds, where its rule is the same.
+    fewer than `mean_k` others, all others count; fewer than three points have no outlier.
     """
     if len(points) < 3:
         return np.ones(len(points), dtype=bool)
-    keep = open3d_statistical_inliers(points, mean_k, stddev_multiplier)
-    return scipy_statistical_inliers(points, mean_k, stddev_multiplier) if keep is None else keep
-
-
-def scipy_statistical_inliers(points: np.ndarray, mean_k: int, stddev_multiplier: float) -> np.ndarray:
-    """Return (n,) bool as statistical_inliers does for three or more points (n, 3), without Open3D."""
-    neighbors = min(mean_k, len(points) - 1)
     # Splitting in the middle instead of at the median builds ten times as fast; the neighbours are the same.
     tree = cKDTree(points, balanced_tree=False, compact_nodes=False)
-    distances, _ = tree.query(points, k=neighbors + 1)
-    return not_above_limit(distances[:, 1:].mean(axis=1), stddev_multiplier)
-
-
-def not_above_limit(mean_distances: np.ndarray, stddev_multiplier: float) -> np.ndarray:
-    """Return (n,) bool: which mean distances (n,), n > 1, are not above their mean + multiplier * sd."""
+    distances, _ = tree.query(points, k=min(mean_k, len(points) - 1) + 1)
+    means = distances[:, 1:].mean(axis=1)
     # Above the smallest, for the mean of equal numbers may round to less than each of them.
-    excess = mean_distances - mean_distances.min()
+    excess = means - means.min()
     return excess <= excess.mean() + stddev_multiplier * excess.std(ddof=1)
 
 

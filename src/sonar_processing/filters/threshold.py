@@ -6,10 +6,9 @@ from typing import Optional
 
 import numpy as np
 
-from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.strengths import StrengthCounts, strength_loops
+from sonar_processing.filters.otsu import threshold_of_levels
 
 
 class ThresholdMode(Enum):
@@ -64,13 +63,38 @@ class ThresholderParameters(ParameterSet):
         high=255.0,
         thesis_name="minThresholdValue",
     )
-    kernel: Kernel = parameter(
-        Kernel.NUMPY, "what runs the loops: NUMBA is two to three times faster and needs python3-numba", tunable=False
-    )
 
-    def check(self) -> None:
-        """Raise ParameterError for a kernel that is not installed."""
-        check_kernel("kernel", self.kernel)
+@dataclass(frozen=True)
+class StrengthCounts:
+    """The finite points of a cloud by strength.
+
+    levels: (256,) int64, how many of the strengths above 0 lie in each integer level, those above 255 in the last.
+    silent: number of the other points. lowest, highest: of all strengths, infinite without a point. weakest: of those
+    above 0.
+    """
+
+    levels: np.ndarray
+    silent: int
+    lowest: float
+    highest: float
+    weakest: float
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether the cloud has no finite point."""
+        return self.lowest > self.highest
+
+    @property
+    def echoes_differ(self) -> bool:
+        """Whether there are different strengths above 0."""
+        return self.weakest < self.highest
+
+    @property
+    def all_levels(self) -> np.ndarray:
+        """(256,) int64: `levels` with the silent points in level 0."""
+        levels = self.levels.copy()
+        levels[0] += self.silent
+        return levels
 
 
 class Thresholder:
@@ -78,7 +102,10 @@ class Thresholder:
 
     def __init__(self, parameters: ThresholderParameters) -> None:
         self.parameters = parameters
-        self._loops = strength_loops(parameters.kernel)
+        # Here, because it loads numba (0.3 s, 90 MB), which the nodes of other stages do without.
+        from sonar_processing.filters import compiled_strengths
+
+        self._loops = compiled_strengths
         self.newest_threshold: Optional[float] = None
         """The threshold of the newest cloud; None before the first and for a cloud without a finite point."""
 
@@ -87,13 +114,15 @@ class Thresholder:
 
         Echoes are what lies above the threshold, as in Otsu's upper class.
         """
-        counts = self._loops.count(cloud)
-        self.newest_threshold = None if counts.is_empty else self.threshold(counts)
+        points, stamps = np.ascontiguousarray(cloud.points), np.ascontiguousarray(cloud.time_stamps)
+        counts, ends = self._loops.count_strengths(points, stamps)
+        strengths = StrengthCounts(counts[:-1], int(counts[-1]), *ends.tolist())
+        self.newest_threshold = None if strengths.is_empty else self._threshold(strengths)
         if self.newest_threshold is None:
             return cloud.take(np.empty(0, dtype=np.int64))
-        return cloud.take(self._loops.strong(cloud, self.newest_threshold))
+        return cloud.take(self._loops.strong_points(points, stamps, np.float32(self.newest_threshold)))
 
-    def threshold(self, counts: StrengthCounts) -> float:
+    def _threshold(self, counts: StrengthCounts) -> float:
         """Return the threshold of a cloud with a finite point.
 
         OTSU and OTSU+PROPORTIONAL separate strong echoes from weak ones. Where all strengths above 0 are the same,
@@ -114,4 +143,4 @@ class Thresholder:
     def _otsu(self, counts: StrengthCounts) -> float:
         if not counts.echoes_differ:
             return 0.0
-        return self._loops.separate(counts.levels if self.parameters.otsu_nonzero else counts.all_levels)
+        return threshold_of_levels(counts.levels if self.parameters.otsu_nonzero else counts.all_levels)

@@ -3,16 +3,14 @@
 from collections import deque
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Callable, Deque, List, Optional, Tuple
+from typing import Deque, List, Optional
 
 import numpy as np
 
-from node_support.kernels import Kernel
-from node_support.numba_cache import prepare_cache
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.pause import long_after
 from sonar_processing.beams.placed_beam import PlacedBeam, servo_moved
-from sonar_processing.beams.projection import bin_headings, kept_bins, project_beams
+from sonar_processing.beams.projection import kept_bins, project_beams
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.scans.head_turn import HeadTurn
 from sonar_processing.scans.laser_pick import picked_bins
@@ -28,16 +26,6 @@ class _Projected:
     stamps: np.ndarray
 
 
-def _loops(kernel: Kernel) -> Optional[Callable[..., Tuple[np.ndarray, np.ndarray]]]:
-    """Return the compiled loop of a kernel. Raises ImportError, which says what to install, for NUMBA without numba."""
-    if kernel is Kernel.NUMPY:
-        return None
-    prepare_cache()
-    from sonar_processing.beams.compiled_projection import kept_points
-
-    return kept_points
-
-
 class ScanAssembler:
     """Turns placed beams into clouds; holds the beams of the unfinished scan and nothing else."""
 
@@ -46,7 +34,6 @@ class ScanAssembler:
         self._beams: List[PlacedBeam] = []
         self._newest: Deque[_Projected] = deque(maxlen=parameters.scan_size)
         self._turn = HeadTurn()
-        self._loops = _loops(parameters.kernel)
         self.clear()
 
     def clear(self) -> None:
@@ -100,27 +87,7 @@ class ScanAssembler:
             return None
         # All at once, for a beam alone takes five times as long; a head seldom changes its range within a scan.
         alike = groupby(beams, lambda placed: (placed.beam.intensities.size, placed.beam.range_resolution))
-        groups = [list(group) for _, group in alike]
-        if self._loops is not None and not (self.parameters.mode.is_laser or self.parameters.keep_organized):
-            return self._cloud_by_loops([self._placed_by_loops(group) for group in groups], last)
-        return self._cloud([self._projected(group) for group in groups], last)
-
-    def _placed_by_loops(self, placed: List[PlacedBeam]) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the kept points (m, 4) of beams of the same ranges, and their stamps (m,)."""
-        parameters = self.parameters
-        return self._loops(
-            bin_headings([one.beam for one in placed], parameters.dispersed_points, parameters.beam_width),
-            np.stack([one.T_target_sonar for one in placed]),
-            placed[0].beam.ranges,
-            np.stack([one.beam.intensities for one in placed]),
-            np.array([one.signed_stamp for one in placed]),
-            parameters.min_range,
-            parameters.height_limit,
-        )
-
-    def _cloud_by_loops(self, parts: List[Tuple[np.ndarray, np.ndarray]], newest: Beam) -> IntensityCloud:
-        points, stamps = parts[0] if len(parts) == 1 else map(np.concatenate, zip(*parts))
-        return IntensityCloud(points, stamps, newest.stamp_ns, self.parameters.target_frame)
+        return self._cloud([self._projected(list(group)) for _, group in alike], last)
 
     def _projected(self, placed: List[PlacedBeam]) -> _Projected:
         """Return beams of the same ranges as points."""

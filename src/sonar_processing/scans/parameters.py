@@ -5,7 +5,6 @@ from enum import Enum
 
 from node_support import topics
 from node_support.headers import StampParameters
-from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.beams.beam_width import beam_width_parameter
@@ -92,16 +91,6 @@ class ScanParameters(ParameterSet):
     still_turn_rate: float = parameter(
         0.005, "turning slower than this counts as still", unit="rad/s", low=0.0, high=1.0
     )
-    kernel: Kernel = parameter(
-        Kernel.NUMPY,
-        "what places the bins in mode SONAR: NUMBA is two to three times faster and needs python3-numba",
-        tunable=False,
-    )
-
-    def check(self) -> None:
-        """Raise ParameterError for a kernel that is not installed."""
-        super().check()
-        check_kernel("kernel", self.kernel)
 
 
 @dataclass(frozen=True)

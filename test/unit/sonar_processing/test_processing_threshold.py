@@ -1,4 +1,4 @@
-"""Which points each mode of the thresholder keeps."""
+"""Which points each mode of the thresholder keeps, and its compiled loops against a few lines of numpy."""
 
 import numpy as np
 import pytest
@@ -6,11 +6,15 @@ from clouds import cloud_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.otsu import otsu_threshold
-from sonar_processing.filters.strengths import counts_of
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
 
 STRENGTHS = st.lists(st.integers(0, 255), max_size=40)
+ANY_STRENGTHS = st.lists(
+    st.one_of(st.integers(-2, 300), st.floats(-2.0, 300.0, width=32), st.sampled_from([np.nan, np.inf, -np.inf])),
+    max_size=60,
+)
 
 
 def _kept(strengths, **values):
@@ -18,7 +22,19 @@ def _kept(strengths, **values):
 
 
 def _threshold(strengths, **values):
-    return Thresholder(ThresholderParameters(**values)).threshold(counts_of(np.array(strengths, dtype=np.float32)))
+    thresholder = Thresholder(ThresholderParameters(**values))
+    thresholder(cloud_of(strengths))
+    return thresholder.newest_threshold
+
+
+def _threshold_by_numpy(strengths, mode, nonzero):
+    """Return the threshold of finite strengths (n,), n > 0."""
+    echoes, own = strengths[strengths > 0], ThresholderParameters()
+    differ = len(np.unique(echoes)) > 1
+    otsu = otsu_threshold(echoes if nonzero else np.maximum(strengths, 0)) if differ else 0.0
+    proportional = own.max_proportion * float(strengths.max()) + own.min_proportion * float(strengths.min())
+    values = {"FIXED": own.fixed_threshold, "PROPORTIONAL": proportional, "OTSU": otsu}
+    return max(values.get(mode.value, own.otsu_multiplier * otsu), own.min_threshold)
 
 
 def test_fixed_keeps_what_is_above_the_value():
@@ -56,13 +72,32 @@ def test_the_floor_does_not_lower_a_threshold(mode):
     assert _threshold([90, 90, 250], min_threshold=10, **values) == _threshold([90, 90, 250], **values) > 10
 
 
-@given(STRENGTHS, st.sampled_from(list(ThresholdMode)), st.floats(0, 255), st.booleans())
-def test_what_is_kept_lies_above_the_threshold_and_what_goes_does_not(strengths, mode, floor, nonzero):
-    thresholder = Thresholder(ThresholderParameters(mode=mode, min_threshold=floor, otsu_nonzero=nonzero))
-    cloud = cloud_of(strengths)
-    threshold = thresholder.threshold(counts_of(cloud.points[:, 3])) if strengths else 0.0
-    above = cloud.points[:, 3] > threshold
-    np.testing.assert_array_equal(thresholder(cloud).points, cloud.points[above])
+@given(ANY_STRENGTHS, st.sampled_from(list(ThresholdMode)), st.booleans(), st.sampled_from([1, 2]))
+def test_the_finite_points_above_the_threshold_are_kept(strengths, mode, nonzero, height):
+    cloud = cloud_of(strengths * height, height=height)
+    finite = cloud.points[np.isfinite(cloud.points[:, 3]), 3]
+    thresholder = Thresholder(ThresholderParameters(mode=mode, otsu_nonzero=nonzero))
+    kept = thresholder(cloud)
+    expected = _threshold_by_numpy(finite, mode, nonzero) if len(finite) else None
+    assert thresholder.newest_threshold == expected
+    assert kept.points[kept.valid, 3].tolist() == [value for value in finite if value > np.float32(expected)]
+
+
+@pytest.mark.parametrize("column", range(5))
+@pytest.mark.parametrize("broken", [np.nan, np.inf, -np.inf])
+def test_a_point_that_is_not_finite_in_any_value_counts_nowhere(column, broken):
+    cloud = cloud_of([10.0, 20.0, 250.0, 90.0, 95.0])
+    [*cloud.points.T, cloud.time_stamps][column][2] = broken
+    thresholder = Thresholder(ThresholderParameters(mode="PROPORTIONAL"))
+    assert thresholder(cloud).points[:, 3].tolist() == [90.0, 95.0]
+    assert thresholder.newest_threshold == 0.5 * 95.0 + 0.5 * 10.0
+
+
+def test_clouds_of_messages_which_cannot_be_written_are_taken():
+    cloud = cloud_of([10.0, 20.0, 90.0])
+    points, stamps = (np.frombuffer(values.tobytes(), values.dtype) for values in (cloud.points, cloud.time_stamps))
+    kept = Thresholder(ThresholderParameters())(IntensityCloud(points.reshape(-1, 4), stamps, 0, "odom"))
+    assert kept.points[:, 3].tolist() == [90.0]
 
 
 @given(STRENGTHS)
@@ -98,17 +133,10 @@ def test_points_that_are_not_finite_are_removed_and_do_not_move_the_threshold(mo
     assert Thresholder(ThresholderParameters(mode=mode))(cloud).points[:, 3].tolist() == _kept(strengths, mode=mode)
 
 
-def test_points_with_a_stamp_that_is_not_finite_are_removed():
-    cloud = cloud_of([100, 200])
-    cloud.time_stamps[0] = np.nan
-    kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
-    assert kept.points[:, 3].tolist() == [200]
-
-
 def test_an_organised_cloud_keeps_its_shape_and_its_stamps():
     cloud = cloud_of([10, 100, 20, 200, 30, 90], height=2)
     kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
-    assert kept.height == 2
+    assert (kept.height, len(kept), kept.is_organized) == (2, 6, True)
     assert np.isnan(kept.points).all(axis=1).tolist() == [True, False, True, False, True, False]
     assert kept.time_stamps.tolist() == cloud.time_stamps.tolist()
 
@@ -129,14 +157,6 @@ def test_the_cloud_given_is_not_changed():
 def test_header_and_frame_are_those_of_the_scan():
     kept = Thresholder(ThresholderParameters())(cloud_of([1, 200]))
     assert (kept.stamp_ns, kept.frame_id) == (5 * 10**9, "odom")
-
-
-def test_an_organised_cloud_stays_organised_and_what_goes_becomes_nan():
-    cloud = cloud_of([70, 10, 80, 90, 20, 30], height=2)
-    kept = Thresholder(ThresholderParameters(mode="FIXED", fixed_threshold=66))(cloud)
-    assert (kept.height, len(kept), kept.is_organized) == (2, 6, True)
-    assert np.isnan(kept.points).all(axis=1).tolist() == [False, True, False, False, True, True]
-    np.testing.assert_array_equal(kept.time_stamps, cloud.time_stamps)
 
 
 def test_points_that_an_earlier_stage_removed_have_no_say_in_the_threshold():

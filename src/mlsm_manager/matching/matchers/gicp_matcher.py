@@ -16,7 +16,6 @@ from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from node_support.geometry import composed, inverse, transformed, wrapped
-from node_support.open3d_library import HOW_TO_INSTALL
 from node_support.parameters import ParameterError
 
 # m^2: of an echo, as the range resolution of 50 m in 500 bins; across the plane of all points it keeps them there.
@@ -47,7 +46,7 @@ class GicpMatcher:
         try:
             self._open3d = importlib.import_module("open3d")
         except ImportError:
-            raise ParameterError(f"matcher = GICP: needs Open3D; install it with: {HOW_TO_INSTALL}") from None
+            raise ParameterError("matcher = GICP: needs Open3D; install it with: apt install python3-open3d") from None
 
     def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; see Matcher."""

@@ -7,7 +7,6 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.errors import ExportError
 from node_support.files import whole_file
-from node_support.open3d_library import HOW_TO_INSTALL
 
 
 def write_pcd(path: Path, blocks: Blocks) -> None:
@@ -18,7 +17,7 @@ def write_pcd(path: Path, blocks: Blocks) -> None:
     try:
         import open3d
     except ImportError:
-        raise ExportError(f"needs Open3D; install it with: {HOW_TO_INSTALL}") from None
+        raise ExportError("needs Open3D; install it with: apt install python3-open3d") from None
     fields = {"intensity": blocks.mean[:, 3], "bottom": blocks.bottom, "height": blocks.height}
     fields.update(
         {f"variance_{axis}": blocks.variance[:, index] for index, axis in enumerate(("x", "y", "z", "intensity"))}
