@@ -1,6 +1,7 @@
 """Compiles all loops of numba, so that no node has to: what is compiled stays in a cache on disk."""
 
 import importlib
+import re
 from pathlib import Path
 
 from node_support.numba_cache import prepare_cache
@@ -12,7 +13,7 @@ def main() -> None:
     """Compile what is not in the cache yet: a loop is compiled when its module is imported."""
     prepare_cache()
     for path in sorted(SOURCES.rglob("*.py")):
-        if "from numba import" in path.read_text() and path.parent.name != "node_support":
+        if re.search("^from (numba|node_support.numba_cache) import", path.read_text(), re.MULTILINE):
             importlib.import_module(".".join(path.relative_to(SOURCES).with_suffix("").parts))
 
 

@@ -8,7 +8,6 @@ from matplotlib.axes import Axes
 
 from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.filters.strengths import count_strengths
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
 from sonar_processing.shapes.lines import Line, LineDetector, LineDetectorParameters
 from thesis_results.pictures import Pictures, new_figure, to_scale
@@ -41,11 +40,12 @@ class Processed:
 def processed(raw: IntensityCloud, place: np.ndarray, lines: LineDetectorParameters) -> Processed:
     """Return what the stages with their default parameters, and the line detector, make of an organised scan."""
     parameters = ThresholderParameters()
-    otsu = Thresholder(replace(parameters, mode=ThresholdMode.OTSU)).threshold(count_strengths(raw))
-    thresholder = Thresholder(parameters)
+    by_otsu, thresholder = Thresholder(replace(parameters, mode=ThresholdMode.OTSU)), Thresholder(parameters)
+    by_otsu(raw)
     thresholded = thresholder(raw)
     cleaned = OutlierRemover(OutlierRemoverParameters())(thresholded)
-    return Processed(place, raw, thresholded, cleaned, LineDetector(lines)(cleaned), otsu, thresholder.newest_threshold)
+    thresholds = by_otsu.newest_threshold, thresholder.newest_threshold
+    return Processed(place, raw, thresholded, cleaned, LineDetector(lines)(cleaned), *thresholds)
 
 
 def draw_stages(pictures: Pictures, name: str, scan: Processed, reach: float, what: str) -> str:

@@ -64,6 +64,7 @@ class ThresholderParameters(ParameterSet):
         thesis_name="minThresholdValue",
     )
 
+
 @dataclass(frozen=True)
 class StrengthCounts:
     """The finite points of a cloud by strength.
