@@ -28,7 +28,7 @@ from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
 from mlsm_manager.offline.evaluation import positions_at
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Scan
-from recordings.reading.reader import Request
+from recordings.reader import Request
 
 Change = Callable[[MultiViewParameters], MultiViewParameters]
 TOURS = ("basin", "harbour")

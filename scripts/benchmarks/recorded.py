@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
-from recordings.beams.found_beams import FoundBeams
-from recordings.reading.reader import Request, read
-from recordings.vehicle.motion import MotionNames, MotionSource
+from recordings.beams import RecordedBeams
+from recordings.motion.vehicle_motion import MotionNames, MotionSource
+from recordings.reader import Request, read
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -15,6 +15,6 @@ def recorded(name: str) -> Path:
     return Path(os.environ.get("UMC_DATA", str(ROOT.parent / "shared/data"))) / name
 
 
-def recorded_beams(name: str) -> FoundBeams:
+def recorded_beams(name: str) -> RecordedBeams:
     """Return the beams of a recording of a vehicle at rest. Raises RecordingError."""
-    return read(recorded(name), Request(motion=MotionNames(declared=MotionSource.STANDING))).found
+    return read(recorded(name), Request(motion=MotionNames(declared=MotionSource.STANDING))).recorded

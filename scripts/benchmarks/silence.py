@@ -28,7 +28,7 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, matrices
-from recordings.reading.reader import Request
+from recordings.reader import Request
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour")
 SHARES = (0.4, 0.55, 0.7)  # of the run's length, where the silence begins

@@ -13,7 +13,7 @@ from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from recordings.reading.reader import Request
+from recordings.reader import Request
 
 ROOT = Path(__file__).resolve().parents[2]
 # Longer than the solver's window, so that frozen scans take part.

@@ -8,8 +8,8 @@ import pytest
 
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.recording import scans_of
-from recordings.reading.reader import Request
-from recordings.vehicle.motion import MotionNames, MotionSource
+from recordings.motion.vehicle_motion import MotionNames, MotionSource
+from recordings.reader import Request
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 
 ROOT = Path(__file__).resolve().parents[2]

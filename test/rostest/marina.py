@@ -24,7 +24,7 @@ from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from node_support.geometry import composed, wrapped
-from recordings.reading.reader import Request
+from recordings.reader import Request
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 TOPICS = ("/sonar/raw", "/tf", "/tf_static", "/cmd_vel")

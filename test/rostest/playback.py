@@ -16,7 +16,7 @@ from rosgraph_msgs.msg import Clock
 
 from node_support import topics
 from node_support.timing import Pace
-from recordings.ros.bag_player import read_messages
+from recordings.ros.play_bag import read_messages
 
 # Of a burst after a stop of this process no message may be lost.
 QUEUE_SIZE = 100000

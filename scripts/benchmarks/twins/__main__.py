@@ -15,7 +15,7 @@ from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import echo_shape_of
 from mlsm_manager.offline.evaluation import positions_at
 from mlsm_manager.offline.recording import Recording
-from recordings.reading.reader import Request
+from recordings.reader import Request
 
 
 def main() -> None:

@@ -7,26 +7,26 @@ import numpy as np
 
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
-from recordings.beams.found_beams import FoundBeams
-from recordings.errors import RecordingError
-from recordings.reading.reader import Request, read
-from recordings.transforms.frame_tree import FrameTree
-from recordings.transforms.pose_track import PoseTrack
+from recordings.bags.bag import RecordingError
+from recordings.beams import RecordedBeams
+from recordings.motion.frame_tree import FrameTree
+from recordings.motion.pose_track import PoseTrack
+from recordings.reader import Request, read
 from sonar_processing.beams.placed_beam import PlacedBeam
 
 
 def read_recording(path: Path, request: Request) -> Recording:
     """Return a recording; raises RecordingError for one that cannot be used."""
-    held = read(path, request)
-    tree, found = held.motion.tree, held.found
+    content = read(path, request)
+    tree, recorded = content.motion.tree, content.recorded
     stamps = tree.moving_stamps
     if not stamps.size:
         # A vehicle that never moves may have fixed transforms only.
-        stamps = np.unique(found.stamps_ns)
+        stamps = np.unique(recorded.stamps_ns)
     track = _track(tree, stamps, path, request)
-    placed, unplaced = _placed(found, tree, path, request)
-    truth = None if held.truth is None else _truth(held.truth)
-    return Recording(placed, found.refused + unplaced, track, truth, held.notes)
+    placed, unplaced = _placed(recorded, tree, path, request)
+    truth = None if content.truth is None else _truth(content.truth)
+    return Recording(placed, recorded.refused + unplaced, track, truth, content.notes)
 
 
 def _track(tree: FrameTree, stamps: np.ndarray, path: Path, request: Request) -> Track:
@@ -40,20 +40,20 @@ def _track(tree: FrameTree, stamps: np.ndarray, path: Path, request: Request) ->
     return Track(stamps[known] * 1e-9, np.column_stack([poses[:, :2, 3], yaws]))
 
 
-def _placed(found: FoundBeams, tree: FrameTree, path: Path, request: Request) -> Tuple[List[PlacedBeam], int]:
+def _placed(recorded: RecordedBeams, tree: FrameTree, path: Path, request: Request) -> Tuple[List[PlacedBeam], int]:
     """Return the beams with their places, in the order of their stamps, and how many have none."""
-    odom, stamps = request.motion.odom_frame, found.stamps_ns
+    odom, stamps = request.motion.odom_frame, recorded.stamps_ns
     of_frame: Dict[str, List[int]] = {}
-    for index, beam in enumerate(found.beams):
+    for index, beam in enumerate(recorded.beams):
         of_frame.setdefault(beam.frame_id, []).append(index)
     placed = {}
     for frame, indices in of_frame.items():
         poses, known = tree.poses(odom, frame, stamps[indices])
         for index, pose, is_known in zip(indices, poses, known):
             if is_known:
-                placed[index] = PlacedBeam(found.beams[index], pose, found.moving[index])
+                placed[index] = PlacedBeam(recorded.beams[index], pose, recorded.moving[index])
     if not placed:
-        reason = tree.why_not(odom, found.beams[0].frame_id, stamps)
+        reason = tree.why_not(odom, recorded.beams[0].frame_id, stamps)
         raise RecordingError(f"{path}: none of {len(stamps)} beams could be placed in {odom}: {reason}")
     order = sorted(placed, key=lambda index: (stamps[index], index))
     return [placed[index] for index in order], len(stamps) - len(placed)

@@ -6,7 +6,7 @@ from typing import Dict
 import numpy as np
 
 from mlsm_manager.offline.recording import Truth
-from recordings.errors import RecordingError
+from recordings.bags.bag import RecordingError
 
 
 @dataclass(frozen=True)

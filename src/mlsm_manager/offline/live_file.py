@@ -10,7 +10,7 @@ from mlsm_manager.localisation.parameters import MapInput, MatchInput, MlsmCoreP
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.files import write_whole
 from node_support.parameters import ParameterSet
-from recordings.reading.parameters import ReadingParameters
+from recordings.reader import ReadingParameters
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters

@@ -16,9 +16,8 @@ from mlsm_manager.offline.run_summary import summary_lines, summary_of
 from mlsm_manager.report.mission import Mission
 from node_support.files import make_folder
 from node_support.parameters import ParameterError
-from recordings.errors import RecordingError
-from recordings.inspection.report import report
-from recordings.inspection.survey import survey
+from recordings.bags.bag import RecordingError
+from recordings.survey import report, survey
 
 
 def run_map_bag() -> None:

@@ -12,9 +12,8 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import ParameterError
-from recordings.reading.arguments import add_reading_arguments, request_of
-from recordings.reading.parameters import ReadingParameters
-from recordings.vehicle.motion import MotionSource
+from recordings.motion.vehicle_motion import MotionSource
+from recordings.reader import ReadingParameters, add_reading_arguments, request_of
 
 _EPILOG = "docs/map_bag.md describes the options, what is written, and how a vehicle is calibrated by it."
 _USAGE = "map_bag BAG [BAG ...] --out DIR [options]\n       map_bag BAG --inspect [options]"

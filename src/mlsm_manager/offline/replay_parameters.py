@@ -6,7 +6,7 @@ from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.joint_parameters import Estimator
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from node_support.parameters import with_defaults
-from recordings.reading.parameters import ReadingParameters
+from recordings.reader import ReadingParameters
 from sonar_processing.beams.beam_correction import BeamCorrection
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 

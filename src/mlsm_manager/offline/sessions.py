@@ -16,7 +16,7 @@ from mlsm_manager.offline.run_files import CORRECTED
 from mlsm_manager.report.mission import Path as Way
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.files.map_file import StoredMap
-from recordings.errors import RecordingError
+from recordings.bags.bag import RecordingError
 from sonar_processing.beams.beam_correction import BeamCorrection
 
 # A cluster in the same network answers within a second, a busy one within a few.

@@ -1,18 +1,28 @@
 """Reads bags: ROS 1 files, and ROS 2 folders or single files (sqlite3, mcap)."""
 
-from contextlib import ExitStack, contextmanager
+import json
+import sqlite3
+from collections import Counter
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Tuple, Union
+from tempfile import TemporaryDirectory
+from typing import Any, Callable, Dict, Iterable, Iterator, List, Tuple, Union
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader as Ros2Reader
+from rosbags.rosbag2.storage_mcap import MCAPFile
 from rosbags.typesys.store import Typestore
 
 from recordings.bags.message_types import defined_in, ros2_types
 from recordings.bags.ros1_reader import Ros1Reader
-from recordings.bags.single_file import LONE_FILES, folder_of
-from recordings.errors import RecordingError
+
+_LONE_FILES = (".mcap", ".db3")
+_TopicCount = Tuple[str, str, int]
+
+
+class RecordingError(ValueError):
+    """A recording cannot be used; the text is one line that says which, why and what to do."""
 
 
 @dataclass(frozen=True)
@@ -32,7 +42,7 @@ class Bag:
         self.path = path
         self._open = ExitStack()
         self._stores: Dict[Tuple[str, str], Typestore] = {}
-        with _told(path), ExitStack() as stack:
+        with _in_one_line(path), ExitStack() as stack:
             self._reader = _reader(path, stack)
             stack.enter_context(self._reader)
             self._open = stack.pop_all()
@@ -51,13 +61,13 @@ class Bag:
     @property
     def topics(self) -> Dict[str, Topic]:
         """All topics by their names."""
-        found: Dict[str, Topic] = {}
+        topics: Dict[str, Topic] = {}
         for connection in self._reader.connections:
-            before = found[connection.topic].count if connection.topic in found else 0
-            found[connection.topic] = Topic(
+            before = topics[connection.topic].count if connection.topic in topics else 0
+            topics[connection.topic] = Topic(
                 connection.topic, connection.msgtype.replace("/msg/", "/"), before + connection.msgcount
             )
-        return found
+        return topics
 
     def messages(self, topic: str) -> Iterator[Tuple[int, Any]]:
         """Yield (time of recording [ns], message) of one topic, in the order of these times; none without the topic.
@@ -67,7 +77,7 @@ class Bag:
         connections = [one for one in self._reader.connections if one.topic == topic]
         if not connections:
             return
-        with _told(self.path):
+        with _in_one_line(self.path):
             readers = {connection.id: self._deserializer(connection) for connection in connections}
             for connection, time, raw in self._reader.messages(connections):
                 yield time, readers[connection.id](raw)
@@ -94,17 +104,82 @@ class Bag:
         return self._stores[key]
 
 
+def missing_topic(topic: str, bags: Iterable[Bag]) -> RecordingError:
+    """Return the error that says which topics there are instead."""
+    names = ", ".join(sorted({name for bag in bags for name in bag.topics}))
+    return RecordingError(f"no topic {topic}; there are {names or 'none at all'}")
+
+
 def _reader(path: Path, stack: ExitStack) -> Union[Ros1Reader, Ros2Reader]:
     if path.is_dir():
         return Ros2Reader(path)
-    if path.suffix in LONE_FILES:
-        return Ros2Reader(stack.enter_context(folder_of(path)))
+    if path.suffix in _LONE_FILES:
+        return Ros2Reader(stack.enter_context(_folder_of(path)))
     path.open("rb").close()
     return Ros1Reader(path)
 
 
 @contextmanager
-def _told(path: Path) -> Iterator[None]:
+def _folder_of(path: Path) -> Iterator[Path]:
+    """Give a folder in which `path`, a file whose metadata.yaml is not there, is a whole bag.
+
+    Raises OSError and what a damaged file leads to.
+    """
+    path.open("rb").close()
+    storage, topics = ("mcap", _mcap_topics(path)) if path.suffix == ".mcap" else ("sqlite3", _sqlite_topics(path))
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        (folder / path.name).symlink_to(path.absolute())
+        # JSON is YAML too.
+        (folder / "metadata.yaml").write_text(json.dumps(_metadata(path.name, storage, topics)))
+        yield folder
+
+
+def _mcap_topics(path: Path) -> List[_TopicCount]:
+    file = MCAPFile(path)
+    file.open()
+    try:
+        if not file.channels:
+            file.meta_scan()
+        counts: Counter = Counter()
+        for chunk in file.chunks:
+            counts.update(chunk.channel_count)
+        return [(one.topic, one.schema, counts[one.id]) for one in file.channels.values()]
+    finally:
+        file.close()
+
+
+def _sqlite_topics(path: Path) -> List[_TopicCount]:
+    query = "SELECT name, type, (SELECT COUNT(*) FROM messages WHERE topic_id = topics.id) FROM topics ORDER BY id"
+    with closing(sqlite3.connect(f"{path.absolute().as_uri()}?immutable=1", uri=True)) as database:
+        return database.execute(query).fetchall()
+
+
+def _metadata(file: str, storage: str, topics: List[_TopicCount]) -> Dict[str, Any]:
+    counted = [
+        {
+            "topic_metadata": {"name": name, "type": kind, "serialization_format": "cdr", "offered_qos_profiles": ""},
+            "message_count": count,
+        }
+        for name, kind, count in topics
+    ]
+    return {
+        "rosbag2_bagfile_information": {
+            "version": 5,
+            "storage_identifier": storage,
+            "relative_file_paths": [file],
+            "duration": {"nanoseconds": 0},
+            "starting_time": {"nanoseconds_since_epoch": 0},
+            "message_count": sum(count for _, _, count in topics),
+            "topics_with_message_count": counted,
+            "compression_format": "",
+            "compression_mode": "",
+        }
+    }
+
+
+@contextmanager
+def _in_one_line(path: Path) -> Iterator[None]:
     """Turn what a damaged file leads to into one line: rosbags and its decompressors raise almost any error."""
     try:
         yield
@@ -114,11 +189,7 @@ def _told(path: Path) -> Iterator[None]:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     except Exception as error:
         if "not indexed" in str(error):
-            told = f"{path}: not indexed, the recording was cut off; run: rosbag reindex {path}"
-            raise RecordingError(told) from None
-        raise RecordingError(f"{path}: not a bag, or damaged: {_one_line(error)}") from None
-
-
-def _one_line(error: Exception) -> str:
-    lines: List[str] = str(error).split()
-    return " ".join(lines) or type(error).__name__
+            advice = f"not indexed, the recording was cut off; run: rosbag reindex {path}"
+            raise RecordingError(f"{path}: {advice}") from None
+        detail = " ".join(str(error).split()) or type(error).__name__
+        raise RecordingError(f"{path}: not a bag, or damaged: {detail}") from None

@@ -7,17 +7,14 @@ from typing import Any, Dict, List, NamedTuple
 import numpy as np
 from rosbags.rosbag1 import Writer
 
-from recordings.bags.blank_message import blank_message
-from recordings.bags.message_bytes import Write, serializer
-from recordings.bags.message_rows import message_rows
-from recordings.bags.message_types import ros1_types
+from recordings.bags.message_types import blank_message, message_rows, ros1_types
 
 COMPRESSIONS = ("none", "lz4", "bz2")
 _MESSAGE_HEAD = struct.Struct(
     "<I I4s I5sI I5s"
-)  # Of a record: size, then the fields op, conn and time with their sizes
-_TIME_AND_SIZE = struct.Struct("<III")  # The value of the field time, and the size of the message
-_HEADER_SIZE = _MESSAGE_HEAD.size - 4 + 8  # Without the size itself, and with the value of the field time
+)  # of a record: size, then the fields op, conn and time with their sizes
+_TIME_AND_SIZE = struct.Struct("<III")  # the value of the field time, and the size of the message
+_HEADER_SIZE = _MESSAGE_HEAD.size - 4 + 8  # without the size itself, and with the value of the field time
 
 
 class _Replaced(type(Path())):
@@ -29,14 +26,10 @@ class _Replaced(type(Path())):
 
 
 class _Topic(NamedTuple):
-    """What is the same for all messages of a topic.
-
-    connection: its number. head: the beginning of a message's record. to_bytes: turns a message into bytes.
-    """
+    """What is the same for all messages of a topic: its number, and the beginning of a message's record."""
 
     connection: int
     head: bytes
-    to_bytes: Write
 
 
 class PackedMessages(NamedTuple):
@@ -71,7 +64,7 @@ class BagWriter:
 
     def make(self, kind: str) -> Any:
         """Return a new message of the type package/Name with fields of zero. Raises KeyError for an unknown type."""
-        return blank_message(ros1_types(), _ros2_name(kind))
+        return blank_message(ros1_types(), kind.replace("/", "/msg/"))
 
     def time(self, stamp_ns: int) -> Any:
         """Return a time for a header."""
@@ -82,7 +75,7 @@ class BagWriter:
     def write(self, topic: str, message: Any, stamp_ns: int) -> None:
         """Append a message, made by `make` or read from a bag of the same type. Raises OSError."""
         known = self._known(topic, message)
-        data = known.to_bytes(message)
+        data = ros1_types().serialize_ros1(message, message.__msgtype__)
         record = known.head + _TIME_AND_SIZE.pack(*divmod(stamp_ns, 10**9), len(data)) + data
         self._append(known.connection, record, stamp_ns)
 
@@ -109,16 +102,10 @@ class BagWriter:
     def _known(self, topic: str, message: Any) -> _Topic:
         known = self._topics.get(topic)
         if known is None:
-            known = self._topics[topic] = self._added(topic, message.__msgtype__)
+            number = self._writer.add_connection(topic, message.__msgtype__, typestore=ros1_types()).id
+            head = _MESSAGE_HEAD.pack(_HEADER_SIZE, 4, b"op=\x02", 9, b"conn=", number, 13, b"time=")
+            known = self._topics[topic] = _Topic(number, head)
         return known
-
-    def _added(self, topic: str, kind: str) -> _Topic:
-        number = self._writer.add_connection(topic, kind, typestore=ros1_types()).id
-        return _Topic(
-            number,
-            _MESSAGE_HEAD.pack(_HEADER_SIZE, 4, b"op=\x02", 9, b"conn=", number, 13, b"time="),
-            serializer(ros1_types(), kind),
-        )
 
     def _append(self, connection: int, record: bytes, stamp_ns: int) -> None:
         """Do what rosbags's Writer.write does, without making the record's header anew for each message."""
@@ -132,8 +119,3 @@ class BagWriter:
         chunk.data.write(record)
         if place + len(record) > self._writer.chunk_threshold:
             self._writer.write_chunk(chunk)
-
-
-def _ros2_name(kind: str) -> str:
-    package, _, name = kind.partition("/")
-    return f"{package}/msg/{name}"

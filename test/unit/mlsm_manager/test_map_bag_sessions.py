@@ -10,7 +10,7 @@ from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.sessions import executor_for, prepared, prepared_in_parallel
 from mlsm_manager.surface_map.files.map_file import read_map
-from recordings.reading.reader import Request
+from recordings.reader import Request
 
 pytestmark = pytest.mark.long
 

@@ -5,7 +5,7 @@ import pytest
 
 from mlsm_manager.offline.evaluation import position_error
 from mlsm_manager.offline.recording import Truth
-from recordings.errors import RecordingError
+from recordings.bags.bag import RecordingError
 
 TIMES = np.arange(0.0, 11.0)
 AHEAD = np.column_stack([TIMES, np.zeros(11)])

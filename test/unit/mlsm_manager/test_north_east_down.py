@@ -10,8 +10,8 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from node_support.geometry import inverse, transformed
-from recordings.reading.reader import Request
-from recordings.vehicle.motion import MotionNames
+from recordings.motion.vehicle_motion import MotionNames
+from recordings.reader import Request
 
 TURN = 0.4
 LEVEL = np.zeros(10)

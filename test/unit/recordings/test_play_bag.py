@@ -10,8 +10,7 @@ from std_msgs.msg import Float64
 from tf2_msgs.msg import TFMessage
 
 from node_support.ros.node import StartError
-from recordings.play_arguments import play_arguments
-from recordings.ros.bag_player import read_messages
+from recordings.ros.play_bag import play_arguments, read_messages
 
 
 def _transform(parent, child):

@@ -11,11 +11,10 @@ from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
 from rosbags.rosbag1 import Reader
 
 from mlsm_manager.offline.bag_recording import read_recording
-from recordings.bags.bag import Bag
+from recordings.bags.bag import Bag, RecordingError
 from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
 from recordings.bags.ros1_reader import Ros1Reader
-from recordings.errors import RecordingError
-from recordings.reading.reader import Request
+from recordings.reader import Request
 
 BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 NAMES = Request(truth="/ground_truth")

@@ -5,8 +5,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from recordings.transforms.frame_tree import FrameTree
-from recordings.transforms.pose_track import PoseTrack
+from recordings.motion.frame_tree import FrameTree
+from recordings.motion.pose_track import PoseTrack
 
 LEVEL = [0.0, 0.0, 0.0, 1.0]
 

@@ -8,12 +8,11 @@ import pytest
 from made_bags import write_mcap
 
 from mlsm_manager.offline.bag_recording import read_recording
-from recordings.conversion.convert_bag import convert_bag
-from recordings.errors import RecordingError
-from recordings.inspection.report import report
-from recordings.inspection.survey import survey
-from recordings.messages.roles import Role
-from recordings.reading.reader import Request
+from recordings.bags.bag import RecordingError
+from recordings.bags.topic_roles import Role
+from recordings.convert_bag import convert_bag
+from recordings.reader import Request
+from recordings.survey import report, survey
 
 BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 

@@ -9,10 +9,10 @@ from hypothesis import strategies as st
 
 from ping360_driver.logs.ping_viewer_log import TITLE, NoLogError, PingViewerLog
 from ping360_driver.protocol.messages import MessageId, packed
-from recordings.beams.makers_logs import is_makers_log, makers_beams
-from recordings.errors import RecordingError
-from recordings.reading.reader import Request, read
-from recordings.vehicle.motion import MotionNames, MotionSource
+from recordings.bags.bag import RecordingError
+from recordings.makers_logs import is_makers_log, makers_beams
+from recordings.motion.vehicle_motion import MotionNames, MotionSource
+from recordings.reader import Request, read
 
 TICKS = 400
 SAMPLES = 300
@@ -91,7 +91,7 @@ def test_it_is_known_by_its_first_bytes(turn, tmp_path):
 
 def test_it_is_read_as_a_recording_of_a_standing_vehicle(turn):
     held = read(turn, Request(motion=MotionNames(declared=MotionSource.STANDING), offset=1e9))
-    assert held.found.beams[0].stamp_ns == pytest.approx((1e9 + 5.0) * 1e9, abs=1e7)
+    assert held.recorded.beams[0].stamp_ns == pytest.approx((1e9 + 5.0) * 1e9, abs=1e7)
 
 
 def test_a_log_without_beams_is_refused(tmp_path):

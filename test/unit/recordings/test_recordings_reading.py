@@ -10,10 +10,9 @@ from imagenex_852_driver.logs.log_file import LogWriter
 from imagenex_852_driver.logs.log_record import LoggedPing
 from imagenex_852_driver.protocol import Reply, ReplyKind
 from mlsm_manager.offline.bag_recording import read_recording
-from recordings.errors import RecordingError
-from recordings.reading.parameters import ReadingParameters
-from recordings.reading.reader import Request, read
-from recordings.vehicle.motion import MotionNames, MotionSource
+from recordings.bags.bag import RecordingError
+from recordings.motion.vehicle_motion import MotionNames, MotionSource
+from recordings.reader import ReadingParameters, Request, read
 
 BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 LOCAL_POSITION = "/mavros/local_position/pose"

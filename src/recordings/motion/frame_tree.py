@@ -1,20 +1,26 @@
-"""How frames are linked, and the pose of any of them in any other."""
+"""How frames are linked, the pose of any of them in any other, and the poses that messages hold."""
 
 from collections import deque
-from typing import Dict, List, Optional, Tuple
+from typing import Any, Dict, Iterable, List, Optional, Tuple
 
 import numpy as np
 
-from recordings.transforms.pose_track import PoseTrack
+from node_support import topics
+from recordings.bags.bag import Bag
+from recordings.motion.pose_track import PoseTrack
+from sonar_processing.messages.fields import stamp_ns
 
 Link = Tuple[str, str]
 """Parent and child."""
 
+_Sample = Tuple[int, Tuple[float, float, float], Tuple[float, float, float, float]]
+
 
 class FrameTree:
-    """Poses of frames in their parents, by (parent, child). Links may form any graph; the way of fewest links counts.
+    """Poses of frames in their parents, by (parent, child).
 
-    tf2 knows one parent per frame; bags of several publishers often hold more.
+    Links may form any graph; of several chains the shortest counts. tf2 knows one parent per frame; bags of several
+    publishers often hold more.
     """
 
     def __init__(self, tracks: Optional[Dict[Link, PoseTrack]] = None) -> None:
@@ -35,7 +41,7 @@ class FrameTree:
         """Return a tree that has one more link, or another track for it."""
         return FrameTree({**self.tracks, (parent, child): track})
 
-    def way(self, target: str, source: str) -> Optional[List[Link]]:
+    def links_between(self, target: str, source: str) -> Optional[List[Link]]:
         """Return the links from `target` to `source`, each as it is passed; None where the two are not linked."""
         if target == source:
             return []
@@ -49,23 +55,23 @@ class FrameTree:
                     waiting.append(neighbour)
         if source not in came_from:
             return None
-        way, frame = [], source
+        links, frame = [], source
         while frame != target:
-            way.append((came_from[frame], frame))
+            links.append((came_from[frame], frame))
             frame = came_from[frame]
-        return way[::-1]
+        return links[::-1]
 
     def poses(self, target: str, source: str, stamps_ns: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return T_target_source (k, 4, 4) at stamps (k,), and (k,) whether every link is known then.
 
         Where one is not known, its nearest pose stands. Raises KeyError when the frames are not linked.
         """
-        way = self.way(target, source)
-        if way is None:
+        links = self.links_between(target, source)
+        if links is None:
             raise KeyError(self.why_not(target, source, stamps_ns))
         result = np.tile(np.eye(4), (len(stamps_ns), 1, 1))
         known = np.ones(len(stamps_ns), dtype=bool)
-        for step in way:
+        for step in links:
             link, is_down = self._link(step)
             poses = self.tracks[link].at(stamps_ns)
             result = result @ (poses if is_down else np.linalg.inv(poses))
@@ -77,10 +83,10 @@ class FrameTree:
         missing = [frame for frame in (source, target) if frame not in self.frames]
         if missing and source != target:
             return f"no transform names {' or '.join(missing)}; there are {', '.join(self.frames) or 'none'}"
-        way = self.way(target, source)
-        if way is None:
+        links = self.links_between(target, source)
+        if links is None:
             return f"{source} and {target} are not linked"
-        for step in way:
+        for step in links:
             (parent, child), _ = self._link(step)
             track = self.tracks[parent, child]
             outside = stamps_ns[~track.covers(stamps_ns)]
@@ -95,3 +101,63 @@ class FrameTree:
     def _link(self, step: Link) -> Tuple[Link, bool]:
         """Return the link that a step passes, and whether it goes from parent to child."""
         return (step, True) if step in self.tracks else (step[::-1], False)
+
+
+def frame_tree(bag: Bag) -> FrameTree:
+    """Return all transforms of a bag. A link on both topics counts as moving, as in tf2.
+
+    Transforms without a frame, of a frame in itself, or that are no rotation are left out.
+    """
+    fixed = {
+        link: PoseTrack(track.stamps_ns[:1], track.translations[:1], track.rotations[:1], is_fixed=True)
+        for link, track in _links(message for _, message in bag.messages(topics.STATIC_TRANSFORMS)).items()
+        if len(track)
+    }
+    return FrameTree({**fixed, **_links(message for _, message in bag.messages(topics.TRANSFORMS))})
+
+
+def pose_track(messages: Iterable[Any]) -> PoseTrack:
+    """Return the poses of Odometry, PoseStamped or PoseWithCovarianceStamped messages; may be empty.
+
+    Raises AttributeError for messages that have no pose.
+    """
+    return _track([_sample(message) for message in messages])
+
+
+def heading_track(messages: Iterable[Any]) -> PoseTrack:
+    """Return the orientations of Imu messages, at the origin; may be empty. Raises AttributeError for others."""
+    return _track([(stamp_ns(one.header), (0.0, 0.0, 0.0), _rotation(one.orientation)) for one in messages])
+
+
+def frame_name(name: str) -> str:
+    """Return the name of a frame without the slash of ROS before Hydro."""
+    return name.lstrip("/")
+
+
+def _links(messages: Iterable[Any]) -> Dict[Link, PoseTrack]:
+    samples: Dict[Link, List[_Sample]] = {}
+    for message in messages:
+        for one in message.transforms:
+            link = frame_name(one.header.frame_id), frame_name(one.child_frame_id)
+            if all(link) and link[0] != link[1]:
+                pose = _vector(one.transform.translation), _rotation(one.transform.rotation)
+                samples.setdefault(link, []).append((stamp_ns(one.header), *pose))
+    return {link: _track(found) for link, found in samples.items()}
+
+
+def _sample(message: Any) -> _Sample:
+    pose = getattr(message.pose, "pose", message.pose)
+    return stamp_ns(message.header), _vector(pose.position), _rotation(pose.orientation)
+
+
+def _track(samples: List[_Sample]) -> PoseTrack:
+    stamps, translations, rotations = zip(*samples) if samples else ((), (), ())
+    return PoseTrack.sorted_from(np.array(stamps, dtype=np.int64), np.array(translations), np.array(rotations))
+
+
+def _vector(value: Any) -> Tuple[float, float, float]:
+    return value.x, value.y, value.z
+
+
+def _rotation(value: Any) -> Tuple[float, float, float, float]:
+    return value.x, value.y, value.z, value.w

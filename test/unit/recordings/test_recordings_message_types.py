@@ -1,18 +1,16 @@
-"""Many messages at once have the bytes of each alone."""
+"""Messages of zeros, and many messages at once to the bytes that rosbags writes of each alone."""
 
 import numpy as np
 import pytest
 from rosbags.interfaces import Nodetype
 
-from recordings.bags.blank_message import blank_message
-from recordings.bags.message_bytes import serializer
-from recordings.bags.message_rows import message_rows
-from recordings.bags.message_types import BEAM_TYPE, ros1_types
+from recordings.bags.message_types import BEAM_TYPE, blank_message, message_rows, ros1_types
 
 NUMBER = 3
 TYPES = [
     BEAM_TYPE, "tf2_msgs/msg/TFMessage", "nav_msgs/msg/Odometry", "sensor_msgs/msg/JointState", "std_msgs/msg/Empty",
-    "std_msgs/msg/Bool", "visualization_msgs/msg/Marker",
+    "std_msgs/msg/Bool", "visualization_msgs/msg/Marker", "std_msgs/msg/String", "sensor_msgs/msg/PointCloud2",
+    "sensor_msgs/msg/LaserScan", "sensor_msgs/msg/CameraInfo", "diagnostic_msgs/msg/DiagnosticArray",
 ]  # fmt: skip
 
 
@@ -51,5 +49,11 @@ def _values(blank, node, detail, rng, several):
 def test_each_row_is_the_message_alone(name, several):
     together, alone = _filled(name, np.random.RandomState(0), several)
     rows = message_rows(ros1_types(), name, together, NUMBER)
-    to_bytes = serializer(ros1_types(), name)
-    assert [row.tobytes() for row in rows] == [to_bytes(message) for message in alone]
+    assert [row.tobytes() for row in rows] == [bytes(ros1_types().serialize_ros1(one, name)) for one in alone]
+
+
+def test_blank_messages_share_nothing():
+    first, second = (blank_message(ros1_types(), "nav_msgs/msg/Odometry") for _ in range(2))
+    first.header.stamp.sec, first.pose.covariance[0] = 1, 1.0
+    assert second.header.stamp.sec == 0
+    assert second.pose.covariance[0] == 0.0

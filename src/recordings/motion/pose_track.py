@@ -1,11 +1,12 @@
-"""The poses of one frame in another over time."""
+"""The poses of one frame in another over time; quaternions are x y z w."""
 
 from dataclasses import dataclass
 
 import numpy as np
 
 from node_support.geometry import FULL_TURN
-from recordings.transforms.rotations import between, normalized, rotation_matrices
+
+_NORMS = (0.5, 2.0)  # of quaternions; a norm outside says that something else than a rotation was written
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class PoseTrack:
 
         Those that are not finite or no rotation are left out; the track may then be empty.
         """
-        rotations = normalized(np.asarray(rotations, dtype=np.float64).reshape(-1, 4))
+        rotations = _normalized(np.asarray(rotations, dtype=np.float64).reshape(-1, 4))
         translations = np.asarray(translations, dtype=np.float64).reshape(-1, 3)
         valid = np.isfinite(rotations).all(axis=1) & np.isfinite(translations).all(axis=1)
         kept, first = np.unique(np.asarray(stamps_ns, dtype=np.int64)[valid], return_index=True)
@@ -64,7 +65,7 @@ class PoseTrack:
         share = np.clip((stamps_ns - self.stamps_ns[before]) / step, 0.0, 1.0)
         translations = (1.0 - share)[:, np.newaxis] * self.translations[before]
         translations += share[:, np.newaxis] * self.translations[after]
-        return _matrices(translations, between(self.rotations[before], self.rotations[after], share))
+        return _matrices(translations, _between(self.rotations[before], self.rotations[after], share))
 
     def turned_up(self) -> "PoseTrack":
         """Return the track from north, east, down to x, y left, z up: both frames by half a turn about x."""
@@ -75,13 +76,44 @@ class PoseTrack:
     @property
     def yaws(self) -> np.ndarray:
         """(n,) heading, rad, without jumps by whole turns."""
-        matrices = rotation_matrices(self.rotations)
+        matrices = _rotation_matrices(self.rotations)
         return np.unwrap(np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]), discont=FULL_TURN / 2)
 
 
 def _matrices(translations: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     matrices = np.zeros((len(translations), 4, 4))
-    matrices[:, :3, :3] = rotation_matrices(normalized(rotations))
+    matrices[:, :3, :3] = _rotation_matrices(_normalized(rotations))
     matrices[:, :3, 3] = translations
     matrices[:, 3, 3] = 1.0
     return matrices
+
+
+def _normalized(quaternions: np.ndarray) -> np.ndarray:
+    """Return quaternions (..., 4) of length one; NaN for those that are no rotation or not finite."""
+    norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
+    with np.errstate(invalid="ignore"):
+        valid = (norms > _NORMS[0]) & (norms < _NORMS[1])
+        return np.where(valid, quaternions / np.where(valid, norms, 1.0), np.nan)
+
+
+def _between(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Return the rotation at `share` (n,) of the shortest way from `first` (n, 4) to `second` (n, 4), as tf2 does."""
+    cosine = np.einsum("ni,ni->n", first, second)
+    second = np.where(cosine[:, np.newaxis] < 0.0, -second, second)
+    angle = np.arccos(np.clip(np.abs(cosine), 0.0, 1.0))
+    apart = angle > 0.0
+    sine = np.where(apart, np.sin(angle), 1.0)
+    left = np.where(apart, np.sin((1.0 - share) * angle) / sine, 1.0)
+    right = np.where(apart, np.sin(share * angle) / sine, 0.0)
+    return left[:, np.newaxis] * first + right[:, np.newaxis] * second
+
+
+def _rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """Return (n, 3, 3) rotations of unit quaternions (n, 4)."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.array(rows).transpose(2, 0, 1)

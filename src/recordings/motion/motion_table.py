@@ -6,10 +6,10 @@ from typing import Dict, List
 
 import numpy as np
 
-from recordings.errors import RecordingError
-from recordings.transforms.frame_tree import FrameTree
-from recordings.transforms.pose_track import PoseTrack
-from recordings.vehicle.motion import Motion, MotionNames, MotionSource, linked
+from recordings.bags.bag import RecordingError
+from recordings.motion.frame_tree import FrameTree
+from recordings.motion.pose_track import PoseTrack
+from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, linked
 
 COLUMNS = {
     "time": "s, of the same clock as the beams",

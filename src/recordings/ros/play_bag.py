@@ -1,25 +1,55 @@
 """Plays a bag with a clock that never stops before its end, however slow bag, machine and listeners are."""
 
+import math
 import threading
-from argparse import Namespace
+from argparse import ArgumentTypeError, Namespace
 from dataclasses import dataclass
-from typing import Any, Dict, List, Sequence
+from pathlib import Path
+from typing import Any, Dict, List, Sequence, Union
 
 import genpy
 import rosbag
 import rospy
+from geometry_msgs.msg import Quaternion, Vector3
 from rosgraph_msgs.msg import Clock
 
 from node_support import topics
+from node_support.help import CommandLine
 from node_support.ros.callbacks import guarded, make_health
-from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError
+from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, run
 from node_support.timing import Pace
-from recordings.ros.upright import turn_up
 
 _CLOCK_PERIOD = 0.01  # s of wall time: as rosbag play does
 _WAIT_STEP = 0.05  # s: soon enough for a person
 _LATECOMERS = 5.0  # s: a node that the master still lists may have died, and will never connect
 _QUEUE_SIZE = 1000
+
+
+def run_play_bag() -> None:
+    """Play a bag to its end."""
+    options = play_arguments(rospy.myargv()[1:])
+    run("play_bag", lambda: BagPlayer(options))
+
+
+def play_arguments(arguments: List[str]) -> Namespace:
+    """Return bag, rate, topics, ned, odom_frame and base_frame; exits on a bad command line."""
+    parser = CommandLine(
+        "play_bag", description="Play a ROS 1 bag with /clock, once every topic has a subscriber. It is read first."
+    )
+    parser.add_argument("bag", type=Path, help="bag to play")
+    parser.add_argument("--rate", type=_positive, default=1.0, help="times real time (default: 1)")
+    parser.add_argument("--topics", nargs="+", help="play only these (default: all)")
+    parser.add_argument("--ned", action="store_true", help="the odometry counts x north, y east, z down: turn it up")
+    parser.add_argument("--odom-frame", default="odom", help="frame of the odometry that --ned turns (default: odom)")
+    parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: base_link)")
+    return parser.parse_args(arguments)
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise ArgumentTypeError(f"{text}: must be above 0")
+    return value
 
 
 @dataclass(frozen=True)
@@ -134,3 +164,27 @@ def _turn_all_up(played: Sequence[Played], options: Namespace) -> None:
     if not any(turned):
         link = f"{options.odom_frame} -> {options.base_frame}"
         raise StartError(f"{options.bag}: --ned turns the pose {link}, which is neither in tf nor in an Odometry")
+
+
+def turn_up(message: Any, odom_frame: str, base_frame: str) -> bool:
+    """Turn what a TFMessage or Odometry says of the vehicle in odom, both frames by half a turn about x.
+
+    Return whether there was such a pose; other messages stay as they are.
+    """
+    poses = [
+        (one.transform.translation, one.transform.rotation)
+        for one in getattr(message, "transforms", ())
+        if (one.header.frame_id.lstrip("/"), one.child_frame_id.lstrip("/")) == (odom_frame, base_frame)
+    ]
+    if hasattr(message, "pose") and hasattr(message, "twist"):
+        poses.append((message.pose.pose.position, message.pose.pose.orientation))
+        for velocity in (message.twist.twist.linear, message.twist.twist.angular):
+            _turn(velocity)
+    for position, orientation in poses:
+        _turn(position)
+        _turn(orientation)
+    return bool(poses)
+
+
+def _turn(value: Union[Vector3, Quaternion]) -> None:
+    value.y, value.z = -value.y, -value.z

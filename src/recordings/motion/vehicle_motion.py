@@ -6,12 +6,10 @@ from typing import List, Optional
 
 import numpy as np
 
-from recordings.bags.bag import Bag
-from recordings.errors import RecordingError
-from recordings.messages.poses import frame_name, frame_tree, heading_track, pose_track
-from recordings.messages.roles import Role, with_role
-from recordings.transforms.frame_tree import FrameTree
-from recordings.transforms.pose_track import PoseTrack
+from recordings.bags.bag import Bag, RecordingError, missing_topic
+from recordings.bags.topic_roles import Role, with_role
+from recordings.motion.frame_tree import FrameTree, frame_name, frame_tree, heading_track, pose_track
+from recordings.motion.pose_track import PoseTrack
 
 _NO_SHIFT, _NO_TURN = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -55,7 +53,7 @@ def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> 
     tree = frame_tree(bag)
     if names.declared is not None:
         return declared_motion(tree, names)
-    if names.odometry is None and tree.way(names.odom_frame, names.base_frame) is not None:
+    if names.odometry is None and tree.links_between(names.odom_frame, names.base_frame) is not None:
         return Motion(_upward(tree, names), MotionSource.POSES)
     topic = names.odometry or _likeliest(bag, Role.ODOMETRY, truth)
     if topic is not None:
@@ -72,12 +70,8 @@ def declared_motion(tree: FrameTree, names: MotionNames) -> Motion:
 
 
 def linked(tree: FrameTree, names: MotionNames, track: PoseTrack) -> FrameTree:
-    """Return a tree whose vehicle moves as `track`, poses of the base frame in odom, which may have z down."""
-    return _linked(tree, names, track.turned_up() if names.z_is_down else track)
-
-
-def _linked(tree: FrameTree, names: MotionNames, track: PoseTrack) -> FrameTree:
-    """Return the tree with the track as the only way from odom to the base frame, and one without other odometry."""
+    """Return a tree whose vehicle moves as `track` alone, poses of the base frame in odom, which may have z down."""
+    track = track.turned_up() if names.z_is_down else track
     base_links = {link: one for link, one in tree.tracks.items() if link[1] != names.base_frame}
     return FrameTree(base_links).with_track(names.odom_frame, names.base_frame, track)
 
@@ -91,7 +85,7 @@ def _upward(tree: FrameTree, names: MotionNames) -> FrameTree:
 
 def _of_poses(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
     if topic not in bag.topics:
-        raise RecordingError(f"no topic {topic}; there are {', '.join(sorted(bag.topics)) or 'none at all'}")
+        raise missing_topic(topic, [bag])
     messages = [message for _, message in bag.messages(topic)]
     try:
         track = pose_track(messages)
@@ -128,8 +122,8 @@ def _likeliest(bag: Bag, role: Role, truth: Optional[str]) -> Optional[str]:
 def _nothing(bag: Bag, tree: FrameTree, names: MotionNames) -> str:
     topics = ", ".join(sorted(bag.topics)) or "none at all"
     reason = tree.why_not(names.odom_frame, names.base_frame, np.zeros(0, dtype=np.int64))
-    tf = f"tf does not tell: {reason}" if tree.tracks else "no /tf"
+    tf = f"tf does not say where the vehicle was: {reason}" if tree.tracks else "no /tf"
     return (
-        f"{tf}; and no topic holds odometry (Odometry, PoseStamped), so nothing tells where the beams were taken; "
+        f"{tf}; and no topic holds odometry (Odometry, PoseStamped), so nothing says where the beams were taken; "
         f"there are {topics}; if the vehicle stood still, give --standing; if it moved, --unknown-motion"
     )

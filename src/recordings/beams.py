@@ -1,13 +1,15 @@
-"""Beams of a bag."""
+"""All beams of a recording, and those of bags."""
 
 from contextlib import suppress
-from typing import Any, Optional
+from dataclasses import dataclass, field, replace
+from typing import Any, List, Optional
+
+import numpy as np
 
 from node_support.errors import RefusedInput
-from recordings.bags.bag import Bag
-from recordings.beams.found_beams import FoundBeams
-from recordings.errors import RecordingError
-from recordings.messages.roles import Role, with_role
+from recordings.bags.bag import Bag, RecordingError, missing_topic
+from recordings.bags.topic_roles import Role, with_role
+from sonar_processing.beams.beam import Beam
 from sonar_processing.messages.parameters import BeamMessageParameters
 from sonar_processing.messages.reader import BeamReader, beam_type
 from sonar_processing.scans.moving_state import MovingState
@@ -16,16 +18,41 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 _VELOCITY_TOPIC = "/cmd_vel"
 
 
+@dataclass(frozen=True)
+class RecordedBeams:
+    """beams: in the order of the recording. moving: whether the vehicle moved then. refused: messages without a beam.
+
+    notes: what was assumed, as sentences.
+    """
+
+    beams: List[Beam]
+    moving: List[bool]
+    refused: int = 0
+    notes: List[str] = field(default_factory=list)
+
+    @property
+    def stamps_ns(self) -> np.ndarray:
+        """(n,) int64, ns, in the order of the recording."""
+        return np.array([beam.stamp_ns for beam in self.beams], dtype=np.int64)
+
+    def later(self, seconds: float) -> "RecordedBeams":
+        """Return the same beams with `seconds` added to their stamps. Raises RefusedInput for a stamp below 0."""
+        if seconds == 0.0:
+            return self
+        shift = round(seconds * 1e9)
+        return replace(self, beams=[replace(beam, stamp_ns=beam.stamp_ns + shift) for beam in self.beams])
+
+
 def beam_topic(bag: Bag, wanted: Optional[str]) -> str:
     """Return the topic of the beams: `wanted`, or the likeliest of the bag. Raises RecordingError without one."""
-    names = ", ".join(sorted(bag.topics)) or "none at all"
     if wanted is None:
         found = with_role(bag.topics, Role.BEAMS)
         if not found:
+            names = ", ".join(sorted(bag.topics)) or "none at all"
             raise RecordingError(f"no topic holds beams of a known type (docs/sonars.md); there are {names}")
         return found[0].name
     if wanted not in bag.topics:
-        raise RecordingError(f"no topic {wanted}; there are {names}")
+        raise missing_topic(wanted, [bag])
     try:
         beam_type(bag.topics[wanted].type)
     except RefusedInput as error:
@@ -33,14 +60,13 @@ def beam_topic(bag: Bag, wanted: Optional[str]) -> str:
     return wanted
 
 
-def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> FoundBeams:
+def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> RecordedBeams:
     """Return all beams of a topic, and whether the vehicle moved by its velocity on /cmd_vel."""
     reader, kind = BeamReader(parameters), bag.topics[topic].type
     moving_state, still = MovingState(), SonarToCloudParameters()
     velocities = bag.messages(_VELOCITY_TOPIC)
     velocity = next(velocities, None)
-    found = FoundBeams([], [])
-    refused = 0
+    beams, moving, notes, refused = [], [], [], 0
     for time, message in list(bag.messages(topic)):
         while velocity is not None and velocity[0] <= time:
             _take_velocity(moving_state, velocity[1])
@@ -51,14 +77,14 @@ def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> Fou
             refused += 1
             continue
         if reading.unit_changed:
-            refused += len(found.beams)
-            found.beams.clear()
-            found.moving.clear()
-        found.beams.extend(reading.beams)
-        found.moving.extend([moving_state.is_moving(still)] * len(reading.beams))
-        found.notes.extend(reading.notes)
+            refused += len(beams)
+            beams.clear()
+            moving.clear()
+        beams.extend(reading.beams)
+        moving.extend([moving_state.is_moving(still)] * len(reading.beams))
+        notes.extend(reading.notes)
         refused += reading.refused
-    return FoundBeams(found.beams, found.moving, refused, found.notes)
+    return RecordedBeams(beams, moving, refused, notes)
 
 
 def _take_velocity(moving_state: MovingState, message: Any) -> None:

@@ -1,1 +1,0 @@
-"""Beams of a recording, from bags and from the logs of sonars' makers."""

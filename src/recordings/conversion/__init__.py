@@ -1,1 +1,0 @@
-"""Recordings of any kind as bags of ROS 1."""

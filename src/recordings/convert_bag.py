@@ -1,0 +1,139 @@
+"""The program convert_bag: writes a recording as a bag of ROS 1 that our nodes play and map_bag reads."""
+
+import argparse
+import sys
+from pathlib import Path
+from typing import Any, Iterator, List, Tuple
+
+import numpy as np
+
+from node_support import topics
+from node_support.files import whole_file
+from node_support.help import CommandLine
+from node_support.parameter_files import assigned_values
+from node_support.parameters import ParameterError
+from recordings.bags.bag import RecordingError
+from recordings.bags.bag_writer import BagWriter
+from recordings.motion.frame_tree import Link
+from recordings.motion.pose_track import PoseTrack
+from recordings.reader import Content, ReadingParameters, Request, add_reading_arguments, read, request_of
+from sonar_processing.beams.beam import Beam
+
+_BEAMS = f"/{topics.BEAMS}"
+_ODOMETRY = f"/{topics.ODOMETRY}"
+_TRUTH = f"/{topics.GROUND_TRUTH}"
+_Stamped = Tuple[int, str, Any]  # ns, topic and message
+
+
+def run_convert_bag() -> None:
+    """Run convert_bag with the command line; ends with one line and status 1 when something is wrong."""
+    try:
+        print(convert_bag(sys.argv[1:]))
+    except (ParameterError, RecordingError) as error:
+        sys.exit(f"convert_bag: {error}")
+    except OSError as error:
+        sys.exit(f"convert_bag: {error.filename or 'output'}: {error.strerror or error}")
+    except KeyboardInterrupt:
+        sys.exit("convert_bag: interrupted; nothing was written")
+
+
+def convert_bag(arguments: List[str]) -> str:
+    """Convert what the arguments name and return in words what was written; exits on a bad command line.
+
+    Raises ParameterError, RecordingError and OSError.
+    """
+    options = _parser().parse_args(arguments)
+    request = request_of(options, ReadingParameters.from_mapping(assigned_values(options.set)))
+    content = read(options.recording, request)
+    for note in content.notes:
+        print(f"convert_bag: {options.recording}: {note}", file=sys.stderr)
+    write_converted(options.out, content, request)
+    lost = f", {content.recorded.refused} messages without a usable beam" if content.recorded.refused else ""
+    return f"{options.out}: {len(content.recorded.beams)} beams{lost}; motion: {content.motion.source.value}"
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = CommandLine(
+        "convert_bag", description="Write a recording of any kind as a bag of ROS 1 with /sonar/raw, /odom and tf."
+    )
+    parser.add_argument("recording", type=Path, help="a bag of ROS 1 or ROS 2, or the log of a sonar's maker")
+    parser.add_argument("out", type=Path, help="bag to write; an existing one is replaced")
+    parser.add_argument(
+        "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="mounting and angles"
+    )
+    add_reading_arguments(parser)
+    return parser
+
+
+def write_converted(path: Path, content: Content, request: Request) -> None:
+    """Write beams, odometry, transforms and truth, whole or not at all. Raises OSError."""
+    with whole_file(path) as temporary, BagWriter(temporary) as bag:
+        messages = [*_beams(bag, content.recorded.beams), *_motion(bag, content, request), *_truth(bag, content)]
+        messages.sort(key=lambda one: one[0])
+        start = messages[0][0]
+        bag.write(topics.STATIC_TRANSFORMS, _fixed_links(bag, content, start), start)
+        for stamp_ns, topic, message in messages:
+            bag.write(topic, message, stamp_ns)
+
+
+def _beams(bag: BagWriter, beams: List[Beam]) -> Iterator[_Stamped]:
+    for beam in beams:
+        message = _stamped(bag, "underwater_map_construction/SonarScanLine", beam.stamp_ns, beam.frame_id)
+        message.angle, message.sensorAngle = beam.angle, beam.sensor_angle
+        message.intensities = np.asarray(beam.intensities, dtype=np.uint8)
+        message.range_resolution = beam.range_resolution
+        message.maxrange_meters = beam.range_resolution * beam.intensities.size
+        yield beam.stamp_ns, _BEAMS, message
+
+
+def _motion(bag: BagWriter, content: Content, request: Request) -> Iterator[_Stamped]:
+    tracks, names = content.motion.tree.tracks, request.motion
+    for link, track in tracks.items():
+        if not track.is_fixed:
+            for index, stamp_ns in enumerate(map(int, track.stamps_ns)):
+                yield stamp_ns, topics.TRANSFORMS, _transforms(bag, [_transform(bag, link, track, index, stamp_ns)])
+    odometry = tracks.get((names.odom_frame, names.base_frame))
+    if odometry is not None and not odometry.is_fixed:
+        yield from _odometry(bag, _ODOMETRY, odometry, names.odom_frame, names.base_frame)
+
+
+def _truth(bag: BagWriter, content: Content) -> Iterator[_Stamped]:
+    return _odometry(bag, _TRUTH, content.truth, "map", "") if content.truth is not None else iter(())
+
+
+def _odometry(bag: BagWriter, topic: str, track: PoseTrack, frame: str, child: str) -> Iterator[_Stamped]:
+    for index in range(len(track)):
+        stamp_ns = int(track.stamps_ns[index])
+        message = _stamped(bag, "nav_msgs/Odometry", stamp_ns, frame)
+        message.child_frame_id = child
+        _fill(message.pose.pose.position, message.pose.pose.orientation, track, index)
+        yield stamp_ns, topic, message
+
+
+def _fixed_links(bag: BagWriter, content: Content, stamp_ns: int) -> Any:
+    fixed = [(link, track) for link, track in content.motion.tree.tracks.items() if track.is_fixed]
+    return _transforms(bag, [_transform(bag, link, track, 0, stamp_ns) for link, track in fixed])
+
+
+def _transforms(bag: BagWriter, transforms: List[Any]) -> Any:
+    message = bag.make("tf2_msgs/TFMessage")
+    message.transforms = transforms
+    return message
+
+
+def _transform(bag: BagWriter, link: Link, track: PoseTrack, index: int, stamp_ns: int) -> Any:
+    message = _stamped(bag, "geometry_msgs/TransformStamped", stamp_ns, link[0])
+    message.child_frame_id = link[1]
+    _fill(message.transform.translation, message.transform.rotation, track, index)
+    return message
+
+
+def _fill(place: Any, turn: Any, track: PoseTrack, index: int) -> None:
+    place.x, place.y, place.z = track.translations[index]
+    turn.x, turn.y, turn.z, turn.w = track.rotations[index]
+
+
+def _stamped(bag: BagWriter, kind: str, stamp_ns: int, frame: str) -> Any:
+    message = bag.make(kind)
+    message.header.stamp, message.header.frame_id = bag.time(stamp_ns), frame
+    return message

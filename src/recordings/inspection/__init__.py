@@ -1,1 +1,0 @@
-"""What a recording holds and lacks, before anything is made of it."""

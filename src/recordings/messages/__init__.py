@@ -1,1 +1,0 @@
-"""What messages hold, as arrays; a message is any object with the fields of its definition."""

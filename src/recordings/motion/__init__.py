@@ -1,0 +1,1 @@
+"""Where frames, and the vehicle, were at any time; without tf2."""

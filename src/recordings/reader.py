@@ -1,0 +1,185 @@
+"""Reads beams and motion of a recording, and a true path if there is one; and the arguments of programs that do."""
+
+import argparse
+from contextlib import ExitStack
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Callable, List, Optional, Tuple, TypeVar
+
+from node_support.geometry import quaternion_of
+from recordings.bags.bag import Bag, RecordingError, missing_topic
+from recordings.beams import RecordedBeams, beam_topic, beams_of_bag
+from recordings.makers_logs import is_makers_log, makers_beams
+from recordings.motion.frame_tree import FrameTree, pose_track
+from recordings.motion.motion_table import is_table, motion_of_csv
+from recordings.motion.pose_track import PoseTrack
+from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, declared_motion, motion_of_bag
+from sonar_processing.beams.mounting import MountingParameters
+from sonar_processing.messages.parameters import BeamMessageParameters
+
+_Result = TypeVar("_Result")
+
+
+@dataclass(frozen=True)
+class ReadingParameters(MountingParameters, BeamMessageParameters):
+    """Where the sonar is mounted, and how the angles in its messages are understood."""
+
+
+@dataclass(frozen=True)
+class Request:
+    """What is read of a recording, and from where.
+
+    beams: topic of the beams; None: the likeliest. truth: topic of the true pose, or None. vehicle: a bag or table with
+    the motion, where the recording itself has none. offset: s that are added to the stamps of the beams, so that they
+    are of the same clock as the motion.
+    """
+
+    beams: Optional[str] = None
+    truth: Optional[str] = None
+    motion: MotionNames = field(default_factory=MotionNames)
+    vehicle: Optional[Path] = None
+    offset: float = 0.0
+    parameters: ReadingParameters = field(default_factory=ReadingParameters)
+
+
+@dataclass(frozen=True)
+class Content:
+    """What a recording holds. The motion's tree links all frames of beams with odom. notes: what was assumed."""
+
+    recorded: RecordedBeams
+    motion: Motion
+    truth: Optional[PoseTrack]
+
+    @property
+    def notes(self) -> List[str]:
+        """Sentences."""
+        return [*self.motion.notes, *self.recorded.notes]
+
+
+def read(path: Path, request: Request) -> Content:
+    """Return what is wanted of a recording. Raises RecordingError, with everything that is missing at once."""
+    with ExitStack() as stack:
+        main = None if is_makers_log(path) else stack.enter_context(Bag(path))
+        vehicle = None if request.vehicle is None or is_table(request.vehicle) else Bag(request.vehicle)
+        bags = [main, stack.enter_context(vehicle) if vehicle else None]
+        problems: List[str] = []
+        topic = tried(problems, lambda: None if main is None else beam_topic(main, request.beams))
+        truth = tried(problems, lambda: _truth([bag for bag in bags if bag is not None], request))
+        motion = tried(problems, lambda: _motion(bags[1] or main, request))
+        if problems:
+            raise RecordingError(f"{path}: {'; '.join(problems)}")
+        recorded = makers_beams(path) if main is None else beams_of_bag(main, topic, request.parameters)
+    if not recorded.beams:
+        raise RecordingError(f"{path}: none of {recorded.refused} messages holds a beam that can be used")
+    recorded = recorded.later(request.offset)
+    tree, notes = mounted(motion.tree, request.motion.base_frame, recorded, request.parameters)
+    _check_common_time(path, recorded, tree, request)
+    return Content(recorded, Motion(tree, motion.source, [*motion.notes, *notes]), truth)
+
+
+def mounted(
+    tree: FrameTree, base_frame: str, recorded: RecordedBeams, parameters: MountingParameters
+) -> Tuple[FrameTree, List[str]]:
+    """Return a tree in which every frame of beams is linked to the vehicle, and what was assumed for that."""
+    notes = []
+    vehicle = parameters.mounted_in or base_frame
+    pose = parameters.matrix()
+    for frame in sorted({beam.frame_id for beam in recorded.beams}):
+        if tree.links_between(base_frame, frame) is None:
+            tree = tree.with_track(vehicle, frame, PoseTrack.fixed(pose[:3, 3], quaternion_of(pose)))
+            notes.append(f"tf does not place {frame} on the vehicle: {_in_words(parameters, vehicle)}")
+    return tree, notes
+
+
+def _in_words(one: MountingParameters, vehicle: str) -> str:
+    upside_down = ", upside down" if one.upside_down else ""
+    return (
+        f"taken as mounted in {vehicle} at {one.mount_x:g} {one.mount_y:g} {one.mount_z:g} m, yaw {one.mount_yaw:g} rad"
+        f"{upside_down} (--set mount_x, mount_y, mount_z, mount_yaw, upside_down)"
+    )
+
+
+def tried(problems: List[str], step: Callable[[], Optional[_Result]]) -> Optional[_Result]:
+    """Return what a step finds; where it raises RecordingError, add its text to the problems and return None."""
+    try:
+        return step()
+    except RecordingError as error:
+        problems.append(str(error))
+        return None
+
+
+def _motion(bag: Optional[Bag], request: Request) -> Motion:
+    if request.vehicle is not None and is_table(request.vehicle):
+        return motion_of_csv(request.vehicle, request.motion)
+    if bag is not None:
+        return motion_of_bag(bag, request.motion, request.truth)
+    if request.motion.declared is not None:
+        return declared_motion(FrameTree(), request.motion)
+    raise RecordingError(
+        "the log of a sonar does not say where the vehicle was: give a bag or a table with --vehicle, or --standing, "
+        "or --unknown-motion"
+    )
+
+
+def _truth(bags: List[Bag], request: Request) -> Optional[PoseTrack]:
+    topic = request.truth
+    if topic is None:
+        return None
+    holder = next((bag for bag in bags if topic in bag.topics), None)
+    if holder is None:
+        raise missing_topic(topic, bags)
+    try:
+        track = pose_track(message for _, message in holder.messages(topic))
+    except AttributeError:
+        kind = holder.topics[topic].type
+        raise RecordingError(f"{topic} holds {kind}, must be Odometry or PoseStamped") from None
+    if not len(track):
+        raise RecordingError(f"{topic} holds no pose")
+    return track.turned_up() if request.motion.z_is_down else track
+
+
+def _check_common_time(path: Path, recorded: RecordedBeams, tree: FrameTree, request: Request) -> None:
+    """Raise RecordingError where no beam was taken while the motion is known."""
+    names, stamps = request.motion, recorded.stamps_ns
+    track = tree.tracks.get((names.odom_frame, names.base_frame))
+    if track is None or track.covers(stamps).any():
+        return
+    (first, last), (start, end) = stamps[[0, -1]] * 1e-9, track.stamps_ns[[0, -1]] * 1e-9
+    raise RecordingError(
+        f"{path}: beams from {first:.3f} to {last:.3f} s, motion from {start:.3f} to {end:.3f} s: no time in common; "
+        f"--offset SECONDS is added to the stamps of the beams; if both were started together, {start - first:.3f}"
+    )
+
+
+def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
+    """Add what says which topics, frames and files of a recording are read."""
+    parser.add_argument("--beams", metavar="TOPIC", help="topic of the beams (default: the likeliest)")
+    parser.add_argument("--truth", metavar="TOPIC", help="topic of the true position, from which errors are measured")
+    parser.add_argument(
+        "--odometry-topic", metavar="TOPIC", help="poses to use instead of tf (default: the likeliest, if tf has none)"
+    )
+    known = parser.add_mutually_exclusive_group()
+    known.add_argument(
+        "--standing", dest="declared", action="store_const", const=MotionSource.STANDING,
+        help="the vehicle did not move",
+    )  # fmt: skip
+    known.add_argument(
+        "--unknown-motion", dest="declared", action="store_const", const=MotionSource.UNKNOWN,
+        help="the vehicle moved, and nothing tells how: no position, no heading",
+    )  # fmt: skip
+    parser.add_argument(
+        "--vehicle", type=Path, metavar="FILE", help="bag or table with the motion, if the recording has none"
+    )
+    parser.add_argument(
+        "--offset", type=float, default=0.0, metavar="SECONDS",
+        help="added to the stamps of the beams, whose clock is not that of the motion",
+    )  # fmt: skip
+    parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
+    parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: %(default)s)")
+    parser.add_argument("--ned", action="store_true", help="the odometry counts x north, y east, z down")
+
+
+def request_of(options: argparse.Namespace, parameters: ReadingParameters) -> Request:
+    """Return what the arguments ask for."""
+    motion = MotionNames(options.odom_frame, options.base_frame, options.odometry_topic, options.declared, options.ned)
+    return Request(options.beams, options.truth, motion, options.vehicle, options.offset, parameters)

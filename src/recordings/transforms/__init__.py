@@ -1,1 +1,0 @@
-"""Where frames are in each other at any time, without tf2."""

@@ -1,1 +1,0 @@
-"""What a recording tells of its vehicle's motion."""
