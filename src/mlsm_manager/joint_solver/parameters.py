@@ -108,7 +108,7 @@ class SolverWindow(ParameterSet):
 class MultiViewParameters:
     """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters.
 
-    kernel: what compares points with surfaces.
+    kernel: what compares ways of the vehicle.
     """
 
     odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))

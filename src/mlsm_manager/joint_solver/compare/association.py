@@ -1,10 +1,11 @@
-"""Which points are compared with which: each with its nearest neighbour in every block of scans."""
+"""Comparisons of points with their nearest neighbours, and how much each of them counts."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, Protocol, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.compare.neighbours import Neighbours
+from mlsm_manager.joint_solver.compiled.compiled_weights import weighed_pairs
 from mlsm_manager.joint_solver.measured.surface_points import ramp
 from mlsm_manager.joint_solver.parameters import SurfaceMatching
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
@@ -29,47 +30,21 @@ class Pairs:
         return replace(self, importance=self.importance * factors[self.neighbours])
 
 
-class Neighbours(Protocol):
-    """Finds neighbours in a set of targets."""
-
-    def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
-        """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
-
-        For each source and each block of scans these are the nearest targets of other scans, and their shares add up
-        to 1. Sources and targets are those of the beginning, perhaps moved.
-        """
-
-
-Weighing = Callable[[Tuple[np.ndarray, ...], PlacedPoints, PlacedPoints, float, SurfaceMatching], Pairs]
-"""Takes what Neighbours.within found, sources, targets, the cut [m] and the matching; returns the pairs that count."""
-
-
-def weighed(
-    found: Tuple[np.ndarray, ...], sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
-) -> Pairs:
-    """Return the pairs that count; see Weighing."""
-    rows, neighbours, distance, shares = found
-    cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals[neighbours])
-    importance = shares * faded(distance, cosine, cut, matching)
-    importance = importance * sources.qualities[rows] * targets.qualities[neighbours]
-    kept = importance > 0.0
-    return Pairs(rows[kept], neighbours[kept], importance[kept])
-
-
 def pairs_of(
-    lists: Neighbours,
-    sources: PlacedPoints,
-    targets: PlacedPoints,
-    cut: float,
-    matching: SurfaceMatching,
-    weighing: Weighing = weighed,
+    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
 ) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
+    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets` that count.
 
     Points of one scan are never compared with each other, nor surfaces that face different ways. In its own block, a
     point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
     """
-    return weighing(lists.within(sources, targets, cut), sources, targets, cut, matching)
+    normals, other_normals = (np.ascontiguousarray(points.normals) for points in (sources, targets))
+    return Pairs(
+        *weighed_pairs(
+            *lists.within(sources, targets, cut), normals, sources.qualities, other_normals, targets.qualities,
+            cut, FADING * cut, matching.min_cosine, matching.min_cosine + COSINE_FADING,
+        )
+    )  # fmt: skip
 
 
 def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, matching: SurfaceMatching) -> np.ndarray:

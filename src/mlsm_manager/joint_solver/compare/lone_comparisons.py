@@ -6,8 +6,8 @@ from typing import Iterator, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.compare.association import Pairs
-from mlsm_manager.joint_solver.compare.comparisons import add_comparisons, summed
-from mlsm_manager.joint_solver.compare.neighbours import NeighbourLists
+from mlsm_manager.joint_solver.compare.comparisons import add_comparisons
+from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.surface_points import ramp
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
@@ -33,7 +33,7 @@ class LoneComparisons:
         self._rows = np.concatenate([np.empty(0, dtype=np.int64), *rows])
         self._importance = matching.lone_quality * np.repeat(importance, [len(own) for own in rows])
         self._matching = replace(matching, normal_deviation=0.0)
-        self._lists: Optional[NeighbourLists] = None
+        self._lists: Optional[Neighbours] = None
 
     def add(self, equations: NormalEquations, layout: Layout, state: State, cut: float) -> int:
         """Add the comparisons of points of free scans; return how many there are."""
@@ -42,17 +42,17 @@ class LoneComparisons:
         points = place_lone(self._log, self._odometry, state, self._rows)
         sources = points.selected(points.scans >= layout.first)
         if self._lists is None:
-            self._lists = NeighbourLists(points, self._matching.block_scans)
+            self._lists = Neighbours(points, self._matching.block_scans)
         near = _NEAR_IN_TIME * self._matching.scan_parts
         pairs, count = lone_pairs(self._lists, sources, points, cut, near), 0
         pairs = replace(pairs, importance=pairs.importance * self._importance[pairs.neighbours])
         for each, heard, met in along_and_across(pairs, sources, points):
-            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut, summed)
+            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut)
         return count
 
 
 def lone_pairs(
-    lists: NeighbourLists, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
+    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
 

@@ -7,7 +7,8 @@ them, no compiled loop of another file does: numba's cache would not notice a ch
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from node_support.numba_cache import compiled
 
 _CELLS_PER_REACH = 2  # small cells leave less to compare for each source, but more to gather
 _MOST_CELLS = 512  # on each side of the grid: bounds its memory, however far apart points lie
@@ -32,7 +33,7 @@ class Cells(NamedTuple):
     source_order: np.ndarray
 
 
-@njit(cache=True)
+@compiled()
 def _sorted(places, low_x, low_y, rows, columns, side):
     """Return where the points of each cell begin, and the points in this order; those in no cell are left out."""
     cell = np.empty(len(places), np.int64)
@@ -53,9 +54,8 @@ def _sorted(places, low_x, low_y, rows, columns, side):
     return starts[:-1].copy(), order
 
 
-@njit(
+@compiled(
     "Tuple((f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1]))(f8[:,::1], f8[:,::1], f8)",
-    cache=True,
     error_model="numpy",
 )
 def sorted_into_cells(sources, targets, reach):

@@ -5,7 +5,8 @@ ImportError without numba.
 """
 
 import numpy as np
-from numba import njit
+
+from node_support.numba_cache import compiled
 
 TIME, NODE_X, NODE_Y, NODE_YAW, REFERENCE_X, REFERENCE_Y, GAIN_X, GAIN_Y = range(8)
 """Columns of the nodes: NodePath's time, place, yaw, reference path and gain."""
@@ -16,7 +17,7 @@ PLACED_COLUMNS = 11
 """Of a placed point: place, arm, normal (x and y each), derivatives by the run (2 x 2), and share."""
 
 
-@njit(cache=True)
+@compiled()
 def _knot_before(time, knots, guess):
     """Return the last of the knots (k, 4) not after `time`, but for the last of all; the search begins at a guess."""
     while guess < len(knots) - 2 and knots[guess + 1, KNOT_TIME] <= time:
@@ -26,7 +27,7 @@ def _knot_before(time, knots, guess):
     return guess
 
 
-@njit(cache=True)
+@compiled()
 def _at(time, knot, knots, column):
     """Return a column linearly between two knots; the nearest beyond the first and the last one."""
     before, after = knots[knot], knots[min(knot + 1, len(knots) - 1)]
@@ -38,7 +39,7 @@ def _at(time, knot, knots, column):
     return slope * (time - before[KNOT_TIME]) + before[column]
 
 
-@njit(cache=True)
+@compiled()
 def _pose(time, knot, knots, node, next_node):
     """Return x, y and heading in map, x and y of the bow, and the share of the time between two nodes."""
     share = (time - node[TIME]) / (next_node[TIME] - node[TIME])
@@ -56,9 +57,8 @@ def _pose(time, knot, knots, node, next_node):
     return place_x, place_y, _at(time, knot, knots, KNOT_YAW) + yaw, bow_x, bow_y, share
 
 
-@njit(
+@compiled(
     "f8[:,::1](f8[::1], i8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8, f8[:,::1], f8[:,::1], f8)",
-    cache=True,
     error_model="numpy",
 )
 def placed_rows(times, legs, ranges, bearings, normals, sonar_in_base, range_scale, nodes, knots, half_window):

@@ -9,7 +9,8 @@ ImportError without numba.
 from collections import namedtuple
 
 import numpy as np
-from numba import njit
+
+from node_support.numba_cache import compiled
 
 CANDIDATES = 6
 """Nearest points of a block that may share a comparison."""
@@ -33,7 +34,7 @@ _Candidates = namedtuple("_Candidates", "distance row")
 _Found = namedtuple("_Found", "neighbours distances shares")
 
 
-@njit(cache=True)
+@compiled()
 def _kept(candidates, held, distance, row):
     """Put a point among the nearest ones, of which `held` are known; return how many are known then."""
     distances, rows, place = candidates.distance, candidates.row, held
@@ -48,7 +49,7 @@ def _kept(candidates, held, distance, row):
     return min(held + 1, CANDIDATES)
 
 
-@njit(cache=True)
+@compiled()
 def _write_shares(candidates, held, tie, found, made):
     """Share a comparison among the candidates that are hardly farther than the nearest; return how many are written."""
     distances, total = candidates.distance, 0.0
@@ -63,7 +64,7 @@ def _write_shares(candidates, held, tie, found, made):
     return made
 
 
-@njit(cache=True)
+@compiled()
 def _longer(found, least):
     """Return arrays that begin with those of `found` and are at least `least` long."""
     length = max(least, 2 * len(found.shares))
@@ -74,7 +75,7 @@ def _longer(found, least):
     return longer
 
 
-@njit(cache=True)
+@compiled()
 def _look_around(row, column, among_sources, grid, starts, targets, around):
     """Write down what lies around a cell; return how many points that are.
 
@@ -100,7 +101,7 @@ def _look_around(row, column, among_sources, grid, starts, targets, around):
     return count
 
 
-@njit(cache=True)
+@compiled()
 def _write_bounds(scans, reach, radius, tie, around):
     """Write for each block how far from the middle of a cell neighbours of its sources, of `scans` (m,), may lie.
 
@@ -115,7 +116,7 @@ def _write_bounds(scans, reach, radius, tie, around):
         around.bound[block] = min(np.sqrt(square) + 2.0 * radius + tie + _SLACK, reach + radius) ** 2
 
 
-@njit(cache=True)
+@compiled()
 def _take_near(count, around, targets, near):
     """Write down, block by block, those of `count` points around a cell that are within the bounds.
 
@@ -140,7 +141,7 @@ def _take_near(count, around, targets, near):
     return blocks
 
 
-@njit(cache=True)
+@compiled()
 def _measure(x, y, scan, count, near):
     """Write the squared distances of the first `count` places from x, y; what the same scan heard is never near."""
     for place in range(count):
@@ -148,7 +149,7 @@ def _measure(x, y, scan, count, near):
         near.square[place] = across * across + along * along if near.scan[place] != scan else _NEVER
 
 
-@njit(cache=True)
+@compiled()
 def _nearest_place(start, end, near):
     """Return where from `start` to before `end` the nearest point stands."""
     least, nearest = _NEVER, start
@@ -159,7 +160,7 @@ def _nearest_place(start, end, near):
     return nearest
 
 
-@njit(cache=True)
+@compiled()
 def _write_nearest(blocks, cut, tie, near, candidates, found, made):
     """Write the points of each block nearest to one source after the `made` ones; return how many are written then."""
     for number in range(blocks):
@@ -183,7 +184,7 @@ def _write_nearest(blocks, cut, tie, near, candidates, found, made):
     return made
 
 
-@njit(cache=True)
+@compiled()
 def _in_order(starts, ends, found):
     """Return rows of sources, rows of their neighbours, distances and shares, source by source.
 
@@ -201,7 +202,7 @@ def _in_order(starts, ends, found):
     return rows, neighbours, distances, shares
 
 
-@njit(cache=True)
+@compiled()
 def _room(points, blocks):
     """Return room for what lies around a cell, and for what is near its sources."""
     around = _Around(
@@ -215,10 +216,9 @@ def _room(points, blocks):
     return around, near
 
 
-@njit(
+@compiled(
     "Tuple((i8[::1], i8[::1], f8[::1], f8[::1]))(f8[:,::1], i8[::1], f8[:,::1], i8[::1], i8[::1], i8, f8, f8,"
     "f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1])",
-    cache=True,
     error_model="numpy",
 )
 def shared_neighbours(

@@ -5,7 +5,8 @@ rows as `compiled_comparisons` packs them. Raises ImportError without numba.
 """
 
 import numpy as np
-from numba import njit
+
+from node_support.numba_cache import compiled
 
 X, Y, ARM_X, ARM_Y, NORMAL_X, NORMAL_Y, SLANT, SHARE, BY_SCALE_X, BY_DELAY_X, BY_SCALE_Y, BY_DELAY_Y = range(12)
 """Columns of a packed point."""
@@ -14,7 +15,7 @@ PAIR_COLUMNS = 14
 """Of the poses of a source's two nodes, of those of the target's two, and of the run's unknowns."""
 
 
-@njit(cache=True)
+@compiled()
 def _groups_of(rows, neighbours, source_scans, target_scans):
     """Return the group of each comparison (m,), and the scans of the source and of the target of each group, (g,)."""
     lowest = target_scans.min() if len(target_scans) else 0
@@ -36,7 +37,7 @@ def _groups_of(rows, neighbours, source_scans, target_scans):
     return group_of, scans[:groups].copy(), other_scans[:groups].copy()
 
 
-@njit(cache=True)
+@compiled()
 def _grouped(group_of, groups):
     """Return the order (m,) in which those of one group follow each other, and where each group begins (groups + 1,).
 
@@ -53,7 +54,7 @@ def _grouped(group_of, groups):
     return order, starts[:-1]
 
 
-@njit(cache=True)
+@compiled()
 def _write_slopes(source, target, slopes):
     """Write the derivatives (c,) of a comparison's residual; return that."""
     x, y = target[NORMAL_X], target[NORMAL_Y]
@@ -71,7 +72,7 @@ def _write_slopes(source, target, slopes):
     return residual
 
 
-@njit(cache=True)
+@compiled()
 def _write_sums(slopes, residuals, weights, information, gradient):
     """Write the information (c, c) and the gradient (c,) of comparisons with slopes (n, c).
 
@@ -102,10 +103,9 @@ def _write_sums(slopes, residuals, weights, information, gradient):
         information[row, 7:14] = s7, s8, s9, s10, s11, s12, s13
 
 
-@njit(
+@compiled(
     "Tuple((i8[::1], i8[::1], f8[:,:,::1], f8[:,::1]))"
     "(i8[::1], i8[::1], f8[::1], f8[:,::1], i8[::1], f8[:,::1], i8[::1], f8, f8, f8, f8)",
-    cache=True,
     error_model="numpy",
 )
 def summed_comparisons(
@@ -136,7 +136,7 @@ def summed_comparisons(
     return scans, other_scans, information, gradient
 
 
-@njit("void(f8[:,::1], i8[:,::1], f8[:,:,::1])", cache=True)
+@compiled("void(f8[:,::1], i8[:,::1], f8[:,:,::1])")
 def scattered_blocks(matrix, columns, blocks):
     """Add blocks (m, c, c) to a matrix (n, n) in their columns (m, c)."""
     for number in range(len(columns)):

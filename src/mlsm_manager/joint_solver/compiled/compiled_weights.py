@@ -5,19 +5,19 @@ ImportError without numba.
 """
 
 import numpy as np
-from numba import njit
+
+from node_support.numba_cache import compiled
 
 
-@njit(cache=True)
+@compiled()
 def _ramp(value, zero, one):
     """Return 0 for a value at `zero` and beyond, 1 at `one` and beyond, and linearly between."""
     return min(max((value - zero) / (one - zero), 0.0), 1.0)
 
 
-@njit(
+@compiled(
     "Tuple((i8[::1], i8[::1], f8[::1]))"
     "(i8[::1], i8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8, f8, f8, f8)",
-    cache=True,
     error_model="numpy",
 )
 def weighed_pairs(

@@ -1,7 +1,5 @@
 """The vehicle's path at any time: as it was known then, or as it is known from the whole run."""
 
-from typing import Tuple
-
 import numpy as np
 
 from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
@@ -34,24 +32,6 @@ class NodePath:
         parts = [(one.real, one.imag) if np.iscomplexobj(one) else (one,) for one in columns]
         return np.column_stack([part for pair in parts for part in pair])
 
-    def poses(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
-        """Return T_map_base (m, 3) at `times` (m,) [s] between nodes `legs` (m,) and the next ones, or about there."""
-        return self._poses_of(self._timeline.motion(times), legs)
-
-    def poses_and_bows(self, times: np.ndarray, legs: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return `poses`, and how far (m, 2) [m] in map these lie beside the straight line from node to node."""
-        poses, bow = self._with_bow(self._timeline.motion(times), legs)
-        return poses, np.column_stack([bow.real, bow.imag])
-
-    def velocities(self, times: np.ndarray, legs: np.ndarray, half_window: float) -> np.ndarray:
-        """Return the mean velocities (m, 3) in map from `half_window` [s] before `times` (m,) to as long after."""
-        before, after = (self.poses(times + shift, legs) for shift in (-half_window, half_window))
-        return (after - before) / (2.0 * half_window)
-
-    def shares(self, times: np.ndarray, legs: np.ndarray) -> np.ndarray:
-        """Return where `times` (m,) lie: 0 at nodes `legs` (m,), 1 at the next ones."""
-        return (times - self._times[legs]) / (self._times[legs + 1] - self._times[legs])
-
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at any `times` (m,) [s]; before the first node and after the last as it goes on."""
         first, last = self._times[0], self._times[-1]
@@ -67,17 +47,14 @@ class NodePath:
         return poses + np.column_stack([beyond.real, beyond.imag, turn])
 
     def _poses_of(self, motion: Motion, legs: np.ndarray) -> np.ndarray:
-        return self._with_bow(motion, legs)[0]
-
-    def _with_bow(self, motion: Motion, legs: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the poses (m, 3), and how far beside the straight line x + i y (m,) they lie."""
-        share = self.shares(motion.times, legs)
+        """Return the poses (m, 3) at times between nodes `legs` (m,) and the next ones."""
+        share = (motion.times - self._times[legs]) / (self._times[legs + 1] - self._times[legs])
         yaw = (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
         from_node = self._odometry.reference(motion) - self._reference[legs]
         bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
         bow = product(product(self._gain[legs], turned(yaw)), bow)
         place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1] + bow
-        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw]), bow
+        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw])
 
 
 def solved_path(

@@ -1,19 +1,19 @@
 """Where the points of scans lie in the map, given the unknowns, and how these move them."""
 
 from dataclasses import dataclass, fields, replace
-from typing import Callable, Union
+from typing import Union
 
 import numpy as np
 
+from mlsm_manager.joint_solver.compiled.compiled_places import placed_rows
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, YAW, State
-from node_support.geometry import rotated
 
-HALF_SECOND = 0.5
-"""s: the velocity of a point is averaged over one second, longer than the odometry's period."""
+_HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
 
 
 @dataclass(frozen=True)
@@ -53,37 +53,35 @@ class PlacedPoints:
         return PlacedPoints(*(np.concatenate([getattr(self, name), getattr(others, name)]) for name in names))
 
 
-Placing = Callable[[RunLog, OdometryModel, State, SurfacePoints, np.ndarray], PlacedPoints]
-"""Takes the log, the odometry, the state, points and the scans (n,) that heard them."""
-
-
 def placed(
     log: RunLog, odometry: OdometryModel, state: State, points: SurfacePoints, scans: np.ndarray
 ) -> PlacedPoints:
-    """Return points in the map; see Placing. NodePath says where the vehicle was between two nodes."""
+    """Return points that `scans` (n,) heard in the map. NodePath says where the vehicle was between two nodes."""
+    if not len(points):
+        return _NO_POINTS
     times = points.times + state.run[DELAY]
     nodes = np.unique(np.concatenate([scans, scans + 1]))
-    legs = np.searchsorted(nodes, scans)
     path = NodePath(odometry, log.odometry, log.node_times[nodes], state.nodes[nodes])
-    poses, bows = path.poses_and_bows(times, legs)
-    sight = _unit(points.bearings + poses[:, YAW]) * points.ranges[:, np.newaxis]
-    mounting = rotated(np.broadcast_to(log.sonar_in_base, sight.shape), poses[:, YAW])
-    arms = mounting + (1.0 + state.run[RANGE_SCALE]) * sight
-    velocity = path.velocities(times, legs, HALF_SECOND)
-    by_delay = velocity[:, :2] + velocity[:, 2:] * np.column_stack([-arms[:, 1], arms[:, 0]])
+    known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)
+    rows = placed_rows(
+        times, np.searchsorted(nodes, scans), points.ranges, points.bearings, points.normals, log.sonar_in_base,
+        float(state.run[RANGE_SCALE]), path.table, _knots(odometry, known), _HALF_SECOND,
+    )  # fmt: skip
     return PlacedPoints(
-        scans=scans, places=poses[:, :2] + arms, arms=arms + bows,
-        normals=rotated(points.normals, poses[:, YAW]),
-        slants=points.slants, qualities=points.qualities, shares=path.shares(times, legs),
-        by_run=np.stack([sight, by_delay], axis=2),
+        scans=scans, places=rows[:, 0:2], arms=rows[:, 2:4], normals=rows[:, 4:6], slants=points.slants,
+        qualities=points.qualities, shares=rows[:, 10], by_run=rows[:, 6:10].reshape(-1, 2, 2),
     )  # fmt: skip
 
 
-def place(
-    log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray, placing: Placing = placed
-) -> PlacedPoints:
+def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
+    """Return poses of the odometry (k, 4) as `compiled_places` takes them: a reference path is even between them."""
+    reference = odometry.reference(known)
+    return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])
+
+
+def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
     """Return the surface points in `rows` (n,) int of the log."""
-    return placing(log, odometry, state, log.points(rows), log.scans(rows))
+    return placed(log, odometry, state, log.points(rows), log.scans(rows))
 
 
 def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
@@ -91,5 +89,7 @@ def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndar
     return placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
 
 
-def _unit(angles: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.cos(angles), np.sin(angles)])
+_NO_POINTS = PlacedPoints(
+    scans=np.empty(0, dtype=np.int64), places=np.empty((0, 2)), arms=np.empty((0, 2)), normals=np.empty((0, 2)),
+    slants=np.empty(0), qualities=np.empty(0), shares=np.empty(0), by_run=np.empty((0, 2, 2)),
+)  # fmt: skip

@@ -5,11 +5,11 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compare.association import Neighbours, Pairs, pairs_of
-from mlsm_manager.joint_solver.compare.comparing import Comparing
+from mlsm_manager.joint_solver.compare.association import Pairs, pairs_of
 from mlsm_manager.joint_solver.compare.comparisons import add_comparisons, support
 from mlsm_manager.joint_solver.compare.islands import Islands
 from mlsm_manager.joint_solver.compare.lone_comparisons import LoneComparisons
+from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
 from mlsm_manager.joint_solver.judge.misfit import misfit_variances
 from mlsm_manager.joint_solver.measured.run_log import RunLog
@@ -164,7 +164,6 @@ class _Batch:
         self._loops, self._start, self._told = list(loops), state.copy(), told
         self._solution = None
         self._move = np.zeros(self._layout.size)
-        self._comparing = Comparing.by(parameters.kernel)
         self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
         self._lone = LoneComparisons(log, odometry, parameters.matching, scans, np.ones(len(scans)))
@@ -182,7 +181,7 @@ class _Batch:
         equations, matching = self._expected(), self._parameters.matching
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self._met()
-        add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut, self._comparing.summed)
+        add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
         self._lone.add(equations, self._layout, self.state, matching.cut)
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
@@ -199,7 +198,7 @@ class _Batch:
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
-        equations = NormalEquations(self._layout.size, scattering=self._comparing.scattered)
+        equations = NormalEquations(self._layout.size)
         odometry, sonar = self._odometry, self._parameters.sonar
         add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
         add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
@@ -213,11 +212,11 @@ class _Batch:
         """Return all points and their comparisons."""
         matching = self._parameters.matching
         rows = self._log.rows(0, self._layout.last)
-        points = place(self._log, self._odometry, self.state, rows, self._comparing.placed)
+        points = place(self._log, self._odometry, self.state, rows)
         points = WeakDirections.of([points], matching).without(points, points.scans)
         if self._lists is None:
-            self._lists = self._comparing.neighbours(points, matching.block_scans)
-        pairs = pairs_of(self._lists, points, points, matching.cut, matching, self._comparing.weighed)
+            self._lists = Neighbours(points, matching.block_scans)
+        pairs = pairs_of(self._lists, points, points, matching.cut, matching)
         return points, self._islands.within(pairs, points, points)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:

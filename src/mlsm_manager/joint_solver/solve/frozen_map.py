@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
-from mlsm_manager.joint_solver.placing.placement import PlacedPoints, Placing, place, placed
+from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, State
 
 _AGE_DISTANCE = 5.0  # m by which the newest block counts as farther than the oldest: the oldest drifted least
@@ -41,7 +41,6 @@ def nearest_blocks(
     count: int,
     place_now: np.ndarray,
     parameters: MultiViewParameters,
-    placing: Placing = placed,
 ) -> FrozenMap:
     """Return the blocks nearest to `place_now` (2,) among the first `count` blocks of the run."""
     scans = parameters.matching.block_scans
@@ -53,7 +52,7 @@ def nearest_blocks(
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
     )
-    points = place(log, odometry, state, rows, placing)
+    points = place(log, odometry, state, rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
     return FrozenMap(points, per_point, numbers, importance[numbers], state.run.copy())
 

@@ -4,12 +4,12 @@ from typing import Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compare.association import Neighbours, Pairs, pairs_of
-from mlsm_manager.joint_solver.compare.comparing import Comparing
+from mlsm_manager.joint_solver.compare.association import Pairs, pairs_of
 from mlsm_manager.joint_solver.compare.comparisons import add_comparisons
 from mlsm_manager.joint_solver.compare.islands import Islands
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.compare.lone_comparisons import LoneComparisons
+from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
 from mlsm_manager.joint_solver.judge.agreement import agreement, surfaces_met
 from mlsm_manager.joint_solver.measured.run_log import RunLog
@@ -45,15 +45,12 @@ class LiveWindow:
     ) -> None:  # fmt: skip
         self._islands = islands
         self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
-        self._comparing = Comparing.by(parameters.kernel)
         last = log.scan_count
         first = max(0, last - parameters.window.free_nodes)
         self._scans_per_block = parameters.matching.block_scans
         self._recent = first // self._scans_per_block * self._scans_per_block
         around = log.node_poses(last)[:2] + state.nodes[last, :2]
-        self._frozen = nearest_blocks(
-            log, odometry, state, first // self._scans_per_block, around, parameters, self._comparing.placed
-        )
+        self._frozen = nearest_blocks(log, odometry, state, first // self._scans_per_block, around, parameters)
         self._layout = Layout(first, last, odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._anchor = estimates[first - 1] if first else None
@@ -91,7 +88,7 @@ class LiveWindow:
 
     def step(self, cut: float) -> None:
         """Take one Gauss-Newton step with points up to `cut` [m] apart."""
-        equations = NormalEquations(self._layout.size, len(self._held_covariance), self._comparing.scattered)
+        equations = NormalEquations(self._layout.size, len(self._held_covariance))
         self._add_beliefs(equations)
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)
@@ -134,7 +131,7 @@ class LiveWindow:
         """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
         matching = self._parameters.matching
         rows = self._log.rows(self._recent, self._layout.last)
-        recent = place(self._log, self._odometry, self._state, rows, self._comparing.placed)
+        recent = place(self._log, self._odometry, self._state, rows)
         frozen = self._frozen.moved_by_run(self._state.run)
         weak = WeakDirections.of((frozen, recent), matching)
         frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
@@ -149,8 +146,7 @@ class LiveWindow:
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])
         self._met = tuple(met)
-        by = self._comparing.summed
-        return sum(add_comparisons(equations, self._layout, *some, matching, cut, by) for some in summed)
+        return sum(add_comparisons(equations, self._layout, *some, matching, cut) for some in summed)
 
     def _compared(
         self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
@@ -158,9 +154,9 @@ class LiveWindow:
         """Compare `sources` with frozen and recent points, whose neighbours are looked up once for all steps."""
         matching = self._parameters.matching
         if self._lists is None:
-            self._lists = tuple(self._comparing.neighbours(targets, matching.block_scans) for targets in surfaces)
+            self._lists = tuple(Neighbours(targets, matching.block_scans) for targets in surfaces)
         for lists, targets in zip(self._lists, surfaces):
-            pairs = pairs_of(lists, sources, targets, cut, matching, self._comparing.weighed)
+            pairs = pairs_of(lists, sources, targets, cut, matching)
             yield self._islands.within(pairs, sources, targets)
 
     def _move(self, step: np.ndarray) -> None:

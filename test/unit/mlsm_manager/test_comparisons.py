@@ -1,0 +1,199 @@
+"""Compiled loops of the joint solver find what a few lines of numpy find."""
+
+from dataclasses import fields, replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from made_harbour import SONAR_IN_BASE, logged, tour
+
+from mlsm_manager.joint_solver.compare.association import COSINE_FADING, FADING, Pairs
+from mlsm_manager.joint_solver.compare.comparisons import summed
+from mlsm_manager.joint_solver.compare.neighbours import Neighbours
+from mlsm_manager.joint_solver.compiled.compiled_sums import scattered_blocks
+from mlsm_manager.joint_solver.compiled.compiled_weights import weighed_pairs
+from mlsm_manager.joint_solver.measured.surface_points import ramp
+from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
+from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
+from mlsm_manager.joint_solver.motion.odometry_motion import as_complex
+from mlsm_manager.joint_solver.motion.odometry_parameters import (
+    DvlOdometry,
+    HeadingOdometry,
+    ThrusterOdometry,
+    UnaidedOdometry,
+)
+from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
+from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
+from mlsm_manager.joint_solver.parameters import MultiViewParameters, SurfaceMatching
+from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import RANGE_SCALE, State
+from node_support.geometry import rotated
+
+SAME = 1e-9
+STEP = 1e-6
+MODELS = [
+    DvlFactors(DvlOdometry()), ThrusterFactors(ThrusterOdometry()), HeadingFactors(HeadingOdometry()),
+    UnaidedFactors(UnaidedOdometry()),
+]  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def log():
+    return logged(tour(3, direction=0.1, delay=0.3).scans)
+
+
+def some_state(log, odometry=MODELS[0], delay=0.3):
+    nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, odometry.width))
+    return State(nodes, np.array([0.01, delay]))
+
+
+def some_points(rng, count, scans):
+    return PlacedPoints(
+        scans=np.sort(rng.choice(scans, count)), places=rng.normal(0.0, 3.0, (count, 2)),
+        arms=rng.normal(0.0, 9.0, (count, 2)), normals=rng.normal(0.0, 1.0, (count, 2)),
+        slants=rng.uniform(0.0, 5.0, count), qualities=np.ones(count), shares=rng.uniform(0.0, 1.0, count),
+        by_run=rng.normal(0.0, 5.0, (count, 2, 2)),
+    )  # fmt: skip
+
+
+def linearised(pairs, sources, targets):
+    """Return residuals (m,) along the targets' normals per unit of range scale, and their derivatives (m, 14)."""
+    i, j = pairs.rows, pairs.neighbours
+    normals = targets.normals[j]
+    residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], normals)
+    late, later = sources.shares[i, np.newaxis], targets.shares[j, np.newaxis]
+    by_source, by_target = by_pose(sources.arms[i], normals), -by_pose(targets.arms[j], normals)
+    by_run = np.einsum("nar,na->nr", sources.by_run[i] - targets.by_run[j], normals)
+    by_run[:, RANGE_SCALE] -= residual
+    parts = [(1.0 - late) * by_source, late * by_source, (1.0 - later) * by_target, later * by_target, by_run]
+    return residual, np.concatenate(parts, axis=1)
+
+
+def by_pose(arms, normals):
+    return np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
+
+
+def weights(residual, pairs, sources, targets, matching, cut):
+    slants = sources.slants[pairs.rows] ** 2 + targets.slants[pairs.neighbours] ** 2
+    variance = matching.range_deviation**2 + matching.beam_half_width**2 * slants
+    widening = max(1.0, cut / matching.cut)
+    return matching.weight / variance / (1.0 + residual**2 / variance / widening**2) ** 2 * pairs.importance
+
+
+@given(st.integers(0, 10**6), st.integers(1, 200), st.sampled_from([[-2], [0], [3, 4, 9], list(range(40))]))
+@settings(max_examples=50)
+def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
+    rng, matching = np.random.RandomState(seed), SurfaceMatching()
+    sources, targets = some_points(rng, 30, list(range(50, 60))), some_points(rng, 40, scans)
+    pairs = Pairs(np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count), rng.uniform(0.1, 1.0, count))
+    residual, jacobian = linearised(pairs, sources, targets)
+    for cut in (matching.cut, matching.wide_cut):
+        weight = weights(residual, pairs, sources, targets, matching, cut)
+        found = list(zip(*summed(pairs, sources, targets, matching, cut)))
+        for scan, other, information, gradient in found:
+            own = (sources.scans[pairs.rows] == scan) & (targets.scans[pairs.neighbours] == other)
+            weighted = jacobian[own] * weight[own, np.newaxis]
+            expected = weighted.T @ jacobian[own]
+            np.testing.assert_allclose(information, expected, rtol=SAME, atol=SAME * np.abs(expected).max())
+            expected = weighted.T @ residual[own]
+            np.testing.assert_allclose(gradient, expected, rtol=SAME, atol=SAME * np.abs(weighted).sum())
+        compared = set(zip(sources.scans[pairs.rows], targets.scans[pairs.neighbours]))
+        assert sorted((scan, other) for scan, other, _, _ in found) == sorted(compared)
+
+
+@pytest.mark.parametrize("column", range(3))
+def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
+    state, rows = some_state(log), log.rows(0, 3)
+    pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
+    before = place(log, MODELS[0], state, rows)
+    _, jacobian = linearised(pairs, before, before)
+    moved = state.copy()
+    moved.nodes[0, column] += STEP
+    after = place(log, MODELS[0], moved, rows)
+    moves = after.places[pairs.rows] - before.places[pairs.rows]
+    change = np.einsum("na,na->n", moves, before.normals[pairs.neighbours])
+    np.testing.assert_allclose(change / STEP, jacobian[:, column], atol=1e-4)
+
+
+def placed_by_numpy(log, odometry, state, rows):
+    """Return places, arms, normals and shares of points between two nodes each."""
+    points, scans = log.points(rows), log.scans(rows)
+    times = points.times + state.run[1]
+    at_nodes, motion = log.node_motion(np.arange(log.scan_count + 1)), log.odometry.motion(times)
+    share = (times - at_nodes.times[scans]) / np.diff(at_nodes.times)[scans]
+    yaw = (1.0 - share) * state.nodes[scans, 2] + share * state.nodes[scans + 1, 2]
+    reference, gain = odometry.reference(at_nodes), odometry.gain(state.nodes)
+    bow = odometry.reference(motion) - reference[scans] - share * np.diff(reference)[scans]
+    bow = (gain[:-1] + gain[1:])[scans] / 2.0 * np.exp(1j * yaw) * bow
+    nodes = as_complex(at_nodes.poses[:, :2] + state.nodes[:, :2])
+    middle = (1.0 - share) * nodes[scans] + share * nodes[scans + 1]
+    heading = motion.poses[:, 2] + yaw
+    sight = points.ranges * np.exp(1j * (points.bearings + heading))
+    arms = as_complex(log.sonar_in_base) * np.exp(1j * heading) + (1.0 + state.run[0]) * sight + bow
+    complex_ones = (np.column_stack([z.real, z.imag]) for z in (middle + arms, arms))
+    return (*complex_ones, rotated(points.normals, heading), share)
+
+
+@pytest.mark.parametrize("odometry", MODELS, ids=lambda model: type(model).__name__)
+@pytest.mark.parametrize("delay", [0.0, -1.7, 900.0])
+def test_points_lie_on_the_path_whatever_the_odometry_tells(log, odometry, delay):
+    state, rows = some_state(log, odometry, delay), log.rows(1, 3)
+    found = place(log, odometry, state, rows)
+    for name, expected in zip(("places", "arms", "normals", "shares"), placed_by_numpy(log, odometry, state, rows)):
+        close = SAME * np.abs(expected).max()
+        np.testing.assert_allclose(getattr(found, name), expected, rtol=SAME, atol=close, err_msg=name)
+
+
+def test_no_points_lie_nowhere(log):
+    nothing = place(log, MODELS[0], some_state(log), log.rows(0, 0))
+    assert [len(getattr(nothing, field.name)) for field in fields(nothing)] == [0] * len(fields(nothing))
+
+
+def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
+    T_base_sonar = np.eye(4)
+    T_base_sonar[:2, 3] = SONAR_IN_BASE
+    solvers = [LiveSolver(MultiViewParameters(), some) for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])]
+    for scan in tour(2).scans:
+        expected, found = (solver.add(scan) for solver in solvers)
+    np.testing.assert_array_equal(found.node, expected.node)
+
+
+@given(st.integers(0, 10**6), st.integers(0, 100))
+@settings(max_examples=30)
+def test_comparisons_fade_out_with_distance_and_angle(seed, count):
+    rng, matching = np.random.RandomState(seed), SurfaceMatching()
+    sources, targets = some_points(rng, 30, [5, 6]), some_points(rng, 40, [0, 1, 2])
+    rows, neighbours = np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count)
+    distance, shares = rng.uniform(0.0, 3.0, count), rng.uniform(0.1, 1.0, count)
+    cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals[neighbours])
+    limits = (matching.cut, FADING * matching.cut, matching.min_cosine, matching.min_cosine + COSINE_FADING)
+    expected = shares * ramp(distance, *limits[:2]) * ramp(cosine, *limits[2:])
+    expected = expected * sources.qualities[rows] * targets.qualities[neighbours]
+    found = weighed_pairs(
+        rows, neighbours, distance, shares, sources.normals, sources.qualities, targets.normals, targets.qualities,
+        *limits,
+    )  # fmt: skip
+    kept = expected > 0.0
+    np.testing.assert_array_equal(found[0], rows[kept])
+    np.testing.assert_array_equal(found[1], neighbours[kept])
+    np.testing.assert_allclose(found[2], expected[kept], rtol=SAME)
+
+
+@given(st.integers(0, 10**6), st.integers(0, 20))
+@settings(max_examples=30)
+def test_terms_are_added_in_their_columns_of_a_matrix(seed, count):
+    rng = np.random.RandomState(seed)
+    columns, terms = rng.randint(0, 7, (count, 3)), rng.normal(0.0, 1.0, (count, 3, 3))
+    expected, found = np.ones((7, 7)), np.ones((7, 7))
+    np.add.at(expected, (columns[:, :, np.newaxis], columns[:, np.newaxis]), terms)
+    scattered_blocks(found, columns, terms)
+    np.testing.assert_allclose(found, expected, atol=SAME)
+
+
+def test_points_without_a_finite_place_are_refused():
+    points = some_points(np.random.RandomState(0), 20, [0, 1])
+    lost = replace(points, places=points.places * np.where(np.arange(20) == 7, np.nan, 1.0)[:, np.newaxis])
+    with pytest.raises(ValueError, match="without a finite place"):
+        Neighbours(points, 5).within(lost, points, 2.0)
