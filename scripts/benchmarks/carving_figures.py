@@ -8,7 +8,7 @@ from typing import List
 import numpy as np
 
 from benchmarks.table import Row
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
@@ -27,10 +27,10 @@ def rows() -> List[Row]:
     folder = Path(os.environ.get("UMC_DATA", str(ROOT.parent / "shared/data")))
     if not (folder / NAME).is_file():
         return [("carving", "skipped", f"{NAME} is not in {folder}; set UMC_DATA")]
-    return [_row(folder / NAME, estimator) for estimator in Estimator]
+    return [_row(folder / NAME, estimator) for estimator in EstimatorName]
 
 
-def _row(bag: Path, estimator: Estimator) -> Row:
+def _row(bag: Path, estimator: EstimatorName) -> Row:
     options = map_bag_arguments([str(bag), "--out", "nowhere", "--set", f"estimator={estimator.value}"])
     recording = read_recording(bag, options.request)
     parameters = with_odometry(options.parameters, odometry_of(recording.track).kind, options.fixed)

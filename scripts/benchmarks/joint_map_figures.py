@@ -1,4 +1,4 @@
-"""What a scan costs the joint solver's mapper in a small map and in a large one, with and without carving."""
+"""What a scan costs the joint estimator in a small map and in a large one, with and without carving."""
 
 import time
 from io import BytesIO
@@ -8,10 +8,10 @@ import numpy as np
 from std_msgs.msg import Header
 
 from benchmarks.table import Row
-from mlsm_manager.localisation.joint_mapper import JointMapper
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.joint import Joint
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
@@ -70,7 +70,7 @@ def scan(number: int, rng: np.random.Generator) -> Scan:
 
 def costs(known: Blocks) -> Costs:
     """Measure scans in a map that has `known` blocks already, in turn with and without carving."""
-    carving, plain = _mapper_in(known, carve=True), _mapper_in(known, carve=False)
+    carving, plain = _estimator_in(known, carve=True), _estimator_in(known, carve=False)
     rng, markers, header = np.random.default_rng(4), BlockMarkers(), Header(frame_id="map")
     taken, without, published, sizes = [], [], [], []
     for number in range(_WARM_UP + _SCANS):
@@ -85,16 +85,16 @@ def costs(known: Blocks) -> Costs:
     )
 
 
-def _mapper_in(known: Blocks, carve: bool) -> JointMapper:
-    parameters = LocaliserParameters(estimator=Estimator.JOINT, carve=carve, match_resolution=RESOLUTION)
-    mapper = parameters.build_localiser().mapper
-    mapper.restore({Layer.SHOWN: known.take(slice(0, 1)), Layer.MATCHED: known}, {})
-    return mapper
+def _estimator_in(known: Blocks, carve: bool) -> Joint:
+    parameters = LocaliserParameters(estimator=EstimatorName.JOINT, carve=carve, match_resolution=RESOLUTION)
+    estimator = parameters.build_localiser().estimator
+    estimator.restore({Layer.SHOWN: known.take(slice(0, 1)), Layer.MATCHED: known}, {})
+    return estimator
 
 
-def _take(mapper: JointMapper, one: Scan) -> None:
-    mapper.take_echoes(one)
-    mapper.take_cloud(TimedPoints.of_scan(one))
+def _take(estimator: Joint, one: Scan) -> None:
+    estimator.add_scan(one)
+    estimator.add_cloud(Cloud.of_scan(one))
 
 
 def _cpu(call) -> float:
@@ -103,15 +103,14 @@ def _cpu(call) -> float:
     return time.process_time() - start
 
 
-def _published(mapper: JointMapper, markers: BlockMarkers, header: Header) -> int:
-    tiles, blocks = mapper.changed_tiles()
-    buffer = BytesIO()
-    markers.changed(blocks, map(tuple, tiles.tolist()), header).serialize(buffer)
+def _published(estimator: Joint, markers: BlockMarkers, header: Header) -> int:
+    tiles, buffer = estimator.shown.take_changed_tiles(), BytesIO()
+    markers.changed(estimator.shown.in_tiles(tiles), map(tuple, tiles.tolist()), header).serialize(buffer)
     return len(buffer.getvalue())
 
 
 def rows(sizes: Tuple[int, ...] = (10_000, 10_000_000)) -> List[Row]:
-    """Return the figures of the joint solver's mapper."""
+    """Return the figures of the joint estimator."""
     result = []
     for size in sizes:
         known = walls(size)

@@ -8,8 +8,8 @@ from scipy.stats import chi2
 
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind
 from benchmarks.table import Row
-from mlsm_manager.localisation.map_layers import MapSettings
-from mlsm_manager.localisation.mapper import Mapper
+from mlsm_manager.localisation.estimator import MapSettings
+from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -48,12 +48,12 @@ def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
     ]
 
 
-def session_mapper(name: MatcherName) -> Mapper:
-    """Return a mapper that matches with default parameters and knows how wrong the odometry may be."""
+def session_estimator(name: MatcherName) -> ScanByScan:
+    """Return an estimator that matches with default parameters and knows how wrong the odometry may be."""
     kind = MATCHERS[name]
-    mapper = Mapper(SETTINGS, ODOMETRY, kind.build(kind.parameters()))
-    mapper.matching = True
-    return mapper
+    estimator = ScanByScan(SETTINGS, ODOMETRY, kind.build(kind.parameters()))
+    estimator.matching = True
+    return estimator
 
 
 def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
@@ -61,10 +61,10 @@ def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
 
     Where a match was not accepted, the pose is the one that the matcher offered.
     """
-    mapper = session_mapper(name)
+    estimator = session_estimator(name)
     rows = []
     for scan in scans:
-        update = mapper.take_echoes(scan)
+        update = estimator.add_scan(scan)
         if update.result is None:
             continue
         difference = update.result.pose - true_path(np.array([scan.reference_time]))[0]

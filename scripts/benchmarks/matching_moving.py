@@ -7,7 +7,7 @@ import numpy as np
 from benchmarks.matching_moves import SETTINGS
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, still
 from benchmarks.table import Row
-from mlsm_manager.localisation.mapper import Mapper
+from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import MatchResult
@@ -50,19 +50,19 @@ def moving_scans(maker: ScanMaker, seed: int) -> List[Scan]:
     ]
 
 
-def moving_mapper(name: MatcherName) -> Mapper:
-    """Return a mapper that matches with default parameters and knows how wrong the odometry may be."""
+def moving_estimator(name: MatcherName) -> ScanByScan:
+    """Return an estimator that matches with default parameters and knows how wrong the odometry may be."""
     kind = MATCHERS[name]
-    mapper = Mapper(SETTINGS, _ERRORS, kind.build(kind.parameters()))
-    mapper.matching = True
-    return mapper
+    estimator = ScanByScan(SETTINGS, _ERRORS, kind.build(kind.parameters()))
+    estimator.matching = True
+    return estimator
 
 
 def matches(scans: List[Scan], name: MatcherName) -> List[MatchResult]:
     """Return what came of matching all scans but the first one, which makes the map."""
-    mapper = moving_mapper(name)
-    mapper.take_echoes(scans[0])
-    return [mapper.take_echoes(scan).result for scan in scans[1:]]
+    estimator = moving_estimator(name)
+    estimator.add_scan(scans[0])
+    return [estimator.add_scan(scan).result for scan in scans[1:]]
 
 
 def squared_errors(result: MatchResult) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 
 from benchmarks.command_line import benchmark_parser
 from benchmarks.table import Row, print_table
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
@@ -82,7 +82,9 @@ def _beams(
             yield Beam(stamp, "sonar", 2.0 * np.pi * step / _BEAMS, strengths[step], _RESOLUTION)
 
 
-def outcome(turn: Callable[[np.random.Generator], np.ndarray], estimator: Estimator, scans: int, seed: int) -> Outcome:
+def outcome(
+    turn: Callable[[np.random.Generator], np.ndarray], estimator: EstimatorName, scans: int, seed: int
+) -> Outcome:
     """Map open water as map_bag does."""
     made = recording(turn, scans, seed)
     parameters = ReplayParameters(estimator=estimator)
@@ -104,7 +106,7 @@ def rows(scans: int = SCANS) -> List[Row]:
     """Return the figures of all waters and both estimators."""
     table: List[Row] = []
     for name, turn in WATERS.items():
-        for estimator in Estimator:
+        for estimator in EstimatorName:
             one = outcome(turn, estimator, scans, seed=1)
             text = f"{one.fixes} of {one.scans} scans, correction up to {one.farthest:.2f} m"
             table.append((f"fixes in {name}, {estimator.value}", text, "0"))

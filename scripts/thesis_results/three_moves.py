@@ -8,7 +8,7 @@ from benchmarks.matching_moves import (
     SEEDS,
     odometry_path,
     session_errors,
-    session_mapper,
+    session_estimator,
     session_scans,
     session_track,
     true_path,
@@ -64,10 +64,10 @@ def wanted(scan: Scan) -> np.ndarray:
 
 def fixes(scans: Sequence[Scan], name: MatcherName) -> List[Fix]:
     """Return the matches after each of the moves."""
-    mapper, found = session_mapper(name), []
+    estimator, found = session_estimator(name), []
     for turn, scan in enumerate(scans):
-        target = mapper.matched.blocks
-        update = mapper.take_echoes(scan)
+        target = estimator.matched.blocks
+        update = estimator.add_scan(scan)
         if turn in AT_REST:
             found.append(Fix(scan, update.result, target))
     return found

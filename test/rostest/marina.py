@@ -57,7 +57,7 @@ class Marina(unittest.TestCase):
         last = cls.replayed.updates[-1].scan.reference_time
         wait_until(lambda: corrections(transforms)[0][-1] >= last)
         cls.corrections = corrections(transforms)
-        whole_map = cls.replayed.mapper.block_count
+        whole_map = len(cls.replayed.estimator.shown)
         wait_until(lambda: maps.messages[-1:] and maps.messages[-1].width >= whole_map, required=False)
         cls.map = rows(maps.messages[-1])
 
@@ -76,7 +76,7 @@ class Marina(unittest.TestCase):
 
     def test_the_map_that_is_shown_is_the_one_of_map_bag(self) -> None:
         """Made of the echoes that are matched, not of the cleaned clouds."""
-        expected = self.replayed.mapper.blocks.mean[:, :2]
+        expected = self.replayed.estimator.shown.blocks.mean[:, :2]
         distances, _ = cKDTree(expected).query(self.map[:, :2])
         self.assertAlmostEqual(len(self.map) / len(expected), 1.0, delta=0.05)
         self.assertLess(np.quantile(distances, 0.95), 0.1)
@@ -96,7 +96,7 @@ def steps(run: Replayed, fixes: Inbox) -> List[Step]:
     found, counts = [], np.cumsum([update.result is not None for update in run.updates])
     for update, count in zip(run.updates, counts):
         wait = partial(fixes.wait_for_number, int(count))
-        found.append(Step(update.scan.reference_time + run.mapper.lookahead + AFTERWARDS, wait))
+        found.append(Step(update.scan.reference_time + run.estimator.lookahead + AFTERWARDS, wait))
     return found
 
 

@@ -7,9 +7,9 @@ import numpy as np
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.localisation.map_updates import ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, Prior, prior_of
-from mlsm_manager.scan_matching.result import MatchResult, MatchStatus
+from mlsm_manager.localisation.updates import ScanUpdate
+from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
+from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from node_support.geometry import composed, inverse, wrapped

@@ -5,11 +5,11 @@ from typing import Dict, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.map_layers import MapSettings
-from mlsm_manager.localisation.stored_run import StoredRun
-from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 
@@ -71,7 +71,7 @@ class JointMaps:
         run.matched.uncover(self.matched.map)
         for scan in run.scans:
             if scan.reference_time > session.settled_until:
-                self.matched.add(TimedPoints.of_scan(scan))
+                self.matched.add(Cloud.of_scan(scan))
         for cloud in run.clouds:
             self.shown.add(cloud)
         self.shown.draw(session, session.settled_until)

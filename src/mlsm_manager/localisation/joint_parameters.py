@@ -23,7 +23,7 @@ _POOR_DISTANCES = 0.1
 _SETTLED = 0.1
 
 
-class Estimator(Enum):
+class EstimatorName(Enum):
     """How scans find their poses."""
 
     JOINT = "JOINT"
@@ -34,8 +34,8 @@ class Estimator(Enum):
 class JointParameters(OdometryChoice):
     """What the joint solver needs besides OdometryErrors."""
 
-    estimator: Estimator = parameter(
-        Estimator.SCAN_BY_SCAN,
+    estimator: EstimatorName = parameter(
+        EstimatorName.SCAN_BY_SCAN,
         "JOINT: the newest scans find their poses together, none is rejected; `odometry` says what "
         "the motion is known from. SCAN_BY_SCAN: each alone, by the matcher",
         tunable=False,
@@ -82,7 +82,9 @@ class JointParameters(OdometryChoice):
     def longest_turn(self, errors: OdometryErrors) -> float:
         """Return how long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
         measured = not np.isinf(self.odometry_model(errors).distance_deviation)
-        return np.inf if measured or self.estimator is Estimator.SCAN_BY_SCAN else errors.rate_time * self.scan_parts
+        return (
+            np.inf if measured or self.estimator is EstimatorName.SCAN_BY_SCAN else errors.rate_time * self.scan_parts
+        )
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.

@@ -1,4 +1,4 @@
-"""One run of the joint solver in the map."""
+"""Fills pauses in which no scan came with scans that heard nothing, so that the motion in a pause has nodes too."""
 
 from dataclasses import dataclass, field, replace
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple
@@ -11,9 +11,8 @@ from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.pauses import scans_of_pause
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.placement import SolvedPlacement
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.continuity import scans_go_on
 from mlsm_manager.self_check.map_agreement import recent_agreement
@@ -22,6 +21,27 @@ from mlsm_manager.self_check.path_spread import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry import composed, transformed
+
+_LONGEST_PAUSE = 2.0
+"""Usual durations of a scan between two scans: fewer may be a turn that was lost."""
+_MOST_SCANS = 30
+"""For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
+
+
+def scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
+    """Return scans without points from the newest of node_times (n,) [s] to the beginning of `scan`, n > 0.
+
+    None where that is less than a pause. The last one ends where the scan begins, so that the vehicle's motion within
+    the scan does not hang on that in the pause.
+    """
+    if len(node_times) < 2:
+        return []
+    newest, usual = node_times[-1], float(np.median(np.diff(node_times)))
+    count = min(round((scan.start - newest) / usual), _MOST_SCANS)
+    if scan.start - newest <= _LONGEST_PAUSE * usual:
+        return []
+    return [scan.without_points(float(end)) for end in np.linspace(newest, scan.start, count + 1)[1:]]
+
 
 _AGREES = 0.5  # share of a scan's points on surfaces of others from which on it agrees with them
 _CHECKED_SCANS = 20
@@ -134,11 +154,11 @@ class JointSession:
     def _placement(self) -> SolvedPlacement:
         return SolvedPlacement(self.solver.log, self.solver.odometry, self.solver.state)
 
-    def points(self, cloud: TimedPoints) -> np.ndarray:
+    def points(self, cloud: Cloud) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
         return self._placement.points(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
 
-    def origins(self, cloud: TimedPoints) -> np.ndarray:
+    def origins(self, cloud: Cloud) -> np.ndarray:
         """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
         return self._placement.origins(cloud)
 

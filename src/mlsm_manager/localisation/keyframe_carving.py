@@ -7,8 +7,8 @@ from typing import Deque, List, Optional, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.placement import Placement
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
@@ -96,7 +96,7 @@ class KeyframeCarving:
     def look(
         self,
         surface_map: MultiLevelSurfaceMap,
-        clouds: List[TimedPoints],
+        clouds: List[Cloud],
         points: List[np.ndarray],
         placement: Placement,
         scans: int = 1,

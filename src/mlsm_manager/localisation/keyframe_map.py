@@ -6,9 +6,9 @@ from typing import Deque, List, Optional
 
 import numpy as np
 
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
 from mlsm_manager.localisation.placement import Placement
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -47,7 +47,7 @@ class KeyframeMap:
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
         self._free = KeyframeCarving(resolution, limit, carver, most_followed, kernel)
         self._kernel = kernel
-        self._moving: Deque[TimedPoints] = deque()
+        self._moving: Deque[Cloud] = deque()
         self._overlay = Overlay(self._map)
         self._above = self._new().blocks
         self._due: Optional[Placement] = None
@@ -69,7 +69,7 @@ class KeyframeMap:
         return self._free
 
     @property
-    def moving(self) -> List[TimedPoints]:
+    def moving(self) -> List[Cloud]:
         """The keyframes that may still move, oldest first."""
         return list(self._moving)
 
@@ -105,7 +105,7 @@ class KeyframeMap:
             self._overlay.lay(self._above)
         return carved
 
-    def add(self, cloud: TimedPoints) -> None:
+    def add(self, cloud: Cloud) -> None:
         """Add a keyframe; it is in the map from the next `draw` on."""
         self._moving.append(cloud)
 
@@ -144,7 +144,7 @@ class KeyframeMap:
                 copy.insert(placement.points(cloud))
         return copy
 
-    def _settled(self, cloud: TimedPoints, placement: Placement, before: Optional[CarveReport]) -> Drawn:
+    def _settled(self, cloud: Cloud, placement: Placement, before: Optional[CarveReport]) -> Drawn:
         """Draw the oldest keyframe for ever; `before`: what older ones carved."""
         self._free.forget_oldest()
         points = placement.points(cloud)
@@ -157,7 +157,7 @@ class KeyframeMap:
         if self._due is None:
             return
         (placement, self._due), clouds, above = (self._due, None), list(self._moving), self._new()
-        everything = placement.points(TimedPoints.joined(clouds))
+        everything = placement.points(Cloud.joined(clouds))
         points = np.split(everything, np.cumsum([len(cloud) for cloud in clouds])[:-1])
         above.insert(everything)
         self._above = above.blocks

@@ -2,21 +2,22 @@
 
 import threading
 import time as wall
-from typing import Any, Callable, List, Mapping, Optional
+from dataclasses import dataclass
+from enum import Enum
+from typing import Any, Callable, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.live_correction import LiveCorrection
-from mlsm_manager.localisation.localiser_settings import LocaliserSettings, MapInput
-from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate, Taken
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.live_correction import LiveCorrection, StandingCorrection
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
-from mlsm_manager.localisation.scan_mapper import ScanMapper
-from mlsm_manager.localisation.shared_map import SharedMap
-from mlsm_manager.localisation.standing_correction import StandingCorrection
-from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
+from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.running_copy import finished
 from node_support.errors import RefusedInput
@@ -28,16 +29,37 @@ _JUMP_BACK = 30.0
 _LONGEST_SILENCE = 120.0
 
 
+class MapInput(Enum):
+    """Which points make the map that is shown and saved."""
+
+    CLEANED = "CLEANED"
+    MATCHED = "MATCHED"
+
+
+@dataclass(frozen=True)
+class LocaliserSettings:
+    """What a localiser can be told, also while it runs.
+
+    matcher: for scans near their expected place. anywhere: for a vehicle that is lost. blend_time: s, within which the
+    correction goes over to a new one.
+    """
+
+    matcher: Matcher
+    anywhere: Matcher
+    blend_time: float
+    map_input: MapInput
+
+
 class Localiser:
     """Safe to use from several threads: a correction can be asked for while a scan is being matched."""
 
     def __init__(
-        self, mapper: ScanMapper, settings: LocaliserSettings, clock: Callable[[], float] = wall.monotonic
+        self, estimator: Estimator, settings: LocaliserSettings, clock: Callable[[], float] = wall.monotonic
     ) -> None:
         """`clock`: s, tells how long ago the newest scan came where the odometry has no stamps."""
-        self.mapper = mapper
+        self.estimator = estimator
         self._lock = threading.RLock()
-        self.map = SharedMap(mapper, self._lock)
+        self._changes = 0
         self._live = LiveCorrection(settings.blend_time)
         self._standing = StandingCorrection(self._live, clock)
         self._newest: Optional[Scan] = None
@@ -49,71 +71,71 @@ class Localiser:
         """Work with other settings from the next scan on; the map stays."""
         with self._lock:
             self._settings = settings
-            self.mapper.matcher = settings.matcher
+            self.estimator.matcher = settings.matcher
             self._live.blend_time = settings.blend_time
 
     @property
     def matching(self) -> bool:
         """Whether scans are matched with the map, or placed by the odometry."""
-        return self.mapper.matching
+        return self.estimator.matching
 
     def match(self, matching: bool) -> bool:
         """Turn matching on or off; return whether that is a change."""
         with self._lock:
-            changed = self.mapper.matching != matching
-            self.mapper.matching = matching
+            changed = self.estimator.matching != matching
+            self.estimator.matching = matching
         return changed
 
     @property
     def lookahead(self) -> float:
         """Seconds of odometry after the end of a scan that are waited for before the scan is taken."""
-        return self.mapper.lookahead
+        return self.estimator.lookahead
 
     def mount(self, sonar_in_base: np.ndarray) -> None:
         """Learn where the sonar is in base_link, (2,) m."""
         with self._lock:
-            self.mapper.mount(sonar_in_base)
+            self.estimator.mount(sonar_in_base)
 
     def verdicts(self) -> List[Verdict]:
         """Return what the run says of itself, without any truth."""
         with self._lock:
-            return self.mapper.verdicts()
+            return self.estimator.verdicts()
 
     @property
     def believed_until(self) -> Optional[float]:
         """Time [s] of the newest belief; None before the first scan."""
-        belief = self.mapper.belief
+        belief = self.estimator.belief
         return None if belief is None else belief.time
 
-    def take_scan(self, scan: Scan) -> Taken:
+    def take_scan(self, scan: Scan) -> ScanResult:
         """Match a scan and put it, and the clouds that waited for it, into the map."""
         with self._lock:
             self.notice_time(scan.reference_time)
-            self.map.change()
+            self._changes += 1
             self._newest = scan
             self._standing.take_scan_time(scan.reference_time)
-            update = self._searched(scan) if self.is_lost else self.mapper.take_echoes(scan)
+            update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
             self._search.learn(update.accepted)
             if update.belief is not None:
                 self._live.believe(update.belief)
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
-                clouds.append(self.mapper.take_cloud(TimedPoints.of_scan(scan)))
-            clouds += iter(self.mapper.take_waiting, None)
-        return Taken(update, clouds)
+                clouds.append(self.estimator.add_cloud(Cloud.of_scan(scan)))
+            clouds += iter(self.estimator.add_waiting, None)
+        return ScanResult(update, clouds)
 
-    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
+    def take_cloud(self, cloud: Cloud) -> CloudUpdate:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)
-            self.map.change()
-            return self.mapper.take_cloud(cloud)
+            self._changes += 1
+            return self.estimator.add_cloud(cloud)
 
-    def take_placed(self, points: np.ndarray) -> CloudUpdate:
+    def take_points(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
         with self._lock:
-            self.map.change()
-            return self.mapper.take_placed(points)
+            self._changes += 1
+            return self.estimator.add_points(points)
 
     def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
         """Return T_map_odom (3,) to be shown at `time` [s], when the odometry says T_odom_base (3,)."""
@@ -122,7 +144,12 @@ class Localiser:
     def standing_correction(self, odometry: np.ndarray) -> np.ndarray:
         """Return T_map_odom (3,) to be shown now by an odometry without stamps; see StandingCorrection."""
         found = self._standing.sample(odometry)
-        return self.mapper.correction if found is None else found
+        return self.last_correction if found is None else found
+
+    @property
+    def last_correction(self) -> np.ndarray:
+        """T_map_odom (3,) as the newest scan told it."""
+        return self.estimator.correction
 
     def notice_time(self, time: float) -> float:
         """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did."""
@@ -130,7 +157,7 @@ class Localiser:
         if until is None or time >= until - _JUMP_BACK:
             return 0.0
         with self._lock:
-            self.mapper.forget_place()
+            self.estimator.forget_place()
             self._forget_scans()
             self._search.jump()
         return until - time
@@ -154,7 +181,7 @@ class Localiser:
     def follow(self, track: Track, time: float) -> None:
         """Bring the belief to `time` [s] by the odometry, which `track` knows from `silent_since` on."""
         with self._lock:
-            self.mapper.follow(track, time)
+            self.estimator.follow(track, time)
 
     def relocalise(self) -> Optional[ScanUpdate]:
         """Search the whole map for the newest scan, and take the place that is found as the vehicle's.
@@ -174,19 +201,59 @@ class Localiser:
     def _searched(self, scan: Scan) -> ScanUpdate:
         """Search the whole map for a scan, and then where the vehicle was expected: few echoes may look like chance."""
         update = self._found(scan)
-        return update if update.accepted or not self._search.may_be_near else self.mapper.take_echoes(scan)
+        return update if update.accepted or not self._search.may_be_near else self.estimator.add_scan(scan)
 
     def _found(self, scan: Scan) -> ScanUpdate:
         """Search the whole map for a scan; where it is found it goes into the map."""
-        result = relocalised(scan, self.mapper.target, self._settings.anywhere, self.mapper.errors)
+        result = relocalised(scan, self.estimator.target, self._settings.anywhere, self.estimator.errors)
         return (
-            self.mapper.adopt(scan, result) if result.accepted else ScanUpdate(scan, result, False, self.mapper.belief)
+            self.estimator.adopt(scan, result)
+            if result.accepted
+            else ScanUpdate(scan, result, False, self.estimator.belief)
         )
 
     @property
     def is_lost(self) -> bool:
         """Whether a map was loaded, scans are matched, and the vehicle is not found in the map yet."""
-        return self._search.is_lost and self.mapper.matching
+        return self._search.is_lost and self.estimator.matching
+
+    @property
+    def changes(self) -> int:
+        """A number that grows whenever the map or the pose in it changes."""
+        return self._changes
+
+    @property
+    def blocks(self) -> Blocks:
+        """A copy of the map that is shown and saved."""
+        return self._copied(Layer.SHOWN)
+
+    @property
+    def free(self) -> Blocks:
+        """A copy of what is known to be free."""
+        return self._copied(Layer.FREE)
+
+    @property
+    def block_count(self) -> int:
+        """Number of blocks of the map that is shown."""
+        with self._lock:
+            return len(self.estimator.shown)
+
+    def region(self, low: np.ndarray, high: np.ndarray) -> Blocks:
+        """Return the blocks of the map that is shown whose mean lies from `low` to `high`, (2,) or (3,) m."""
+        with self._lock:
+            return self.estimator.shown.in_box(low, high)
+
+    def changed_tiles(self) -> Tuple[np.ndarray, Blocks]:
+        """Return the tiles (n, 2) of the map that is shown that changed since the last call, and their blocks."""
+        with self._lock:
+            shown = self.estimator.shown
+            tiles = shown.take_changed_tiles()
+            return tiles, shown.in_tiles(tiles)
+
+    def _copied(self, layer: Layer) -> Blocks:
+        with self._lock:
+            copy = self.estimator.map_of(layer).begin_copy()
+        return finished(copy, self._lock)
 
     def stored(self, frame: str, calibration: Mapping[str, Any], made: float, run: str) -> StoredMap:
         """Return a copy of the map and of the place in it, to be written; see StoredMap.
@@ -194,9 +261,9 @@ class Localiser:
         Keyframes are only stored with the name of a run of the graph, in which a node can go on with them.
         """
         with self._lock:
-            belief, copies = self.mapper.belief, {layer: self.mapper.begin_copy(layer) for layer in Layer}
-            keyframes = self.mapper.keyframes if run else {}
-            correction = self.mapper.correction.copy()
+            belief, copies = self.estimator.belief, {one: self.estimator.map_of(one).begin_copy() for one in Layer}
+            keyframes = self.estimator.keyframes if run else {}
+            correction = self.estimator.correction.copy()
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
         layers = {layer: finished(copy, self._lock) for layer, copy in copies.items()}
         return StoredMap(frame, layers, calibration, made, arrays, run)
@@ -209,14 +276,14 @@ class Localiser:
         Raises ValueError, and keeps the present map, for other resolutions than those of the parameters.
         """
         with self._lock:
-            reason = self.mapper.restore(stored.layers, stored.arrays if same_odometry else {})
-            self.map.change()
+            reason = self.estimator.restore(stored.layers, stored.arrays if same_odometry else {})
+            self._changes += 1
             self._forget_scans()
             self._search.lose()
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
             self._resumed_at = place
             if place is not None:
-                self.mapper.start_from(place.widened, place.correction)
+                self.estimator.start_from(place.widened, place.correction)
                 self._live.start_from(place.correction)
                 self._search.expect()
         return reason
@@ -224,9 +291,9 @@ class Localiser:
     def clear(self) -> int:
         """Forget map and place; return how many blocks the map had."""
         with self._lock:
-            count = self.mapper.block_count
-            self.map.change()
-            self.mapper.clear()
+            count = self.block_count
+            self._changes += 1
+            self.estimator.clear()
             self._forget_scans()
             self._search.forget()
         return count

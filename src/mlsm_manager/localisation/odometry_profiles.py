@@ -5,7 +5,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 import yaml
 
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 
 
@@ -21,7 +21,7 @@ _COMPASS = (
     Setting("heading_deviation", 0.0175, "1 degree: a compass's data sheet, iron near it included"),
     Setting("turn_rate_deviation", 7e-5, "the drift of its gyro between two fixes of the compass is far below that"),
 )
-_JOINT = Setting("estimator", Estimator.JOINT.value, "the newest scans find their poses together")
+_JOINT = Setting("estimator", EstimatorName.JOINT.value, "the newest scans find their poses together")
 _NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
 _NORMALS = Setting("normal_deviation", 0.2, "rad: of a straight wall's normals, as a beam of 2.5 degrees hears it")
 _POSTS = Setting("lone_quality", 1.0, "posts and buoys tell the way where walls do not")

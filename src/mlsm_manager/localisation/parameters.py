@@ -4,18 +4,14 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Dict, Optional, Sequence
 
-import numpy as np
-
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
-from mlsm_manager.localisation.joint_mapper import JointMapper
-from mlsm_manager.localisation.joint_parameters import Estimator, JointParameters
-from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.localiser_settings import LocaliserSettings, MapInput
-from mlsm_manager.localisation.map_layers import MapSettings
-from mlsm_manager.localisation.mapper import Mapper
+from mlsm_manager.localisation.estimator import Estimator, MapSettings
+from mlsm_manager.localisation.joint import Joint
+from mlsm_manager.localisation.joint_parameters import EstimatorName, JointParameters
+from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
 from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
-from mlsm_manager.localisation.scan_mapper import ScanMapper
+from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
@@ -61,16 +57,16 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
     def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
         """Return a localiser with an empty map; sonar_in_base: m, x y of the sonar in base_link."""
         settings = self.localiser_settings()
-        mapper = self._build_mapper(settings.matcher, np.array(sonar_in_base, dtype=np.float64))
-        mapper.matching = self.matches_from_start
-        return Localiser(mapper, settings)
+        estimator = self._build_estimator(settings.matcher, sonar_in_base)
+        estimator.matching = self.matches_from_start
+        return Localiser(estimator, settings)
 
-    def _build_mapper(self, matcher: Matcher, sonar_in_base: np.ndarray) -> ScanMapper:
+    def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
         errors = self.part(OdometryErrors)
-        if self.estimator is Estimator.SCAN_BY_SCAN:
-            return Mapper(self.map_settings(), errors, matcher, sonar_in_base)
+        if self.estimator is EstimatorName.SCAN_BY_SCAN:
+            return ScanByScan(self.map_settings(), errors, matcher, sonar_in_base)
         solver = self.solver_parameters(errors, self.range_scale_deviation)
-        return JointMapper(self.map_settings(), errors, solver, matcher, sonar_in_base)
+        return Joint(self.map_settings(), errors, matcher, sonar_in_base, solver)
 
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""

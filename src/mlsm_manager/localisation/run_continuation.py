@@ -4,8 +4,8 @@ from typing import Optional
 
 import numpy as np
 
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
@@ -30,7 +30,7 @@ def continued(session: JointSession, scan: Scan, surface_map: MultiLevelSurfaceM
         agreement = longer.add(scan).agreement
     except RefusedInput:
         return None
-    points = longer.points(TimedPoints.of_scan(scan))[:, :2]
+    points = longer.points(Cloud.of_scan(scan))[:, :2]
     near = _share_near_blocks(points, surface_map)
     if near * agreement < _LEAST_SHARE:
         return None

@@ -162,7 +162,7 @@ def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Na
 def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
     """Return the map as made when the recording ended: equal runs write equal files."""
     calibration = parameters.part(BeamCorrection).to_mapping()
-    return StoredMap(_MAP_FRAME, dict(replayed.mapper.layers), calibration, replayed.times[-1])
+    return StoredMap(_MAP_FRAME, dict(replayed.estimator.layers), calibration, replayed.times[-1])
 
 
 def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:

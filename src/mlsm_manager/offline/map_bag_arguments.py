@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 from typing import Any, Dict, List
 
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
@@ -36,7 +36,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
         options.odometry = OdometryKind(ReplayParameters.from_mapping({"odometry": values["odometry"]}).odometry)
     options.parameters = ReplayParameters.from_mapping(values)
     options.request = request_of(options, options.parameters.part(ReadingParameters))
-    if options.refine and options.parameters.estimator is not Estimator.JOINT:
+    if options.refine and options.parameters.estimator is not EstimatorName.JOINT:
         raise ParameterError(f"estimator = {options.parameters.estimator.value}: must be JOINT with --refine")
     return options
 
@@ -102,7 +102,7 @@ def _values(options: argparse.Namespace) -> Dict[str, Any]:
     values = replay_values(read_values(options.parameters)) if options.parameters else {}
     values.update(assigned_values(options.set))
     if options.matcher:
-        values.update(matcher=options.matcher, estimator=Estimator.SCAN_BY_SCAN.value)
+        values.update(matcher=options.matcher, estimator=EstimatorName.SCAN_BY_SCAN.value)
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
     return values

@@ -9,10 +9,10 @@ from mlsm_manager.joint_solver.placing.path import solved_path
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solve.way_batch import solved_best
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.map_layers import MapSettings
 from mlsm_manager.localisation.placement import SolvedPlacement
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
@@ -40,7 +40,7 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: Ma
     closing = closed(solver, solved_best(solver))
     surfaces = KeyframeMap(settings.resolution, settings.limit, kernel=settings.kernel, carver=settings.carver)
     for scan in scans:
-        surfaces.add(TimedPoints.of_scan(scan))
+        surfaces.add(Cloud.of_scan(scan))
     surfaces.settle(SolvedPlacement(solver.log, solver.odometry, closing.batch.state))
     poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
     return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)

@@ -7,10 +7,9 @@ from typing import Callable, List, Mapping, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.joint_mapper import JointMapper
+from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.map_updates import ScanUpdate
-from mlsm_manager.localisation.scan_mapper import ScanMapper
+from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -30,7 +29,7 @@ class Replayed:
     times: np.ndarray
     odometry: np.ndarray
     corrected: np.ndarray
-    mapper: ScanMapper
+    estimator: Estimator
     updates: List[ScanUpdate] = field(default_factory=list)
     refused: Mapping[str, int] = field(default_factory=dict)
 
@@ -42,7 +41,7 @@ class Replayed:
     @property
     def solver(self) -> Optional[LiveSolver]:
         """The joint solver that has taken all scans; None where each was matched alone."""
-        return self.mapper.solver if isinstance(self.mapper, JointMapper) else None
+        return self.estimator.solver
 
     @property
     def matched(self) -> int:
@@ -90,7 +89,7 @@ def replay(
             refused[reason.kind] += 1
         on_scans(1)
     corrections[done:] = _corrections(localiser, track, done, len(track.times))
-    return Replayed(track.times, track.poses, composed(corrections, track.poses), localiser.mapper, updates, refused)
+    return Replayed(track.times, track.poses, composed(corrections, track.poses), localiser.estimator, updates, refused)
 
 
 def _corrections(localiser: Localiser, track: Track, start: int, end: int) -> np.ndarray:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from node_support.parameters import with_defaults
 from recordings.reader import ReadingParameters
@@ -13,7 +13,7 @@ from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 
 @dataclass(frozen=True)
 @with_defaults(
-    estimator=Estimator.JOINT,
+    estimator=EstimatorName.JOINT,
     solver_kernel=SolverKernel.AUTO,
     range_scale_deviation=0.02,
     sonar_delay_deviation=1.0,

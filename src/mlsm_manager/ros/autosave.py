@@ -25,7 +25,7 @@ class Autosave:
         self._folder = MapFolder(parameters.map_directory)
         self._name = rospy.resolve_name(namespace).strip("/").replace("/", ".") + ".autosave"
         self._run = _run_of_roslaunch()
-        self._saved_at = localiser.map.changes
+        self._saved_at = localiser.changes
         if not self._resumed() and parameters.map:
             self._start_in(parameters.map)
         if parameters.autosave_period > 0.0:
@@ -34,8 +34,8 @@ class Autosave:
 
     def save_if_changed(self) -> None:
         """Write the map, unless it is empty or as it was when it was written last."""
-        changes = self._localiser.map.changes
-        if changes == self._saved_at or not self._localiser.map.block_count:
+        changes = self._localiser.changes
+        if changes == self._saved_at or not self._localiser.block_count:
             return
         try:
             self._folder.save(self._name, stored_map(self._localiser, self._parameters, self._run), overwrite=True)
@@ -54,7 +54,7 @@ class Autosave:
             load_into(self._localiser, self._folder.load(name), self._parameters, same_odometry=False)
         except ValueError as error:
             raise ParameterError(f"map = {self._parameters.map!r}: {error}") from None
-        rospy.loginfo("%s: starts in %s, %d blocks", self._health.name, name, self._localiser.map.block_count)
+        rospy.loginfo("%s: starts in %s, %d blocks", self._health.name, name, self._localiser.block_count)
 
     def _resumed(self) -> bool:
         """Load what this node saved in this run of roslaunch; put aside what another run left."""
@@ -73,8 +73,8 @@ class Autosave:
         if reason:
             detail = f"{reason}; its map is kept, and the vehicle is searched in it"
             self._health.problem("runs not resumed", detail)
-        self._saved_at = self._localiser.map.changes
-        rospy.loginfo("%s: goes on in the map of %d blocks", self._health.name, self._localiser.map.block_count)
+        self._saved_at = self._localiser.changes
+        rospy.loginfo("%s: goes on in the map of %d blocks", self._health.name, self._localiser.block_count)
         return True
 
 

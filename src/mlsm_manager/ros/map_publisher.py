@@ -9,8 +9,8 @@ from nav_msgs.msg import OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import MarkerArray
 
+from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.localisation.shared_map import SharedMap
 from mlsm_manager.ros.map_messages import has_octomap_messages, map_cloud, occupancy_grid, octomap_message, octomap_type
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.export.errors import ExportError
@@ -29,9 +29,9 @@ _MOST_TIME = 0.1
 class _WholeMap(rospy.SubscribeListener):
     """A topic that carries the whole map in each message: built only for those who listen, and not all the time."""
 
-    def __init__(self, topic: str, kind: Any, build: Callable[[], Any], shared_map: SharedMap, health: Health) -> None:
+    def __init__(self, topic: str, kind: Any, build: Callable[[], Any], localiser: Localiser, health: Health) -> None:
         self._build = build
-        self._map = shared_map
+        self._localiser = localiser
         self._next = 0.0
         self._is_due = False
         self._guarded = guarded(health, self._send)
@@ -39,7 +39,7 @@ class _WholeMap(rospy.SubscribeListener):
 
     def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], peer_publish: Callable[[Any], None]) -> None:
         """Send all to who comes, once there is something."""
-        if self._map.block_count:
+        if self._localiser.block_count:
             self._guarded(peer_publish)
 
     def change(self) -> None:
@@ -66,8 +66,8 @@ class _WholeMap(rospy.SubscribeListener):
 class _Tiles(rospy.SubscribeListener):
     """MLSM/Markers: the tiles that changed, and the whole map to who comes."""
 
-    def __init__(self, parameters: MlsmCoreParameters, shared_map: SharedMap, health: Health) -> None:
-        self._map = shared_map
+    def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
+        self._localiser = localiser
         self._frame = parameters.map_frame
         self._markers = BlockMarkers(parameters.color_by, parameters.insertion)
         self._lock = threading.Lock()
@@ -88,37 +88,37 @@ class _Tiles(rospy.SubscribeListener):
         if not self._publisher.get_num_connections():
             return
         with self._lock:
-            tiles, blocks = self._map.changed_tiles()
+            tiles, blocks = self._localiser.changed_tiles()
             if self._is_replaced or self._markers.is_outgrown(blocks):
                 self._is_replaced = False
-                self._publisher.publish(self._markers.whole(self._map.blocks, header(0, self._frame)))
+                self._publisher.publish(self._markers.whole(self._localiser.blocks, header(0, self._frame)))
             elif len(tiles):
                 changed = self._markers.changed(blocks, map(tuple, tiles.tolist()), header(0, self._frame))
                 self._publisher.publish(changed)
 
     def _again(self, send: Callable[[Any], None]) -> None:
         with self._lock:
-            if self._map.block_count:
-                send(self._markers.again(self._map.blocks, header(0, self._frame)))
+            if self._localiser.block_count:
+                send(self._markers.again(self._localiser.blocks, header(0, self._frame)))
 
 
 class MapPublisher:
     """Publishes /MLSM/Markers, /MLSM/cloud, /MLSM/grid and, where its messages are installed, /MLSM/octomap."""
 
-    def __init__(self, parameters: MlsmCoreParameters, shared_map: SharedMap, health: Health) -> None:
+    def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
         self._parameters = parameters
-        self._map = shared_map
+        self._localiser = localiser
         self._stamp_ns = 0
-        self._tiles = _Tiles(parameters, shared_map, health)
+        self._tiles = _Tiles(parameters, localiser, health)
         self._whole = [
-            _WholeMap(topics.MAP_CLOUD, PointCloud2, self._cloud, shared_map, health),
-            _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, shared_map, health),
+            _WholeMap(topics.MAP_CLOUD, PointCloud2, self._cloud, localiser, health),
+            _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, localiser, health),
         ]
         if has_octomap_messages():
-            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, shared_map, health))
+            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, localiser, health))
         self._tell = on_change(parameters.map_period, self._publish, health)
         # rospy takes connections before it knows the listeners, and tells them of none that came so early.
-        if shared_map.block_count:
+        if localiser.block_count:
             self.replace()
 
     def change(self, stamp_ns: Optional[int] = None) -> None:
@@ -144,14 +144,14 @@ class MapPublisher:
         # In each message the stamp is read before the map: a cloud that comes between them may be there early, but
         # none that the stamp tells of is missing.
         stamp_ns = self._stamp_ns
-        return map_cloud(self._map.blocks, stamp_ns, self._parameters.map_frame)
+        return map_cloud(self._localiser.blocks, stamp_ns, self._parameters.map_frame)
 
     def _grid(self) -> OccupancyGrid:
         parameters, stamp_ns = self._parameters, self._stamp_ns
-        grid = occupancy(self._map.blocks, self._map.free, parameters.grid_low, parameters.grid_high)
+        grid = occupancy(self._localiser.blocks, self._localiser.free, parameters.grid_low, parameters.grid_high)
         return occupancy_grid(grid, stamp_ns, parameters.map_frame)
 
     def _octomap(self) -> Any:
         stamp_ns = self._stamp_ns
-        tree = octree(self._map.blocks, self._map.free)
+        tree = octree(self._localiser.blocks, self._localiser.free)
         return octomap_message(tree, header(stamp_ns, self._parameters.map_frame))

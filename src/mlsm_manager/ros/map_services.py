@@ -8,8 +8,8 @@ import rospy
 from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 
 from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.map_updates import ScanUpdate
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.ros.map_messages import map_cloud
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.files.map_file import StoredMap
@@ -66,7 +66,7 @@ class MapServices:
         except ValueError as error:
             return LoadMapResponse(False, f"{error}; the present map stays")
         self._on_replaced()
-        return LoadMapResponse(True, f"{self._localiser.map.block_count} blocks loaded")
+        return LoadMapResponse(True, f"{self._localiser.block_count} blocks loaded")
 
     def _reset(self, _request: TriggerRequest) -> TriggerResponse:
         count = self._localiser.clear()
@@ -75,7 +75,7 @@ class MapServices:
 
     def _get_region(self, request: GetRegionRequest) -> GetRegionResponse:
         low, high = (np.array([corner.x, corner.y, corner.z]) for corner in (request.low, request.high))
-        blocks = self._localiser.map.region(low, high)
+        blocks = self._localiser.region(low, high)
         return GetRegionResponse(map_cloud(blocks, rospy.Time.now().to_nsec(), self._parameters.map_frame))
 
     def _relocalise(self, _request: TriggerRequest) -> TriggerResponse:

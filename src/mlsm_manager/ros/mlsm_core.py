@@ -6,11 +6,17 @@ import numpy as np
 import rospy
 from std_msgs.msg import Bool
 
-from mlsm_manager.localisation.localiser_settings import MapInput
-from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
-from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.localisation.update_report import report_cloud, report_scan, report_turn, report_verdicts
+from mlsm_manager.localisation.updates import (
+    CloudUpdate,
+    ScanUpdate,
+    report_cloud,
+    report_scan,
+    report_turn,
+    report_verdicts,
+)
 from mlsm_manager.ros.autosave import Autosave
 from mlsm_manager.ros.fix_publisher import FixPublisher
 from mlsm_manager.ros.map_publisher import MapPublisher
@@ -54,7 +60,7 @@ class MlsmCore:
         self._mounted = False
         self._z_down = ZDownSigns()
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
-        self._map = MapPublisher(parameters, self._localiser.map, self.health)
+        self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
         # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
@@ -113,11 +119,9 @@ class MlsmCore:
 
     def _inserted(self, cloud: IntensityCloud) -> CloudUpdate:
         if cloud.frame_id == self._live.current.map_frame:
-            return self._localiser.take_placed(cloud.points[cloud.valid])
+            return self._localiser.take_points(cloud.points[cloud.valid])
         self._notice_time_of_scan(cloud.stamp_ns * 1e-9)
-        return self._localiser.take_cloud(
-            TimedPoints.from_stamps(cloud.points, cloud.time_stamps, cloud.stamp_ns * 1e-9)
-        )
+        return self._localiser.take_cloud(Cloud.from_stamps(cloud.points, cloud.time_stamps, cloud.stamp_ns * 1e-9))
 
     def _match(self, cloud: IntensityCloud) -> None:
         self.health.count("scans in")
@@ -191,7 +195,7 @@ class MlsmCore:
 
     def _report_cloud(self, update: CloudUpdate, stamp_ns: int) -> None:
         self._map.change(stamp_ns)
-        report_cloud(self.health, update, self._localiser.map.block_count, self._live.current.map_limit)
+        report_cloud(self.health, update, self._localiser.block_count, self._live.current.map_limit)
 
     def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
         if update.result is not None and update.accepted:
@@ -205,7 +209,7 @@ class MlsmCore:
     def _correction(self) -> np.ndarray:
         newest = self._odometry.newest()
         if newest is None:
-            return self._localiser.mapper.correction
+            return self._localiser.last_correction
         time, pose = newest
         if time is None:
             return self._localiser.standing_correction(pose)

@@ -4,16 +4,16 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.localisation.joint_parameters import Estimator
-from mlsm_manager.localisation.localiser_settings import MapInput
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.joint_parameters import EstimatorName
+from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.localisation.timed_points import TimedPoints
 from node_support.errors import RefusedInput
 
 SCANS = tour(12).scans
 PARAMETERS = MlsmCoreParameters(
-    estimator=Estimator.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
+    estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
     speed_deviation=0.025, rate_time=12.0, heading_deviation=0.0175, size_x_meters=0.0, size_y_meters=0.0,
 )  # fmt: skip
 
@@ -32,8 +32,8 @@ def test_no_scan_is_rejected_and_those_with_neighbours_give_a_fix():
 
 def test_the_map_has_all_points_of_all_scans():
     localiser, _ = localiser_after(4)
-    assert localiser.map.blocks.mean[:, 3].min() > 0.0
-    assert localiser.map.block_count == len(localiser.map.blocks) > 100
+    assert localiser.blocks.mean[:, 3].min() > 0.0
+    assert localiser.block_count == len(localiser.blocks) > 100
 
 
 def test_matching_off_and_on_again_goes_on_from_the_same_place():
@@ -56,7 +56,7 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
     localiser, _ = localiser_after(6)
     update = localiser.relocalise()
     assert update.accepted, update.result.reason
-    assert localiser.mapper.solver is None
+    assert localiser.estimator.solver is None
     found = localiser.take_scan(SCANS[6]).scan
     assert found.result is not None
     assert np.hypot(*(found.belief.theta[:2] - SCANS[6].reference_pose[:2])) < 0.5
@@ -64,22 +64,22 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
 
 def test_a_jump_in_time_keeps_the_map_and_begins_at_the_odometry():
     localiser, _ = localiser_after(6)
-    count = localiser.map.block_count
+    count = localiser.block_count
     assert localiser.notice_time(0.0) > 0.0
-    assert (localiser.map.block_count, localiser.believed_until, localiser.mapper.solver) == (count, None, None)
-    np.testing.assert_array_equal(localiser.mapper.correction, np.zeros(3))
+    assert (localiser.block_count, localiser.believed_until, localiser.estimator.solver) == (count, None, None)
+    np.testing.assert_array_equal(localiser.estimator.correction, np.zeros(3))
 
 
 def test_clear_forgets_everything():
     localiser, _ = localiser_after(3)
     localiser.clear()
-    assert (localiser.map.block_count, localiser.believed_until, localiser.verdicts()) == (0, None, [])
+    assert (localiser.block_count, localiser.believed_until, localiser.verdicts()) == (0, None, [])
     assert localiser.take_scan(SCANS[3]).scan.result is None
 
 
 def test_a_cloud_waits_for_the_scan_of_its_time():
     localiser, _ = localiser_after(2, map_input=MapInput.CLEANED)
-    cloud = TimedPoints.of_scan(SCANS[2])
+    cloud = Cloud.of_scan(SCANS[2])
     assert localiser.take_cloud(cloud).waiting
     (waited,) = localiser.take_scan(SCANS[2]).clouds
     assert waited.report.inserted == len(cloud)
@@ -88,11 +88,11 @@ def test_a_cloud_waits_for_the_scan_of_its_time():
 def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
     localiser = PARAMETERS.changed({"map_input": MapInput.CLEANED}).build_localiser(SONAR_IN_BASE)
     localiser.take_scan(SCANS[5])
-    early = TimedPoints.of_scan(SCANS[3])
+    early = Cloud.of_scan(SCANS[3])
     assert localiser.take_cloud(early).report.inserted == len(early)
     low, high = early.points[:, :2].min(axis=0), early.points[:, :2].max(axis=0)
-    assert (localiser.map.blocks.mean[:, :2] >= low - 1e-6).all()
-    assert (localiser.map.blocks.mean[:, :2] <= high + 1e-6).all()
+    assert (localiser.blocks.mean[:, :2] >= low - 1e-6).all()
+    assert (localiser.blocks.mean[:, :2] <= high + 1e-6).all()
 
 
 def test_a_long_silence_is_followed_by_the_odometry():
@@ -137,21 +137,21 @@ def test_late_beams_make_it_wait_for_odometry():
 
 def test_free_space_is_known_between_the_vehicle_and_the_walls():
     localiser, _ = localiser_after(6)
-    free = localiser.map.free
+    free = localiser.free
     assert len(free) > 1000
     assert np.hypot(*(free.centers - SCANS[2].reference_pose[:2]).T).min() < 1.0
-    walls = {tuple(cell) for cell in localiser.map.blocks.cells.tolist()}
+    walls = {tuple(cell) for cell in localiser.blocks.cells.tolist()}
     assert len(walls.intersection(map(tuple, free.cells.tolist()))) < 0.2 * len(walls)
 
 
 def test_free_space_is_known_without_matching_too():
     localiser, _ = localiser_after(3, start_matching=False)
-    assert len(localiser.map.free) > 1000
+    assert len(localiser.free) > 1000
 
 
 def test_free_space_is_not_known_where_nobody_wants_it():
     localiser, _ = localiser_after(3, carve=False)
-    assert len(localiser.map.free) == 0
+    assert len(localiser.free) == 0
 
 
 def test_a_stored_map_gives_its_free_space_back():
@@ -159,4 +159,4 @@ def test_a_stored_map_gives_its_free_space_back():
     stored = localiser.stored("map", {}, 0.0, "")
     other, _ = localiser_after(0)
     other.restore(stored, same_odometry=False)
-    assert len(other.map.free) == len(localiser.map.free)
+    assert len(other.free) == len(localiser.free)

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
 
-from mlsm_manager.localisation.joint_parameters import Estimator
-from mlsm_manager.localisation.localiser_settings import MapInput
+from mlsm_manager.localisation.joint_parameters import EstimatorName
+from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
@@ -19,7 +19,7 @@ HARBOUR = tour(14, direction=0.05)
 KILLED_AFTER = 9
 FREE_SCANS = 4
 PARAMETERS = MlsmCoreParameters(
-    estimator=Estimator.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
+    estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
     speed_deviation=0.025, rate_time=12.0, heading_deviation=0.0175, direction_deviation=0.1, size_x_meters=0.0,
     size_y_meters=0.0, free_scans=FREE_SCANS,
 )  # fmt: skip
@@ -77,10 +77,8 @@ def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed, whole):
     for one, other in zip(taken(halves, HARBOUR.scans[KILLED_AFTER:]), wanted[KILLED_AFTER:]):
         np.testing.assert_allclose(one.belief.theta, other.belief.theta, atol=1e-9)
         np.testing.assert_allclose(one.belief.covariance, other.belief.covariance, atol=1e-9)
-    assert halves.map.block_count == whole.map.block_count
-    np.testing.assert_allclose(
-        np.sort(halves.map.blocks.mean, axis=0), np.sort(whole.map.blocks.mean, axis=0), atol=1e-4
-    )
+    assert halves.block_count == whole.block_count
+    np.testing.assert_allclose(np.sort(halves.blocks.mean, axis=0), np.sort(whole.blocks.mean, axis=0), atol=1e-4)
 
 
 def test_what_was_stored_stays_as_it_is_while_scans_are_taken(killed):
@@ -97,15 +95,15 @@ def test_what_was_stored_stays_as_it_is_while_scans_are_taken(killed):
 def test_the_newest_scans_of_a_resumed_run_may_still_move(killed):
     _, stored = killed
     localiser = resumed(stored)
-    before = localiser.mapper.solver.state.nodes[KILLED_AFTER].copy()
+    before = localiser.estimator.solver.state.nodes[KILLED_AFTER].copy()
     taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 2])
-    assert np.abs(localiser.mapper.solver.state.nodes[KILLED_AFTER] - before).max() > 1e-6
+    assert np.abs(localiser.estimator.solver.state.nodes[KILLED_AFTER] - before).max() > 1e-6
 
 
 def test_a_resumed_map_is_the_one_that_was_saved(killed):
     localiser, stored = killed
     again = resumed(stored)
-    assert again.map.block_count == localiser.map.block_count
+    assert again.block_count == localiser.block_count
     assert again.believed_until == localiser.believed_until
 
 
@@ -121,11 +119,11 @@ def test_a_second_kill_loses_no_more_than_the_first(killed):
 def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(killed, has_run):
     _, stored = killed
     localiser = resumed(stored if has_run else without_a_run(stored))
-    before = localiser.map.blocks.rows.copy()
+    before = localiser.blocks.rows.copy()
     updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]))
     assert [update.accepted for update in updates] == [False, False, False]
     assert localiser.is_lost
-    np.testing.assert_array_equal(localiser.map.blocks.rows, before)
+    np.testing.assert_array_equal(localiser.blocks.rows, before)
 
 
 @pytest.mark.parametrize(("has_run", "goes_on"), [(True, True), (False, False)])
@@ -165,9 +163,9 @@ def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, whole,
     assert updates[3].accepted
     assert not localiser.is_lost
     np.testing.assert_allclose(updates[-1].belief.theta[:2], wanted[-1].belief.theta[:2], atol=0.5)
-    walls = {tuple(cell) for cell in whole.map.blocks.cells.tolist()}
-    beside = sum(tuple(cell) not in walls for cell in localiser.map.blocks.cells.tolist())
-    assert beside < 0.2 * before.map.block_count
+    walls = {tuple(cell) for cell in whole.blocks.cells.tolist()}
+    beside = sum(tuple(cell) not in walls for cell in localiser.blocks.cells.tolist())
+    assert beside < 0.2 * before.block_count
 
 
 @pytest.mark.newest_only("dear; test_localiser relocalises with every version")
@@ -176,10 +174,10 @@ def test_a_loaded_map_is_not_written_into_before_the_vehicle_is_found(killed):
     localiser = resumed(stored, same_odometry=False)
     rng, last = np.random.RandomState(0), HARBOUR.scans[-1]
     places = np.column_stack([rng.uniform(-25.0, 25.0, (len(last), 2)), last.points[:, 2:]])
-    before = localiser.map.blocks.rows.copy()
+    before = localiser.blocks.rows.copy()
     nowhere = Scan(places, last.times, last.moving, last.track, last.reference_time)
     assert not localiser.take_scan(nowhere).scan.accepted
-    np.testing.assert_array_equal(localiser.map.blocks.rows, before)
+    np.testing.assert_array_equal(localiser.blocks.rows, before)
 
 
 def test_a_jump_in_time_after_the_start_makes_the_place_unknown(killed):
@@ -201,8 +199,8 @@ def test_a_jump_in_time_after_the_start_makes_the_place_unknown(killed):
 def test_a_run_that_does_not_fit_leaves_the_map_alone(killed, name, array):
     _, stored = killed
     localiser = resumed(replace(stored, arrays={**stored.arrays, name: array}))
-    assert localiser.mapper.solver is None
-    assert localiser.map.block_count == len(stored.shown)
+    assert localiser.estimator.solver is None
+    assert localiser.block_count == len(stored.shown)
     assert taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 1])[0].accepted
 
 
@@ -211,8 +209,8 @@ def test_a_run_with_another_odometry_profile_is_refused(killed):
     other = PARAMETERS.changed({"odometry": "THRUSTERS"}).build_localiser(SONAR_IN_BASE)
     told = "it was stored with another odometry profile: DvlFactors, not ThrusterFactors"
     assert other.restore(stored, same_odometry=True) == told
-    assert other.mapper.solver is None
-    assert other.map.block_count == len(stored.shown)
+    assert other.estimator.solver is None
+    assert other.block_count == len(stored.shown)
 
 
 def test_two_profiles_with_as_many_unknowns_are_told_apart():

@@ -6,8 +6,8 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -33,7 +33,7 @@ class MovedBy:
 def cloud(number, *echoes):
     """Return keyframe `number`, which ends at that second, with a beam for each of the echoes (x, y) [m]."""
     points = np.array([[x, y, -2.0, 50.0] for x, y in echoes]).reshape(-1, 4)
-    return TimedPoints(points, number + 0.001 * np.arange(len(points)), float(number))
+    return Cloud(points, number + 0.001 * np.arange(len(points)), float(number))
 
 
 def carved_map(*clouds, place=None):

@@ -8,8 +8,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_maps import random_points
 
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION, LIMIT = 0.5, 1000.0
@@ -18,7 +18,7 @@ RESOLUTION, LIMIT = 0.5, 1000.0
 def cloud(number):
     """Return keyframe `number`: a flat patch of points that ends at that second."""
     points = random_points(number, 40, extent=3.0) * [1.0, 1.0, 0.0, 1.0]
-    return TimedPoints(points, np.full(len(points), float(number)), float(number))
+    return Cloud(points, np.full(len(points), float(number)), float(number))
 
 
 @dataclass(frozen=True)

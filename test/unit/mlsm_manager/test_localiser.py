@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from made_scans import SECONDS, at_velocity, harbour, scan_of, still
 
-from mlsm_manager.localisation.localiser import Localiser
-from mlsm_manager.localisation.localiser_settings import MapInput
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import LocaliserParameters, MlsmCoreParameters
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.scan_matching.result import MatchStatus
 from node_support.errors import RefusedInput
 
@@ -31,7 +30,7 @@ def localiser_after(turns, **changes):
 def test_scans_correct_the_odometry_and_make_the_map():
     localiser, taken = localiser_after(4)
     assert [update.scan.result.status for update in taken[1:]] == [MatchStatus.CONVERGED] * 3
-    assert localiser.map.block_count == len(localiser.map.blocks) > 50
+    assert localiser.block_count == len(localiser.blocks) > 50
     assert localiser.believed_until == 4 * SECONDS
 
 
@@ -46,26 +45,26 @@ def test_the_correction_moves_to_a_fix_within_the_blend_time():
 def test_where_cleaned_clouds_make_the_map_they_wait_for_the_scan_of_their_time():
     localiser = MlsmCoreParameters(start_matching=True).build_localiser()
     localiser.take_scan(drifting(0))
-    assert localiser.take_cloud(TimedPoints.of_scan(drifting(1))).waiting
-    assert localiser.map.block_count == 0
+    assert localiser.take_cloud(Cloud.of_scan(drifting(1))).waiting
+    assert localiser.block_count == 0
     (waited,) = localiser.take_scan(drifting(1)).clouds
     assert waited.report.inserted == len(harbour())
 
 
 def test_points_in_map_are_inserted_as_they_are():
     localiser, _ = localiser_after(0)
-    localiser.take_placed(np.array([[1.0, 2.0, 0.0, 9.0]]))
-    np.testing.assert_array_equal(localiser.map.blocks.mean, [[1.0, 2.0, 0.0, 9.0]])
+    localiser.take_points(np.array([[1.0, 2.0, 0.0, 9.0]]))
+    np.testing.assert_array_equal(localiser.blocks.mean, [[1.0, 2.0, 0.0, 9.0]])
 
 
 @pytest.mark.parametrize("take", ["take_scan", "take_cloud"])
 def test_a_jump_back_in_time_keeps_the_map_and_forgets_the_place(take):
     localiser, _ = localiser_after(8)
-    count = localiser.map.block_count
+    count = localiser.block_count
     assert localiser.notice_time(SECONDS) == 7 * SECONDS
-    assert (localiser.believed_until, localiser.map.block_count) == (None, count)
+    assert (localiser.believed_until, localiser.block_count) == (None, count)
     early = drifting(0)
-    assert getattr(localiser, take)(early if take == "take_scan" else TimedPoints.of_scan(early)) is not None
+    assert getattr(localiser, take)(early if take == "take_scan" else Cloud.of_scan(early)) is not None
 
 
 def test_a_scan_that_is_late_by_more_than_half_a_minute_is_refused():
@@ -102,9 +101,9 @@ def test_relocalisation_without_a_scan_finds_nothing():
 
 def test_clear_forgets_map_and_scan():
     localiser, _ = localiser_after(2)
-    count = localiser.map.block_count
+    count = localiser.block_count
     assert localiser.clear() == count
-    assert (localiser.map.block_count, localiser.believed_until, localiser.relocalise()) == (0, None, None)
+    assert (localiser.block_count, localiser.believed_until, localiser.relocalise()) == (0, None, None)
 
 
 def test_matching_is_turned_on_and_off():
@@ -118,7 +117,7 @@ def test_other_settings_hold_from_the_next_scan_on():
     localiser, _ = localiser_after(1)
     localiser.use(PARAMETERS.changed({"min_points": 10000}).localiser_settings())
     assert localiser.take_scan(drifting(1)).scan.result.status is MatchStatus.TOO_FEW_POINTS
-    assert localiser.map.block_count > 0
+    assert localiser.block_count > 0
 
 
 def test_a_recording_and_a_live_node_that_matches_make_the_same_localiser():
@@ -126,7 +125,7 @@ def test_a_recording_and_a_live_node_that_matches_make_the_same_localiser():
     recorded, _ = localiser_after(3)
     for turn in range(3):
         live.take_scan(drifting(turn))
-    np.testing.assert_allclose(live.map.blocks.rows, recorded.map.blocks.rows, rtol=0.0, atol=1e-9)
+    np.testing.assert_allclose(live.blocks.rows, recorded.blocks.rows, rtol=0.0, atol=1e-9)
 
 
 class Clock:
@@ -140,7 +139,7 @@ class Clock:
 
 def test_under_an_odometry_without_stamps_a_fix_is_blended_in_and_then_holds():
     clock = Clock()
-    localiser = Localiser(PARAMETERS.build_localiser().mapper, PARAMETERS.localiser_settings(), clock)
+    localiser = Localiser(PARAMETERS.build_localiser().estimator, PARAMETERS.localiser_settings(), clock)
     np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))
     localiser.take_scan(scan_of(harbour(), still()))
     localiser.take_scan(scan_of(harbour(), still((1.0, 0.0, 0.0)), still(), start=SECONDS))

@@ -8,9 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, still
 
-from mlsm_manager.localisation.correction_history import CorrectionHistory
+from mlsm_manager.localisation.clouds import Cloud, CorrectionHistory
 from mlsm_manager.localisation.live_correction import LiveCorrection
-from mlsm_manager.localisation.timed_points import TimedPoints
 from mlsm_manager.scan_matching.prediction import Belief, Fading
 from mlsm_manager.scan_matching.scan import Track
 
@@ -26,7 +25,7 @@ def belief_of(time, pose, *errors):
 
 def cloud_at(times):
     times = np.array(times, dtype=float)
-    return TimedPoints(np.zeros((len(times), 4)), times, float(times[-1]))
+    return Cloud(np.zeros((len(times), 4)), times, float(times[-1]))
 
 
 def history_of(*stretches):
@@ -145,34 +144,30 @@ def test_clear_forgets_what_was_before_a_jump_of_time():
 
 
 def test_points_are_placed_by_the_stretch_of_their_time():
-    placed = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, True)).placed(cloud_at([1.0, 4.0]))
-    points, unplaced = placed.points, placed.unplaced
+    points, times = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, True)).placed(cloud_at([1.0, 4.0]))
     np.testing.assert_allclose(points[:, 0], [1.0, 3.0])
-    assert unplaced == 0
+    assert times.tolist() == [1.0, 4.0]
 
 
 def test_between_two_times_the_correction_is_between_theirs():
     history = CorrectionHistory()
     poses = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
     history.add(np.array([0.0, 2.0]), poses, Track(TIMES, still()(TIMES)), holds=True)
-    assert history.placed(cloud_at([0.5])).points[0, 0] == pytest.approx(0.5)
+    assert history.placed(cloud_at([0.5]))[0][0, 0] == pytest.approx(0.5)
 
 
 def test_points_of_a_rejected_stretch_have_no_place():
-    placed = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, False)).placed(cloud_at([1.0, 3.0, 4.0]))
-    points, unplaced = placed.points, placed.unplaced
-    assert len(points) == 1
-    assert unplaced == 2
+    points, times = history_of((0.0, 2.0, 1.0, True), (2.5, 5.0, 3.0, False)).placed(cloud_at([1.0, 3.0, 4.0]))
+    assert (len(points), times.tolist()) == (1, [1.0])
 
 
 def test_without_history_no_point_has_a_place():
-    placed = CorrectionHistory().placed(cloud_at([1.0, 4.0]))
-    points, unplaced = placed.points, placed.unplaced
-    assert (len(points), unplaced) == (0, 2)
+    points, times = CorrectionHistory().placed(cloud_at([1.0, 4.0]))
+    assert (len(points), len(times)) == (0, 0)
     assert CorrectionHistory().end == -np.inf
 
 
 def test_only_the_last_stretches_are_kept():
     history = history_of(*[(float(k), k + 0.5, float(k), True) for k in range(9)])
     assert history.end == 8.5
-    assert history.placed(cloud_at([0.2])).points[0, 0] == pytest.approx(1.0)
+    assert history.placed(cloud_at([0.2]))[0][0, 0] == pytest.approx(1.0)

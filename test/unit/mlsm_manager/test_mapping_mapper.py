@@ -3,10 +3,10 @@
 import numpy as np
 from made_scans import at_velocity, harbour, scan_of, still, wall
 
-from mlsm_manager.localisation.map_layers import MapSettings
-from mlsm_manager.localisation.mapper import Mapper
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
-from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
@@ -21,16 +21,18 @@ def drift(times):
     return at_velocity((0.02, 0.01, 0.0))(np.asarray(times) - 16.0)
 
 
-def mapper_of(matching=True, **changes):
+def estimator_of(matching=True, **changes):
     kind = MATCHERS[MatcherName.DISTRIBUTIONS]
-    mapper = Mapper(SETTINGS, OdometryErrors(speed_deviation=0.05), kind.build(kind.parameters().changed(changes)))
-    mapper.matching = matching
-    return mapper
+    estimator = ScanByScan(
+        SETTINGS, OdometryErrors(speed_deviation=0.05), kind.build(kind.parameters().changed(changes))
+    )
+    estimator.matching = matching
+    return estimator
 
 
 def mapped(scans, **options):
-    mapper = mapper_of(**options)
-    return mapper, [mapper.take_echoes(scan) for scan in scans]
+    estimator = estimator_of(**options)
+    return estimator, [estimator.add_scan(scan) for scan in scans]
 
 
 def drifting(turn, places=None):
@@ -43,23 +45,23 @@ def unknown_place(turn):
 
 
 def test_the_first_scan_makes_the_map_where_the_odometry_says():
-    mapper, (update,) = mapped([drifting(0)])
+    estimator, (update,) = mapped([drifting(0)])
     assert update.accepted
     assert update.result is None
-    np.testing.assert_array_equal(mapper.correction, np.zeros(3))
-    assert len(mapper.matched) > 50
+    np.testing.assert_array_equal(estimator.correction, np.zeros(3))
+    assert len(estimator.matched) > 50
 
 
 def test_matched_scans_correct_the_odometry():
-    mapper, updates = mapped([drifting(turn) for turn in range(4)])
+    estimator, updates = mapped([drifting(turn) for turn in range(4)])
     assert [update.result.status for update in updates[1:]] == [MatchStatus.CONVERGED] * 3
-    np.testing.assert_allclose(mapper.belief.theta[:2], updates[0].belief.theta[:2], atol=0.1)
+    np.testing.assert_allclose(estimator.belief.theta[:2], updates[0].belief.theta[:2], atol=0.1)
 
 
 def test_without_matching_the_correction_stays():
-    mapper, updates = mapped([drifting(turn) for turn in range(4)], matching=False)
+    estimator, updates = mapped([drifting(turn) for turn in range(4)], matching=False)
     assert all(update.result is None and update.accepted for update in updates)
-    np.testing.assert_array_equal(mapper.correction, np.zeros(3))
+    np.testing.assert_array_equal(estimator.correction, np.zeros(3))
 
 
 def test_a_matched_scan_goes_into_the_map_undistorted():
@@ -70,95 +72,97 @@ def test_a_matched_scan_goes_into_the_map_undistorted():
 
 
 def test_a_rejected_scan_leaves_map_and_correction_alone():
-    mapper, _ = mapped([drifting(0), drifting(1)])
-    rows, correction = mapper.matched.blocks.rows.copy(), mapper.correction.copy()
-    update = mapper.take_echoes(unknown_place(2))
+    estimator, _ = mapped([drifting(0), drifting(1)])
+    rows, correction = estimator.matched.blocks.rows.copy(), estimator.correction.copy()
+    update = estimator.add_scan(unknown_place(2))
     assert not update.accepted
     assert update.result.reason
-    np.testing.assert_array_equal(mapper.matched.blocks.rows, rows)
-    np.testing.assert_array_equal(mapper.correction, correction)
+    np.testing.assert_array_equal(estimator.matched.blocks.rows, rows)
+    np.testing.assert_array_equal(estimator.correction, correction)
 
 
 def test_after_rejections_the_place_is_less_sure_and_is_found_again():
-    mapper, updates = mapped([drifting(0), drifting(1), unknown_place(2), unknown_place(3), drifting(4)])
+    estimator, updates = mapped([drifting(0), drifting(1), unknown_place(2), unknown_place(3), drifting(4)])
     deviations = [np.sqrt(update.belief.covariance[0, 0]) for update in updates]
     assert deviations[1] < deviations[2] < deviations[3]
     assert updates[4].accepted
-    np.testing.assert_allclose(mapper.belief.theta[:2], updates[0].belief.theta[:2], atol=0.15)
+    np.testing.assert_allclose(estimator.belief.theta[:2], updates[0].belief.theta[:2], atol=0.15)
 
 
 def test_a_cloud_waits_for_the_match_of_its_time_and_goes_where_that_puts_it():
-    mapper, _ = mapped([drifting(0)])
-    cloud = TimedPoints.of_scan(drifting(1))
-    assert mapper.take_cloud(cloud).waiting
-    assert mapper.take_waiting() is None
-    mapper.take_echoes(drifting(1))
-    update = mapper.take_waiting()
+    estimator, _ = mapped([drifting(0)])
+    cloud = Cloud.of_scan(drifting(1))
+    assert estimator.add_cloud(cloud).waiting
+    assert estimator.add_waiting() is None
+    estimator.add_scan(drifting(1))
+    update = estimator.add_waiting()
     assert not update.waiting
     assert update.report.inserted == len(cloud)
 
 
 def test_a_cloud_of_a_rejected_scan_stays_out_of_the_map():
-    mapper, _ = mapped([drifting(0), drifting(1), unknown_place(2)])
-    update = mapper.take_cloud(TimedPoints.of_scan(drifting(2)))
+    estimator, _ = mapped([drifting(0), drifting(1), unknown_place(2)])
+    update = estimator.add_cloud(Cloud.of_scan(drifting(2)))
     assert update.unplaced > 0.8 * len(harbour())
     assert update.report.inserted < 0.2 * len(harbour())
 
 
 def test_without_matching_a_cloud_is_inserted_at_once():
-    mapper = mapper_of(matching=False)
-    update = mapper.take_cloud(TimedPoints.of_scan(drifting(0)))
+    estimator = estimator_of(matching=False)
+    update = estimator.add_cloud(Cloud.of_scan(drifting(0)))
     assert not update.waiting
     assert update.report.inserted == len(harbour())
 
 
 def test_an_empty_scan_is_rejected_and_nothing_breaks():
-    mapper, _ = mapped([drifting(0), drifting(1)])
+    estimator, _ = mapped([drifting(0), drifting(1)])
     empty = drifting(2)
     empty = Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), empty.track, empty.reference_time)
-    assert mapper.take_echoes(empty).result.status is MatchStatus.TOO_FEW_POINTS
+    assert estimator.add_scan(empty).result.status is MatchStatus.TOO_FEW_POINTS
 
 
 def test_clear_forgets_map_and_place():
-    mapper, _ = mapped([drifting(0), drifting(1)])
-    mapper.clear()
-    assert (len(mapper.matched), mapper.block_count, mapper.belief) == (0, 0, None)
-    np.testing.assert_array_equal(mapper.correction, np.zeros(3))
+    estimator, _ = mapped([drifting(0), drifting(1)])
+    estimator.clear()
+    assert (len(estimator.matched), len(estimator.shown), estimator.belief) == (0, 0, None)
+    np.testing.assert_array_equal(estimator.correction, np.zeros(3))
 
 
 def test_forget_place_keeps_the_map():
-    mapper, _ = mapped([drifting(0), drifting(1)])
-    count = len(mapper.matched)
-    mapper.forget_place()
-    assert len(mapper.matched) == count
-    assert mapper.belief is None
+    estimator, _ = mapped([drifting(0), drifting(1)])
+    count = len(estimator.matched)
+    estimator.forget_place()
+    assert len(estimator.matched) == count
+    assert estimator.belief is None
 
 
 def test_the_belief_can_follow_the_odometry_without_scans():
-    mapper, _ = mapped([drifting(0)])
-    before = mapper.belief
-    mapper.follow(drifting(1).track, 30.0)
-    assert mapper.belief.time == 30.0
-    assert mapper.belief.covariance[0, 0] > before.covariance[0, 0]
+    estimator, _ = mapped([drifting(0)])
+    before = estimator.belief
+    estimator.follow(drifting(1).track, 30.0)
+    assert estimator.belief.time == 30.0
+    assert estimator.belief.covariance[0, 0] > before.covariance[0, 0]
 
 
 def test_relocalisation_finds_the_place_anywhere_in_the_map():
-    mapper, _ = mapped([scan_of(harbour(), still())])
+    estimator, _ = mapped([scan_of(harbour(), still())])
     lost = scan_of(harbour(), still(), still((40.0, -70.0, 2.5)))
     matcher = relocaliser(DistributionMatcherParameters())
-    result = relocalised(lost, mapper.matched.blocks, matcher, OdometryErrors())
+    result = relocalised(lost, estimator.matched.blocks, matcher, OdometryErrors())
     assert result.accepted, result.reason
     np.testing.assert_allclose(result.pose, np.zeros(3), atol=0.05)
 
 
 def test_relocalisation_along_a_wall_is_refused():
-    mapper, _ = mapped([scan_of(wall((-20, 10), (20, 10)), still())])
+    estimator, _ = mapped([scan_of(wall((-20, 10), (20, 10)), still())])
     matcher = relocaliser(DistributionMatcherParameters())
-    result = relocalised(scan_of(wall((-10, 10), (10, 10)), still()), mapper.matched.blocks, matcher, OdometryErrors())
+    result = relocalised(
+        scan_of(wall((-10, 10), (10, 10)), still()), estimator.matched.blocks, matcher, OdometryErrors()
+    )
     assert not result.accepted
 
 
 def test_relocalisation_in_an_empty_map_is_refused():
     matcher = relocaliser(DistributionMatcherParameters())
-    result = relocalised(drifting(0), mapper_of().matched.blocks, matcher, OdometryErrors())
+    result = relocalised(drifting(0), estimator_of().matched.blocks, matcher, OdometryErrors())
     assert result.status is MatchStatus.TOO_FEW_POINTS

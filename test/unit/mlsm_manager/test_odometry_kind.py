@@ -8,7 +8,7 @@ from dead_reckoning.parameters import DeadReckoningParameters
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import PROFILES, profile_values, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.localisation.update_report import report_turn
+from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
 from mlsm_manager.offline.replay_parameters import ReplayParameters

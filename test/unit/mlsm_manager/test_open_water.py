@@ -3,7 +3,7 @@
 import pytest
 from benchmarks.open_water import bubbles, outcome
 
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 
 pytestmark = pytest.mark.long
 
@@ -11,7 +11,7 @@ SCANS = 50
 
 
 @pytest.mark.newest_only("a statistic of many scans; test_map_bag and test_localiser compute single ones")
-@pytest.mark.parametrize("estimator", Estimator)
+@pytest.mark.parametrize("estimator", EstimatorName)
 def test_noise_and_bubbles_correct_nothing(estimator):
     found = outcome(bubbles, estimator, SCANS, seed=2)
     assert (found.scans, found.fixes) == (SCANS, 0)

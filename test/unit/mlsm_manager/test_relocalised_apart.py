@@ -5,10 +5,10 @@ import pytest
 from made_compass import with_heading_only
 from made_harbour import SONAR_IN_BASE, TURN, ahead, tour
 
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.localisation.timed_points import TimedPoints
 
 pytestmark = pytest.mark.long
 HEARD, SILENT, AFTER = 10, 5, 3
@@ -29,7 +29,7 @@ class Run:
         profile = {**profile_values(OdometryKind.HEADING), "start_matching": True}
         self.localiser = MlsmCoreParameters().changed(profile).build_localiser(SONAR_IN_BASE)
         self.take(made.scans[:HEARD])
-        self.blocks = self.localiser.map.blocks
+        self.blocks = self.localiser.blocks
         self.take(made.scans[-AFTER:])
         begin, end = made.truth.at(np.array([0.0, made.scans[-1].reference_time]))
         self.expected = end - begin * [1.0, 1.0, 0.0]
@@ -39,7 +39,7 @@ class Run:
         for scan in scans:
             scan = with_heading_only(scan)
             self.localiser.take_scan(scan)
-            self.localiser.take_cloud(TimedPoints.of_scan(scan))
+            self.localiser.take_cloud(Cloud.of_scan(scan))
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def far_from(blocks, others):
 
 
 def test_1_what_it_hears_after_the_silence_lies_apart(run):
-    assert far_from(run.localiser.map.blocks, run.blocks) > 50
+    assert far_from(run.localiser.blocks, run.blocks) > 50
 
 
 def test_2_it_is_found_in_the_map_from_before(run):
@@ -65,4 +65,4 @@ def test_2_it_is_found_in_the_map_from_before(run):
 
 
 def test_3_what_lay_apart_is_not_in_the_map_any_more(run):
-    assert far_from(run.localiser.map.blocks, run.blocks) == 0
+    assert far_from(run.localiser.blocks, run.blocks) == 0

@@ -103,25 +103,25 @@ def test_another_odometry_is_found_anywhere_in_the_map(stored):
 
 def test_a_lost_vehicle_does_not_write_into_the_map(stored):
     localiser = restored(stored, same_odometry=False)
-    before = localiser.map.blocks.rows.copy()
+    before = localiser.blocks.rows.copy()
     assert not localiser.take_scan(elsewhere(1)).scan.accepted
-    np.testing.assert_array_equal(localiser.map.blocks.rows, before)
+    np.testing.assert_array_equal(localiser.blocks.rows, before)
     assert localiser.is_lost
 
 
 def test_a_map_of_another_resolution_is_refused_and_the_present_one_stays(stored):
     localiser = PARAMETERS.changed({"resolution": 0.25}).build_localiser()
     localiser.take_scan(drifting(0))
-    count = localiser.map.block_count
+    count = localiser.block_count
     with pytest.raises(ValueError, match=r"resolution 0\.5 m: must be the map's, 0\.25 m"):
         localiser.restore(stored, same_odometry=True)
-    assert (localiser.map.block_count, localiser.is_lost) == (count, False)
+    assert (localiser.block_count, localiser.is_lost) == (count, False)
 
 
 def test_a_map_without_a_matched_layer_is_matched_with_as_it_is_shown(stored):
     shown_only = StoredMap("map", {Layer.SHOWN: stored.layers[Layer.SHOWN]})
     localiser = restored(shown_only, same_odometry=False)
-    assert len(localiser.mapper.matched) == len(stored.layers[Layer.SHOWN])
+    assert len(localiser.estimator.matched) == len(stored.layers[Layer.SHOWN])
 
 
 @pytest.mark.parametrize("name", ["T_map_odom", "time", "state", "covariance"])

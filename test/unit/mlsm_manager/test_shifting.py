@@ -19,7 +19,7 @@ from mlsm_manager.joint_solver.ways.way_comparisons import nats_of
 from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
 from mlsm_manager.joint_solver.ways.way_nodes import on_path
 from mlsm_manager.joint_solver.ways.ways import Ways
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
@@ -139,7 +139,7 @@ def test_a_run_that_heard_nothing_stays_as_it_is():
 
 def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():
     made = tour(6, path=along_canal, corners=CANAL)
-    profile = MlsmCoreParameters(estimator=Estimator.JOINT).changed(profile_values(OdometryKind.HEADING))
+    profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(OdometryKind.HEADING))
     live = LiveSolver(profile.solver_parameters(profile.part(OdometryErrors), 0.0), SONAR_IN_BASE)
     for scan in made.scans:
         live.add(scan)

@@ -6,7 +6,7 @@ from made_harbour import SONAR_IN_BASE, TURN, tour
 
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solve.way_batch import solved_best
-from mlsm_manager.localisation.joint_parameters import Estimator
+from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.localisation.odometry_profiles import profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
@@ -35,7 +35,7 @@ MADE = tour(14, path=strafed)
 
 
 def solver_of(kind):
-    profile = MlsmCoreParameters(estimator=Estimator.JOINT).changed(profile_values(kind))
+    profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(kind))
     return LiveSolver(profile.solver_parameters(profile.part(OdometryErrors), 0.0), SONAR_IN_BASE)
 
 

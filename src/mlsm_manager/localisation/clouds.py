@@ -1,20 +1,49 @@
-"""Which correction of the odometry holds at which time of the last scans, for clouds that come beside them."""
+"""Points with the times of their beams, and where those that come beside the scans lie in map."""
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Optional
+from typing import Deque, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.timed_points import TimedPoints
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import composed, inverse, transformed
 
-# A cloud comes within a scan or two of its own; eight turns of a head are two minutes.
 _MOST_STRETCHES = 8
-
-# s by which a cloud may reach beyond the scans that are known: a few beams, in which a vehicle moves decimetres.
+"""A cloud comes within a scan or two of its own; eight turns of a head are two minutes."""
 _SLACK = 0.5
+"""s by which a cloud may reach beyond the scans that are known: a few beams, in which a vehicle moves decimetres."""
+
+
+@dataclass(frozen=True)
+class Cloud:
+    """points: (n, 4) float64, x y z [m] in odom and echo strength. times: (n,) s. end: s, stamp of the newest beam."""
+
+    points: np.ndarray
+    times: np.ndarray
+    end: float
+
+    @classmethod
+    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "Cloud":
+        """Build from a cloud's points (n, 4) and signed time stamps (n,); points that are not finite are left out."""
+        points = np.asarray(points, dtype=np.float64)
+        stamps = np.asarray(time_stamps, dtype=np.float64)
+        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
+        return cls(points[valid], np.abs(stamps[valid]), end)
+
+    @classmethod
+    def of_scan(cls, scan: Scan) -> "Cloud":
+        """Return the points of a scan."""
+        return cls(scan.points, scan.times, scan.reference_time)
+
+    @classmethod
+    def joined(cls, clouds: "Sequence[Cloud]") -> "Cloud":
+        """Return the points of clouds (at least one), one after the other, as one cloud."""
+        points, times = ([getattr(cloud, name) for cloud in clouds] for name in ("points", "times"))
+        return cls(np.concatenate(points), np.concatenate(times), max(cloud.end for cloud in clouds))
+
+    def __len__(self) -> int:
+        return len(self.points)
 
 
 @dataclass(frozen=True)
@@ -28,15 +57,6 @@ class _Stretch:
     corrections: np.ndarray
     poses: np.ndarray
     holds: bool
-
-
-@dataclass(frozen=True)
-class PlacedPoints:
-    """points: (k, 4) in map. times: (k,) s. unplaced: how many were left out because their time has no place."""
-
-    points: np.ndarray
-    times: np.ndarray
-    unplaced: int
 
 
 class CorrectionHistory:
@@ -55,13 +75,13 @@ class CorrectionHistory:
         corrections = composed(poses, inverse(track.at(times)))
         self._stretches.append(_Stretch(times, corrections, poses, holds))
 
-    def placed(self, cloud: TimedPoints) -> PlacedPoints:
-        """Return the points of `cloud` in map, without those whose time has no place.
+    def placed(self, cloud: Cloud) -> Tuple[np.ndarray, np.ndarray]:
+        """Return those of the cloud's points whose time has a place, (k, 4) in map, and the times of their beams (k,).
 
         Between two stretches the nearer one's end counts.
         """
         if not self._stretches:
-            return PlacedPoints(np.empty((0, 4)), np.empty(0), len(cloud))
+            return np.empty((0, 4)), np.empty(0)
         times = np.concatenate([stretch.times for stretch in self._stretches])
         corrections = np.concatenate([stretch.corrections for stretch in self._stretches])
         holds = np.concatenate([np.full(len(stretch.times), stretch.holds) for stretch in self._stretches])
@@ -69,7 +89,7 @@ class CorrectionHistory:
         keep = holds[nearest]
         chosen = cloud.times[keep]
         path = np.column_stack([np.interp(chosen, times, corrections[:, axis]) for axis in range(3)])
-        return PlacedPoints(transformed(path, cloud.points[keep]), chosen, int(np.count_nonzero(~keep)))
+        return transformed(path, cloud.points[keep]), chosen
 
     def reaches(self, times: np.ndarray) -> bool:
         """Return whether all of `times` (n,) [s], n > 0, are known or from before the history begins."""

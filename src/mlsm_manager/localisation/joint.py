@@ -1,12 +1,14 @@
-"""The joint solver as a ScanMapper: scans in, a map drawn from keyframes and the vehicle's place in it out."""
+"""The joint solver as an estimator: scans in, a map drawn from keyframes and the vehicle's place in it out."""
 
 from time import perf_counter
-from typing import List, Mapping, Optional
+from typing import List, Mapping, Optional, Sequence
 
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint_belief import (
     belief_at,
     belief_of,
@@ -16,28 +18,27 @@ from mlsm_manager.localisation.joint_belief import (
     prior_at,
     update_of,
 )
-from mlsm_manager.localisation.joint_clouds import JointClouds
 from mlsm_manager.localisation.joint_maps import JointMaps
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
-from mlsm_manager.localisation.map_layers import MapSettings, ShowsMaps
-from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
+from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.localisation.run_continuation import continued
-from mlsm_manager.localisation.stored_run import StoredRun
-from mlsm_manager.localisation.timed_points import TimedPoints
+from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.scan_matching.result import MatchResult
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.free_space.carving import CarveReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, transformed
 
 
-class JointMapper(ShowsMaps):
+class Joint(Estimator):
     """Follows the vehicle with all scans at once: the newest may still move, the older ones are the map.
 
     No scan of a run is rejected: one that says little moves little, and its covariance grows. While `matching` is off
@@ -48,18 +49,13 @@ class JointMapper(ShowsMaps):
     """
 
     def __init__(
-        self, settings: MapSettings, errors: OdometryErrors, parameters: MultiViewParameters, matcher: Matcher,
-        sonar_in_base: np.ndarray,
+        self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher, sonar_in_base: Sequence[float],
+        parameters: MultiViewParameters,
     ) -> None:  # fmt: skip
-        """`sonar_in_base`: (2,) m; `mount` changes it."""
-        self.settings = settings
-        self.errors = errors
+        """`sonar_in_base`: (2,) m; `mount` changes it from the next run on."""
         self.parameters = parameters
-        self.matcher = matcher
-        self.matching = False
-        self._sonar_in_base = sonar_in_base
         self._session: Optional[JointSession] = None
-        self.clear()
+        super().__init__(settings, errors, matcher, sonar_in_base)
 
     def clear(self) -> None:
         """Forget the map and the place in it."""
@@ -70,20 +66,13 @@ class JointMapper(ShowsMaps):
     def forget_place(self) -> None:
         """Keep the map but forget where the vehicle is, because time jumped."""
         self._end_session()
-        self.belief: Optional[Belief] = None
-        self._expected: Optional[Belief] = None
-        self.correction = np.zeros(3)
-        self._start: Optional[np.ndarray] = None
-        self._clouds = JointClouds(self._maps.shown)
+        super().forget_place()
+        self._found_at = -np.inf
 
     @property
     def lookahead(self) -> float:
         """Seconds of odometry after a scan's end that it is placed better with, because beams may be late."""
         return self.parameters.window.lookahead
-
-    def mount(self, sonar_in_base: np.ndarray) -> None:
-        """Learn where the sonar is in base_link, (2,) m; it counts from the next run on."""
-        self._sonar_in_base = sonar_in_base
 
     def verdicts(self) -> List[Verdict]:
         """Return whether the newest scans of the run agree with the map, and how uncertain its path has become."""
@@ -102,15 +91,18 @@ class JointMapper(ShowsMaps):
         return self._maps.matched.drawn_until(self._session.apart_from, self._session)
 
     @property
-    def _shown_map(self) -> MultiLevelSurfaceMap:
+    def shown(self) -> MultiLevelSurfaceMap:
+        """The map that is shown and saved."""
         return self._maps.shown.map
 
     @property
-    def _matched_map(self) -> MultiLevelSurfaceMap:
+    def matched(self) -> MultiLevelSurfaceMap:
+        """The map that is searched for a lost vehicle, and whose surfaces a new run begins among."""
         return self._maps.matched.map
 
     @property
-    def _free_space(self) -> KeyframeCarving:
+    def free(self) -> KeyframeCarving:
+        """What is known to be free, in the map that is shown."""
         return self._maps.shown.free
 
     @property
@@ -119,12 +111,7 @@ class JointMapper(ShowsMaps):
         return {} if self._session is None else self._maps.stored(self._session)
 
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
-        """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
-
-        Return why the stored run cannot go on; nothing where it does, or where there is none. A map without a matched
-        layer is matched with as it is shown. Raises ValueError, and keeps all as it is, for other resolutions than
-        those of the settings.
-        """
+        """Take stored maps in the place of the present ones; go on with a stored run. See Estimator.restore."""
         self._take(layers)
         run = StoredRun.of_arrays(keyframes)
         if run is None:
@@ -144,12 +131,7 @@ class JointMapper(ShowsMaps):
         self._maps = maps
         self.forget_place()
 
-    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
-        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
-        self.correction = np.array(correction, dtype=np.float64)
-        self._expected = belief
-
-    def take_echoes(self, scan: Scan) -> ScanUpdate:
+    def add_scan(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan together with those of the scans before it, and draw the map anew."""
         if not self.matching:
             return self._place(scan)
@@ -161,11 +143,11 @@ class JointMapper(ShowsMaps):
         A stored run goes on where its solver finds the scan on the map, also if the scan alone says too little.
         """
         start = perf_counter()
-        longer = None if self._session is None else continued(self._session, scan, self._matched_map)
+        longer = None if self._session is None else continued(self._session, scan, self.matched)
         if longer is not None:
             self._expected = None
             return self._taken(scan, longer, start)
-        result = self.matcher.match(scan, self._matched_map, prior_at(self.correction, scan, expected))
+        result = self.matcher.match(scan, self.matched, prior_at(self.correction, scan, expected))
         if not result.accepted:
             return ScanUpdate(scan, result, False, self.belief)
         if self._session is None:
@@ -178,32 +160,12 @@ class JointMapper(ShowsMaps):
         session = self._session
         self._end_session(np.inf if session is None else session.apart_from)
         self._expected = None
-        self._clouds.found(scan.start)
+        # Nobody knows how far the odometry strayed until now: clouds from before are left out.
+        self._found_at = scan.start
         self.correction = result.correction(scan)
         self._start = np.sqrt(np.diag(result.covariance)[POSE])
         self.belief = belief_of_match(scan, result, self.errors)
         return ScanUpdate(scan, result, True, self.belief, forgotten=0 if session is None else session.turns_apart)
-
-    def take_cloud(self, cloud: TimedPoints) -> CloudUpdate:
-        """Put a cloud into the map that is shown, or let it wait for the scan of its time; see JointClouds."""
-        if self.matching:
-            return self._clouds.take(cloud, self._session)
-        return self._clouds.place(cloud, self.correction, self._sonar_in_base)
-
-    def take_placed(self, points: np.ndarray) -> CloudUpdate:
-        """Insert points (n, 4) that are in map already into the map that is shown."""
-        return CloudUpdate(self._maps.shown.insert(points), False, 0)
-
-    def take_waiting(self) -> Optional[CloudUpdate]:
-        """Insert or carve the next cloud that waited, if its time is known now; None when there is none."""
-        known_until = -np.inf if self._session is None else self._session.known_until
-        cloud = self._clouds.next_until(known_until if self.matching else np.inf)
-        if cloud is not None:
-            return self.take_cloud(cloud)
-        if self.matching:
-            # A run does not tell where the vehicle was by the odometry, with which such clouds were placed.
-            self._clouds.forget_uncarved()
-        return self._clouds.carve_next(self._sonar_in_base)
 
     def follow(self, track: Track, time: float) -> None:
         """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
@@ -212,6 +174,29 @@ class JointMapper(ShowsMaps):
         if self._session is not None:
             self._session.follow(track, time)
         self.belief = predicted(self.belief, track, time, self.errors)
+
+    @property
+    def _known_until(self) -> float:
+        return -np.inf if self._session is None else self._session.known_until
+
+    def _add_matched(self, cloud: Cloud) -> CloudUpdate:
+        """Insert a cloud as a keyframe of the run; without a run it waits for one."""
+        session = self._session
+        if cloud.end <= self._found_at:
+            return CloudUpdate(NOTHING_INSERTED, False, len(cloud))
+        if session is not None and cloud.end <= session.start:
+            return self.add_points(transformed(session.T_map_odom, cloud.points))
+        if session is None or cloud.end > session.known_until:
+            return self._wait(cloud)
+        self._maps.shown.add(cloud)
+        drawn = self._maps.shown.draw(session, session.settled_until)
+        return CloudUpdate(drawn.report, False, 0, drawn.carved)
+
+    def _insert(self, points: np.ndarray) -> InsertReport:
+        return self._maps.shown.insert(points)
+
+    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        return self._maps.shown.carve(points, times, origins)
 
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
@@ -224,7 +209,7 @@ class JointMapper(ShowsMaps):
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
-        self._maps.matched.add(TimedPoints.of_scan(scan))
+        self._maps.matched.add(Cloud.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
         return update_of(scan, session, self.belief, perf_counter() - start)
@@ -238,9 +223,10 @@ class JointMapper(ShowsMaps):
         self._end_session()
         pose = composed(self.correction, scan.reference_pose)
         self.belief = belief_at(scan.reference_time, pose, self.errors)
-        self._clouds.learn_path(path_times(scan.start, scan.reference_time), self.correction, scan.track)
-        origins = self._clouds.origins(scan.times, self._sonar_in_base)
-        self._maps.matched.insert_cloud(transformed(self.correction, scan.points), scan.times, origins)
+        times = path_times(scan.start, scan.reference_time)
+        self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
+        points = transformed(self.correction, scan.points)
+        self._maps.matched.insert_cloud(points, scan.times, self._origins(scan.times))
         return ScanUpdate(scan, None, True, self.belief)
 
     def _end_session(self, until: float = np.inf) -> None:

@@ -1,12 +1,60 @@
-"""Reports to the diagnostics what was done with scans and clouds."""
+"""What became of a scan or a cloud that an estimator took, and what the diagnostics say of it."""
 
-from typing import Sequence
+from dataclasses import dataclass
+from typing import List, Optional, Sequence
 
-from mlsm_manager.localisation.map_updates import CloudUpdate, ScanUpdate
+from mlsm_manager.scan_matching.prediction import Belief
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.admission import InsertReport
+from mlsm_manager.surface_map.free_space.carving import CarveReport
 from node_support.health import Health
 
+NOTHING_INSERTED = InsertReport(0, 0, 0)
 _PROVISIONAL = "provisional: one scan of an unknown velocity; the next ones draw it anew"
+
+
+@dataclass(frozen=True)
+class ScanUpdate:
+    """What was done with a scan.
+
+    result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
+    found: how the vehicle was found again with it after a silence of the sonar; empty where it was not.
+    forgotten: turns of the head that lay apart from the map and are left out of it, because the run began anew.
+    provisional: whether the map hangs on scans of an unknown velocity, none of which agrees with another yet.
+    """
+
+    scan: Scan
+    result: Optional[MatchResult]
+    accepted: bool
+    belief: Belief
+    found: str = ""
+    provisional: bool = False
+    forgotten: int = 0
+
+
+@dataclass(frozen=True)
+class CloudUpdate:
+    """What was done with a cloud.
+
+    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
+    not inserted because the scan of their time was rejected.
+    carved: what its beams said about free space, None where nobody asked or the vehicle's position is not known.
+    """
+
+    report: InsertReport
+    waiting: bool
+    unplaced: int
+    carved: Optional[CarveReport] = None
+
+
+@dataclass(frozen=True)
+class ScanResult:
+    """What was done with a scan, and with the clouds that could be inserted after it."""
+
+    scan: ScanUpdate
+    clouds: List[CloudUpdate]
 
 
 def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:

@@ -1,0 +1,222 @@
+"""The base of what finds the poses of scans and draws the map, behind the localiser."""
+
+from abc import ABC, abstractmethod
+from collections import deque
+from dataclasses import dataclass
+from typing import Deque, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+
+import numpy as np
+
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.localisation.clouds import Cloud, CorrectionHistory
+from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
+from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
+from mlsm_manager.matching.matchers.matcher_table import Matcher
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
+from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.admission import InsertReport
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource
+from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry import transformed
+from node_support.kernels import Kernel
+
+_MOST_WAITING = 8
+"""Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """The grids of the map that is shown and of the map that is matched with.
+
+    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
+    of blocks to reserve memory for. fewest_blocks: of a map that can be matched with.
+    carver: what marks free space and takes blocks away that beams go through; None where that is not wanted.
+    """
+
+    resolution: float
+    match_resolution: float
+    limit: float
+    expected_blocks: int
+    fewest_blocks: int
+    carver: Optional[Carver] = None
+    kernel: Kernel = Kernel.NUMPY
+
+
+class Estimator(ABC):
+    """Finds the poses of scans and draws the map: `ScanByScan` with a matcher, `Joint` with a solver over many scans.
+
+    Scans are inserted into the map that is matched with, clouds into the map that is shown. While `matching` is off
+    both are placed by the odometry as corrected so far. An estimator may change the poses of earlier scans with each
+    one that is added: `belief`, the maps and the places of clouds are what it knows at the time they are asked for.
+    """
+
+    def __init__(
+        self,
+        settings: MapSettings,
+        errors: OdometryErrors,
+        matcher: Matcher,
+        sonar_in_base: Sequence[float] = (0.0, 0.0),
+    ) -> None:
+        """`sonar_in_base`: (2,) m; `mount` changes it."""
+        self.settings = settings
+        self.errors = errors
+        self.matcher = matcher
+        self.matching = False
+        self._sonar_in_base = np.array(sonar_in_base, dtype=np.float64)
+        self.clear()
+
+    @abstractmethod
+    def clear(self) -> None:
+        """Delete the map, and forget the pose in it."""
+
+    def forget_place(self) -> None:
+        """Keep the map but forget the pose, because time jumped."""
+        self.belief: Optional[Belief] = None
+        self.correction = np.zeros(3)
+        self._expected: Optional[Belief] = None
+        self._history = CorrectionHistory()
+        self._waiting: Deque[Cloud] = deque(maxlen=_MOST_WAITING)
+        self._uncarved: Deque[Tuple[np.ndarray, np.ndarray]] = deque(maxlen=_MOST_WAITING)
+
+    def start_from(self, belief: Belief, correction: np.ndarray) -> None:
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
+        self._expected = belief
+        self.correction = np.array(correction, dtype=np.float64)
+
+    def mount(self, sonar_in_base: np.ndarray) -> None:
+        """Learn where the sonar is in base_link, (2,) m, from where free space is seen."""
+        self._sonar_in_base = sonar_in_base
+
+    @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after the end of a scan that its track should hold."""
+        return 0.0
+
+    @property
+    def solver(self) -> Optional[LiveSolver]:
+        """The joint solver of the current run; None where none runs."""
+        return None
+
+    def verdicts(self) -> List[Verdict]:
+        """Return what the run says of itself, without any truth."""
+        return []
+
+    @property
+    @abstractmethod
+    def shown(self) -> MultiLevelSurfaceMap:
+        """The map that is shown and saved."""
+
+    @property
+    @abstractmethod
+    def matched(self) -> MultiLevelSurfaceMap:
+        """The map that scans are matched with."""
+
+    @property
+    @abstractmethod
+    def free(self) -> Union[MultiLevelSurfaceMap, KeyframeCarving]:
+        """What is known to be free, in the map that is shown."""
+
+    @property
+    def target(self) -> BlockSource:
+        """The map in which a lost vehicle is searched."""
+        return self.matched
+
+    def map_of(self, layer: Layer) -> Union[MultiLevelSurfaceMap, KeyframeCarving]:
+        """Return one of the maps that are stored."""
+        return {Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free}[layer]
+
+    @property
+    def layers(self) -> Dict[Layer, Blocks]:
+        """Copies of all maps that are stored."""
+        return {layer: self.map_of(layer).blocks for layer in Layer}
+
+    @property
+    def keyframes(self) -> Mapping[str, np.ndarray]:
+        """What else must be stored to go on with scans whose poses may still change, as arrays by name."""
+        return {}
+
+    @abstractmethod
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
+        """Take stored maps in the place of the present ones, and forget the place, or go on with stored `keyframes`.
+
+        Return why the stored run cannot go on; nothing where it does, or where there is none. keyframes: as stored,
+        where the odometry is still the same; empty else. A map without a matched layer is matched with as it is shown.
+        Raises ValueError, and keeps all as it is, for other resolutions than those of the settings.
+        """
+
+    @abstractmethod
+    def add_scan(self, scan: Scan) -> ScanUpdate:
+        """Find the pose of a scan of echoes, or place it by the odometry, and keep the scan where that holds."""
+
+    @abstractmethod
+    def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
+        """Take a match that was made elsewhere as the pose of a scan."""
+
+    @abstractmethod
+    def follow(self, track: Track, time: float) -> None:
+        """Bring the belief to a later `time` [s] by the odometry alone, after a long time without scans."""
+
+    def add_points(self, points: np.ndarray) -> CloudUpdate:
+        """Insert points (n, 4) that are in map already into the map that is shown."""
+        return CloudUpdate(self._insert(points), False, 0)
+
+    def add_cloud(self, cloud: Cloud) -> CloudUpdate:
+        """Insert a cloud into the map that is shown, or let it wait until the pose of its time is known."""
+        if self.matching:
+            return self._add_matched(cloud)
+        return self._show(transformed(self.correction, cloud.points), cloud.times, 0)
+
+    def add_waiting(self) -> Optional[CloudUpdate]:
+        """Insert or carve the next cloud that waited, if its time is known now; None when there is none."""
+        if self._waiting and not (self.matching and self._waiting[0].end > self._known_until):
+            return self.add_cloud(self._waiting.popleft())
+        if self.matching:
+            # Corrections that scans are matched with are not those that such a cloud was placed with.
+            self._uncarved.clear()
+        while self._uncarved and self._history.reaches(self._uncarved[0][1]):
+            points, times = self._uncarved.popleft()
+            origins = self._origins(times)
+            if origins is not None:
+                return CloudUpdate(NOTHING_INSERTED, False, 0, self._carve(points, times, origins))
+        return None
+
+    @property
+    @abstractmethod
+    def _known_until(self) -> float:
+        """Time [s] until which the poses of matched scans are known; -inf before the first."""
+
+    @abstractmethod
+    def _add_matched(self, cloud: Cloud) -> CloudUpdate:
+        """Insert a cloud where matched scans put it, or let it wait."""
+
+    @abstractmethod
+    def _insert(self, points: np.ndarray) -> InsertReport:
+        """Insert points (n, 4) in map into the map that is shown."""
+
+    @abstractmethod
+    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        """Carve the map that is shown with points (n, 4) in it, of beams taken at `times` (n,) s from `origins` (n, 2).
+
+        Return None where nothing is to be carved.
+        """
+
+    def _wait(self, cloud: Cloud) -> CloudUpdate:
+        self._waiting.append(cloud)
+        return CloudUpdate(NOTHING_INSERTED, True, 0)
+
+    def _show(self, points: np.ndarray, times: np.ndarray, unplaced: int) -> CloudUpdate:
+        """Insert points (n, 4) in map, of beams taken at `times` (n,), and carve once it is known from where."""
+        report, origins = self._insert(points), self._origins(times)
+        if origins is not None:
+            return CloudUpdate(report, False, unplaced, self._carve(points, times, origins))
+        if len(points):
+            self._uncarved.append((points, times))
+        return CloudUpdate(report, False, unplaced)
+
+    def _origins(self, times: np.ndarray) -> Optional[np.ndarray]:
+        """Return where the sonar was in map at `times` (n,) [s], (n, 2) m; None where not all of them are known."""
+        return self._history.origins(times, self._sonar_in_base)

@@ -1,0 +1,156 @@
+"""Matches scan by scan with the map of the scans before, and keeps that map and the pose in it (thesis 6.5.6)."""
+
+from typing import List, Mapping, Optional
+
+import numpy as np
+
+from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
+from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
+from mlsm_manager.scan_matching.result import MatchResult, corrected_points
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan_path import ERRORS
+from mlsm_manager.surface_map.admission import InsertReport
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import CarveReport
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry import composed
+
+
+class ScanByScan(Estimator):
+    """Keeps the map, what is known of the pose, and the errors of the odometry.
+
+    A scan that is not matched, because `matching` is off or because there is no map yet, is placed by the odometry as
+    corrected so far and inserted; its pose is then certain.
+    """
+
+    def clear(self) -> None:
+        """Delete the map, and forget the pose in it."""
+        self._shown, self._matched, self._free = self._new_maps()
+        self.forget_place()
+
+    def _new_maps(self) -> List[MultiLevelSurfaceMap]:
+        own = self.settings
+        return [
+            MultiLevelSurfaceMap(own.resolution, own.limit, own.expected_blocks, own.kernel),
+            MultiLevelSurfaceMap(own.match_resolution, own.limit),
+            MultiLevelSurfaceMap(own.resolution, own.limit),
+        ]
+
+    @property
+    def shown(self) -> MultiLevelSurfaceMap:
+        """The map that is shown and saved."""
+        return self._shown
+
+    @property
+    def matched(self) -> MultiLevelSurfaceMap:
+        """The map that scans are matched with."""
+        return self._matched
+
+    @property
+    def free(self) -> MultiLevelSurfaceMap:
+        """What is known to be free, in the map that is shown."""
+        return self._free
+
+    def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
+        """Take stored maps in the place of the present ones, and forget the place; there is no run to go on with.
+
+        See Estimator.restore.
+        """
+        maps, blocks = self._new_maps(), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        shown, matched, free = maps
+        shown.insert_blocks(blocks)
+        matched.insert_blocks(layers.get(Layer.MATCHED, blocks))
+        if Layer.FREE in layers:
+            free.insert_blocks(layers[Layer.FREE])
+        self._shown, self._matched, self._free = maps
+        self.forget_place()
+        return ""
+
+    def add_scan(self, scan: Scan) -> ScanUpdate:
+        """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
+        belief = self._belief_at(scan)
+        if not self.matching or len(self.matched) < self.settings.fewest_blocks:
+            return self._place(scan, belief)
+        result = self.matcher.match(scan, self.matched, prior_of(belief, scan.reference_pose))
+        return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
+
+    def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
+        """Accept a match: insert the scan into the map, and take its pose over into the belief."""
+        theta = np.concatenate([result.pose, result.rate, result.motion])
+        self.belief = Belief(scan.reference_time, theta, result.state_covariance)
+        self.correction = result.correction(scan)
+        self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
+        self._insert_matched(corrected_points(scan, result), scan.times)
+        return ScanUpdate(scan, result, True, self.belief)
+
+    def follow(self, track: Track, time: float) -> None:
+        """Predict the belief at a later `time` by the odometry, after a long time without scans."""
+        if self.belief is not None and time > self.belief.time:
+            self.belief = predicted(self.belief, track, time, self.errors)
+
+    @property
+    def _known_until(self) -> float:
+        return self._history.end
+
+    def _add_matched(self, cloud: Cloud) -> CloudUpdate:
+        if cloud.end > self._known_until:
+            return self._wait(cloud)
+        points, times = self._history.placed(cloud)
+        return self._show(points, times, len(cloud) - len(points))
+
+    def _insert(self, points: np.ndarray) -> InsertReport:
+        return self.shown.insert(points)
+
+    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        if self.settings.carver is None:
+            return None
+        beams = FirstEchoes.of_level(points, times, origins)
+        return self.settings.carver.carve(self.shown, self.free, beams, points)
+
+    def _insert_matched(self, points: np.ndarray, times: np.ndarray) -> None:
+        """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is matched with; clear it."""
+        self.matched.insert(points)
+        origins = self._origins(times)
+        if self.settings.carver is not None and origins is not None:
+            self.settings.carver.clear(self.matched, FirstEchoes.of_level(points, times, origins), points)
+
+    def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
+        times, poses = self._path(scan, belief)
+        self._history.add(times, poses, scan.track, holds=True)
+        self._insert_matched(*self._history.placed(Cloud.of_scan(scan)))
+        self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
+        # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
+        if belief.theta[ERRORS].any():
+            self.correction = prior_of(belief, scan.reference_pose).correction
+        return ScanUpdate(scan, None, True, self.belief)
+
+    def _reject(self, scan: Scan, result: MatchResult, belief: Belief) -> ScanUpdate:
+        self.belief = belief
+        self._history.add(*self._path(scan, belief), scan.track, holds=False)
+        return ScanUpdate(scan, result, False, belief)
+
+    def _belief_at(self, scan: Scan) -> Belief:
+        """Return what is known at the scan's reference time before it is matched."""
+        if self.belief is None:
+            self.belief = self._first_belief(scan)
+        if scan.reference_time <= self.belief.time:
+            return self.belief
+        belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
+        return updated_by_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
+
+    def _first_belief(self, scan: Scan) -> Belief:
+        if self._expected is None:
+            theta = np.concatenate([scan.reference_pose, np.zeros(5)])
+            return Belief(scan.reference_time, theta, self.errors.covariance())
+        theta = np.concatenate([composed(self.correction, scan.reference_pose), self._expected.theta[3:]])
+        return Belief(scan.reference_time, theta, self._expected.covariance)
+
+    def _path(self, scan: Scan, belief: Belief) -> tuple:
+        """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""
+        times = np.unique(np.append(np.linspace(scan.start, scan.reference_time, 17), scan.reference_time))
+        correction = prior_of(belief, scan.reference_pose).correction
+        return times, composed(correction, scan.track.at(times))
