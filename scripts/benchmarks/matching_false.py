@@ -7,8 +7,7 @@ import numpy as np
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, noise_scan, still
 from benchmarks.matching_starts import tour_map
 from benchmarks.table import Row
-from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.result import Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks

@@ -6,11 +6,11 @@ import numpy as np
 import yaml
 from scipy.stats import chi2
 
+from benchmarks.matchers import MATCHERS, MatcherName
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind
 from benchmarks.table import Row
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan, Track
 from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
@@ -50,8 +50,7 @@ def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
 
 def session_estimator(name: MatcherName) -> ScanByScan:
     """Return an estimator that matches with default parameters and knows how wrong the odometry may be."""
-    kind = MATCHERS[name]
-    estimator = ScanByScan(SETTINGS, ODOMETRY, kind.build(kind.parameters()))
+    estimator = ScanByScan(SETTINGS, ODOMETRY, MATCHERS[name]())
     estimator.matching = True
     return estimator
 

@@ -4,11 +4,11 @@ from typing import List
 
 import numpy as np
 
+from benchmarks.matchers import MATCHERS, MatcherName
 from benchmarks.matching_moves import SETTINGS
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind, still
 from benchmarks.table import Row
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import MatchResult
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -52,8 +52,7 @@ def moving_scans(maker: ScanMaker, seed: int) -> List[Scan]:
 
 def moving_estimator(name: MatcherName) -> ScanByScan:
     """Return an estimator that matches with default parameters and knows how wrong the odometry may be."""
-    kind = MATCHERS[name]
-    estimator = ScanByScan(SETTINGS, _ERRORS, kind.build(kind.parameters()))
+    estimator = ScanByScan(SETTINGS, _ERRORS, MATCHERS[name]())
     estimator.matching = True
     return estimator
 

@@ -9,10 +9,8 @@ import yaml
 
 from benchmarks.matching_scans import KINDS, ROOT, ScanMaker, SonarKind, still
 from benchmarks.table import Row
-from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
-from mlsm_manager.scan_matching.result import MatchResult, Prior
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.result import Matcher, MatchResult, Prior
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, inverse, wrapped

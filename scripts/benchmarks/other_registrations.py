@@ -11,8 +11,7 @@ from benchmarks.in_turn import OURS, ratio_figure
 from benchmarks.matching_scans import KINDS, ScanMaker, still
 from benchmarks.matching_starts import tour_map, tour_stops
 from benchmarks.table import Row
-from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.result import Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks

@@ -4,12 +4,12 @@ from typing import Dict, List
 
 import numpy as np
 from benchmarks.heads import figures, recordings, tour_setup
+from benchmarks.matchers import MatcherName
 from benchmarks.matching_moves import SEEDS, nees_band, session_errors, session_scans, session_track
 from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from thesis_results.markdown import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure
 

@@ -4,13 +4,14 @@ from itertools import product
 from typing import Dict, Mapping
 
 import numpy as np
+from benchmarks.matchers import MATCHERS, MatcherName
 from benchmarks.matching_scans import KINDS, ScanMaker
 from benchmarks.matching_starts import NEAR, NEAR_YAW, WIDE, started, tour_map
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
 
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, Matcher, MatcherName
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.result import Matcher
 from thesis_results.markdown import joined, prose
 from thesis_results.pictures import Pictures, new_figure
 
@@ -52,12 +53,10 @@ def make(pictures: Pictures) -> str:
 
 
 def _matchers() -> Dict[str, Matcher]:
-    default, gicp = MATCHERS[MatcherName.DISTRIBUTIONS], MATCHERS[MatcherName.GICP]
-    wide = default.build(default.parameters().changed(WIDE))
     return {
-        "`GICP`": gicp.build(gicp.parameters()),
-        "`DISTRIBUTIONS`": default.build(default.parameters()),
-        "`DISTRIBUTIONS`, wide search": wide,
+        "`GICP`": MATCHERS[MatcherName.GICP](),
+        "`DISTRIBUTIONS`": MATCHERS[MatcherName.DISTRIBUTIONS](),
+        "`DISTRIBUTIONS`, wide search": DistributionMatcher(DistributionMatcherParameters().changed(WIDE)),
     }
 
 

@@ -3,6 +3,7 @@
 from typing import List
 
 import numpy as np
+from benchmarks.matchers import MatcherName
 from benchmarks.matching_moving import (
     SEEDS,
     SPEED,
@@ -19,7 +20,6 @@ from benchmarks.matching_scans import HEAD, KINDS, ScanMaker
 from benchmarks.recorded import ROOT
 from matplotlib.axes import Axes
 
-from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.scan_matching.result import MatchResult, corrected_points
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry import inverse, transformed
@@ -53,7 +53,7 @@ def make(pictures: Pictures) -> str:
             [[f"`{name.value}`", *_summary(results)] for name, results in found.items()],
         ),
         prose("""Root mean squares over all beams of a run, and the median of the runs; of all matches where none
-        was accepted. `DISTRIBUTIONS` finds pose and velocity together, `SEGMENTS` moves the segments of a scan,
+        was accepted. `DISTRIBUTIONS` finds pose and velocity together, `THESIS` moves the segments of a scan,
         `GICP` moves the scan as one piece."""),
     )
 

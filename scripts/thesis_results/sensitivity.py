@@ -4,11 +4,11 @@ from dataclasses import dataclass, replace
 from typing import Dict, List, Sequence
 
 import numpy as np
+from benchmarks.matchers import MATCHERS, MatcherName
 from benchmarks.matching_scans import KINDS, RAYS, ScanMaker, SonarKind
 from benchmarks.matching_starts import Start, started, tour_map
 from matplotlib.axes import Axes
 
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
 from thesis_results.markdown import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure
 
@@ -89,8 +89,7 @@ def _kind(rays: int, spread: float) -> SonarKind:
 def _found(kind: SonarKind) -> Found:
     maker = ScanMaker("basin", kind)
     target = tour_map(maker)
-    default = MATCHERS[MatcherName.DISTRIBUTIONS]
-    matcher = default.build(default.parameters())
+    matcher = MATCHERS[MatcherName.DISTRIBUTIONS]()
     return Found.of([started(maker, target, matcher, OFF, TURNED, seed) for seed in range(SCANS)])
 
 

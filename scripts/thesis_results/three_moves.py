@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from typing import Dict, List, Sequence, Tuple
 
 import numpy as np
+from benchmarks.matchers import MatcherName
 from benchmarks.matching_moves import (
     SEEDS,
     odometry_path,
@@ -17,7 +18,6 @@ from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
 from benchmarks.recorded import ROOT
 from matplotlib.axes import Axes
 
-from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.scan_matching.result import MatchResult, corrected_points
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.blocks import Blocks
@@ -83,7 +83,7 @@ def make(pictures: Pictures) -> str:
     return joined(
         prose("""The vehicle makes the moves of the thesis in the basin: 4 m on x, 3 m on y and -8 m on x as the
         odometry sees them, and 30 % more in truth. After each move the vehicle rests for a scan, which is matched
-        with the map of the scans before. `DISTRIBUTIONS` is the default, `SEGMENTS` the thesis's own matcher
+        with the map of the scans before. `DISTRIBUTIONS` is the default, `THESIS` the thesis's own matcher
         without the faults of its code, `GICP` Open3D's. The thesis published one run."""),
         _picture(pictures, found[SHOWN]),
         "Corrections of one run, x and y in metres, and how far they are from the wanted ones:",

@@ -17,6 +17,7 @@ from typing import Any, Callable, Dict, Mapping, Optional, Sequence, Tuple, Type
 
 _METADATA_KEY = "parameter"
 Self = TypeVar("Self", bound="ParameterSet")
+Part = TypeVar("Part", bound="ParameterSet")
 
 
 class ParameterError(ValueError):
@@ -119,6 +120,10 @@ class ParameterSet:
         """Return plain values (enumerations by value), as yaml and the parameter server hold them."""
         values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
         return {key: value.value if isinstance(value, Enum) else value for key, value in values.items()}
+
+    def part(self, kind: Type[Part]) -> Part:
+        """Return the parameters of one of the sets that this one is made of."""
+        return kind(**{field.name: getattr(self, field.name) for field in dataclasses.fields(kind)})
 
     @classmethod
     def tunable_fields(cls) -> Tuple[dataclasses.Field, ...]:

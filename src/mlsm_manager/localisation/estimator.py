@@ -11,9 +11,8 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import Cloud, CorrectionHistory
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
-from mlsm_manager.matching.matchers.matcher_table import Matcher
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
-from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.result import Matcher, MatchResult
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.admission import InsertReport

@@ -28,6 +28,7 @@ class EstimatorName(Enum):
 
     JOINT = "JOINT"
     SCAN_BY_SCAN = "SCAN_BY_SCAN"
+    THESIS = "THESIS"
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,8 @@ class JointParameters(OdometryChoice):
     estimator: EstimatorName = parameter(
         EstimatorName.SCAN_BY_SCAN,
         "JOINT: the newest scans find their poses together, none is rejected; `odometry` says what "
-        "the motion is known from. SCAN_BY_SCAN: each alone, by the matcher",
+        "the motion is known from. SCAN_BY_SCAN: each alone, against the map of those before. THESIS: the same by the "
+        "matcher of the thesis, to compare with",
         tunable=False,
     )  # fmt: skip
     sonar_delay_deviation: float = parameter(
@@ -82,9 +84,8 @@ class JointParameters(OdometryChoice):
     def longest_turn(self, errors: OdometryErrors) -> float:
         """Return how long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
         measured = not np.isinf(self.odometry_model(errors).distance_deviation)
-        return (
-            np.inf if measured or self.estimator is EstimatorName.SCAN_BY_SCAN else errors.rate_time * self.scan_parts
-        )
+        alone = self.estimator is not EstimatorName.JOINT
+        return np.inf if measured or alone else errors.rate_time * self.scan_parts
 
     def solver_parameters(self, errors: OdometryErrors, range_scale_deviation: float) -> MultiViewParameters:
         """Return what these and `errors` mean for the solver.

@@ -14,7 +14,7 @@ from mlsm_manager.localisation.live_correction import LiveCorrection, StandingCo
 from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
-from mlsm_manager.matching.matchers.matcher_table import Matcher
+from mlsm_manager.scan_matching.result import Matcher
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks

@@ -9,14 +9,14 @@ from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint import Joint
 from mlsm_manager.localisation.joint_parameters import EstimatorName, JointParameters
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
-from mlsm_manager.localisation.matcher_choice import MatcherChoice
 from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.result import Matcher
 from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.headers import StampParameters
 from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterError, ParameterSet, parameter
@@ -51,7 +51,10 @@ class MapParameters(ParameterSet):
 
 
 @dataclass(frozen=True)
-class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, CarvingParameters, MapParameters):
+class LocaliserParameters(
+    ThesisMatcherParameters, DistributionMatcherParameters, JointParameters, OdometryErrors, CarvingParameters,
+    MapParameters,
+):  # fmt: skip
     """All that a localiser is made from."""
 
     def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
@@ -63,7 +66,7 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
 
     def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
         errors = self.part(OdometryErrors)
-        if self.estimator is EstimatorName.SCAN_BY_SCAN:
+        if self.estimator is not EstimatorName.JOINT:
             return ScanByScan(self.map_settings(), errors, matcher, sonar_in_base)
         solver = self.solver_parameters(errors, self.range_scale_deviation)
         return Joint(self.map_settings(), errors, matcher, sonar_in_base, solver)
@@ -72,6 +75,12 @@ class LocaliserParameters(MatcherChoice, JointParameters, OdometryErrors, Carvin
         """Return the settings that a localiser can take over while it runs."""
         anywhere = relocaliser(self.part(DistributionMatcherParameters))
         return LocaliserSettings(self.build_matcher(), anywhere, self.blend_time, self.chosen_map_input)
+
+    def build_matcher(self) -> Matcher:
+        """Return what places a single scan: in JOINT only those that begin a run in a map."""
+        if self.estimator is EstimatorName.THESIS:
+            return ThesisMatcher(self.part(ThesisMatcherParameters))
+        return DistributionMatcher(self.part(DistributionMatcherParameters))
 
     def map_settings(self) -> MapSettings:
         """Return what the grids are made from."""

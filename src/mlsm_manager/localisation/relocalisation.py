@@ -2,11 +2,9 @@
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.matcher_table import Matcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.result import MatchResult, Prior
+from mlsm_manager.scan_matching.result import Matcher, MatchResult, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import YAW, X, Y
 from mlsm_manager.surface_map.blocks import BlockSource, all_of

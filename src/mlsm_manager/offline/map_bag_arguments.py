@@ -6,7 +6,6 @@ from typing import Any, Dict, List
 
 from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.matching.matchers.matcher_table import MatcherName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.help import CommandLine
@@ -16,6 +15,12 @@ from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import ReadingParameters, add_reading_arguments, request_of
 
 _EPILOG = "docs/map_bag.md describes the options, what is written, and how a vehicle is calibrated by it."
+_ESTIMATORS = {
+    "DISTRIBUTIONS": EstimatorName.SCAN_BY_SCAN,
+    "THESIS": EstimatorName.THESIS,
+    "SEGMENTS": EstimatorName.THESIS,
+}
+"""By the names that --matcher takes; the thesis's has two."""
 _USAGE = "map_bag BAG [BAG ...] --out DIR [options]\n       map_bag BAG --inspect [options]"
 
 
@@ -80,8 +85,8 @@ def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
         help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
     )  # fmt: skip
     parser.add_argument(
-        "--matcher", choices=[name.value for name in MatcherName],
-        help="match each scan alone instead of jointly, by this matcher",
+        "--matcher", choices=list(_ESTIMATORS),
+        help="match each scan alone instead of jointly, by this matcher: DISTRIBUTIONS, or that of the thesis",
     )  # fmt: skip
 
 
@@ -102,7 +107,7 @@ def _values(options: argparse.Namespace) -> Dict[str, Any]:
     values = replay_values(read_values(options.parameters)) if options.parameters else {}
     values.update(assigned_values(options.set))
     if options.matcher:
-        values.update(matcher=options.matcher, estimator=EstimatorName.SCAN_BY_SCAN.value)
+        values.update(estimator=_ESTIMATORS[options.matcher].value)
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
     return values

@@ -2,10 +2,12 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from typing import Protocol
 
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.geometry import composed, inverse, transformed, wrapped
 
 
@@ -80,6 +82,16 @@ class MatchResult:
         correction = composed(self.pose, inverse(scan.reference_pose))
         correction[2] = wrapped(correction[2])
         return correction
+
+
+class Matcher(Protocol):
+    """Finds where a scan lies among blocks."""
+
+    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
+        """Return where the scan was taken; never raises for a scan or a target that cannot be matched.
+
+        `target` gives the blocks in map; a matcher fetches those within the scan's reach, or all.
+        """
 
 
 def corrected_points(scan: Scan, result: MatchResult) -> np.ndarray:

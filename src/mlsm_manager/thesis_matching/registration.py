@@ -1,16 +1,22 @@
-"""The thesis's registration (6.5.6): the closest block along the movement, and translations by segments."""
+"""The thesis's registration (6.5.6): the closest block along the movement, and the motion that takes points to theirs.
 
-from dataclasses import dataclass
-from typing import List, Tuple
+While the vehicle is still the error of all points is that of one pose; while it moves the error grows along a line over
+time, whose slope is the velocity that is missing (figures 6.6 to 6.8).
+"""
+
+from typing import List, NamedTuple, Optional, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.surface_map.blocks import Blocks
+from node_support.geometry import rotated
+
+_FEWEST_TIMES = 3  # two times always lie on a line, and show no error of it
 
 
 class ClosestBlocks:
-    """Finds blocks by cell; `blocks` must hold at least one."""
+    """Finds blocks through the tree of their cells; `blocks` must hold at least one."""
 
     def __init__(self, blocks: Blocks) -> None:
         self._blocks = blocks
@@ -29,10 +35,10 @@ class ClosestBlocks:
         return np.take_along_axis(members, best[..., np.newaxis], axis=-1)[..., 0]
 
     def find_along(self, points: np.ndarray, steps: np.ndarray, samples: int) -> np.ndarray:
-        """Return (n,) indices for points (n, 3) that moved: of the blocks closest to the point and to `samples` places
-        one step (n, 3) apart from there on, the one that lies best in the direction of the step.
+        """Return (n,) indices for points (n, 3) that moved (figure 6.5).
 
-        Points whose step is zero take their closest block.
+        Of the blocks closest to the point and to `samples` places one step (n, 3) apart from there on, it is the one
+        that lies best in the direction of the step. Points whose step is zero take their closest block.
         """
         closest = self.find(points)
         length = np.linalg.norm(steps, axis=1)
@@ -45,27 +51,20 @@ class ClosestBlocks:
         direction = self._blocks.mean[found, :3] - start[:, np.newaxis, :]
         distance = np.maximum(np.linalg.norm(direction, axis=-1), 1e-12)
         cosine = np.einsum("nja,na->nj", direction, step / length[moved][:, np.newaxis]) / distance
-        best = cosine.argmax(axis=1)
-        closest[moved] = found[np.arange(len(found)), best]
+        closest[moved] = found[np.arange(len(found)), cosine.argmax(axis=1)]
         return closest
 
 
-def _padded_members(cell_of_block: np.ndarray, cells: int) -> np.ndarray:
-    """Return (cells, k) block indices, -1 where a cell has fewer than k."""
-    order = np.argsort(cell_of_block, kind="stable")
-    sizes = np.bincount(cell_of_block, minlength=cells)
-    rank = np.arange(len(order)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    members = np.full((cells, int(sizes.max())), -1, dtype=np.int64)
-    members[cell_of_block[order], rank] = order
-    return members
+def rigid_motion(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
+    """Return the motion (3,) x y yaw that takes points (n, 2) nearest to their targets (n, 2) (Besl and McKay 1992)."""
+    middle, target = points.mean(axis=0), targets.mean(axis=0)
+    arms, wanted = points - middle, targets - target
+    cross = arms[:, 0] @ wanted[:, 1] - arms[:, 1] @ wanted[:, 0]
+    yaw = np.arctan2(cross, (arms * wanted).sum())
+    return np.append(target - rotated(middle, yaw), yaw)
 
 
-# Two times always lie on a line, and show no error of it.
-_FEWEST_TIMES = 3
-
-
-@dataclass(frozen=True)
-class SegmentFit:
+class SegmentFit(NamedTuple):
     """translations: (n, 2) m for each point, in the order of time. slope: (2,) m/s of the last segment, 0 if still."""
 
     translations: np.ndarray
@@ -81,28 +80,29 @@ def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray
     """
     translations = np.zeros((len(times), 2))
     slope = np.zeros(2)
-    last = np.zeros(2)
-    for number, (first, end) in enumerate(_runs(moving)):
+    last: Optional[np.ndarray] = None
+    for first, end in _runs(moving):
         part = slice(first, end)
         if not moving[first]:
             slope = np.zeros(2)
             translations[part] = errors[part].mean(axis=0)
         else:
             since = times[part] - (times[first - 1] if first else times[first])
-            offset, slope = _line(since, errors[part], last if number else None)
+            offset, slope = _line(since, errors[part], last)
             translations[part] = offset + since[:, np.newaxis] * slope
         last = translations[end - 1]
     return SegmentFit(translations, slope)
 
 
 def _runs(moving: np.ndarray) -> List[Tuple[int, int]]:
+    """Return the first index and the end of each run of equal values."""
     changes = np.flatnonzero(np.diff(moving.astype(np.int8))) + 1
     bounds = np.concatenate([[0], changes, [len(moving)]])
-    return [(int(first), int(end)) for first, end in zip(bounds[:-1], bounds[1:]) if end > first]
+    return list(zip(bounds[:-1], bounds[1:]))
 
 
-def _line(since: np.ndarray, errors: np.ndarray, start: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return offset (2,) and slope (2,) by least squares; the line begins at `start` where that is known."""
+def _line(since: np.ndarray, errors: np.ndarray, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
+    """Return offset (2,) and slope (2,) by least squares; the line begins at `start` (2,) where that is known."""
     if np.unique(since).size < _FEWEST_TIMES:
         return errors.mean(axis=0), np.zeros(2)
     if start is not None:
@@ -110,3 +110,13 @@ def _line(since: np.ndarray, errors: np.ndarray, start: np.ndarray) -> Tuple[np.
     centered = since - since.mean()
     slope = centered @ errors / (centered @ centered)
     return errors.mean(axis=0) - since.mean() * slope, slope
+
+
+def _padded_members(cell_of_block: np.ndarray, cells: int) -> np.ndarray:
+    """Return (cells, k) block indices, -1 where a cell has fewer than k."""
+    order = np.argsort(cell_of_block, kind="stable")
+    sizes = np.bincount(cell_of_block, minlength=cells)
+    rank = np.arange(len(order)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    members = np.full((cells, int(sizes.max())), -1, dtype=np.int64)
+    members[cell_of_block[order], rank] = order
+    return members

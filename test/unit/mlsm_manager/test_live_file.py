@@ -20,7 +20,7 @@ from node_support.parameters import ParameterError, describe
 
 ROOT = Path(__file__).resolve().parents[3]
 USED = ReplayParameters().changed(
-    {"sonar_delay": 0.9, "range_scale": 0.97, "echo_deviation": 0.3, "matcher": "SEGMENTS", "spacing": 0.7}
+    {"sonar_delay": 0.9, "range_scale": 0.97, "echo_deviation": 0.3, "estimator": "THESIS", "spacing": 0.7}
 )
 
 
@@ -149,6 +149,6 @@ def test_without_it_the_nodes_own_hold():
 
 
 def test_an_argument_goes_before_it(written):
-    assert launched("mapping.launch", f"parameters:={written}", "matcher:=DISTRIBUTIONS")["/mlsm_core/matcher"] == (
-        "DISTRIBUTIONS"
+    assert launched("mapping.launch", f"parameters:={written}", "estimator:=SCAN_BY_SCAN")["/mlsm_core/estimator"] == (
+        "SCAN_BY_SCAN"
     )

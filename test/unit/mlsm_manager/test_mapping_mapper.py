@@ -7,8 +7,7 @@ from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.matching.matchers.matcher_table import MATCHERS, MatcherName
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import MatchStatus
 from mlsm_manager.scan_matching.scan import Scan
@@ -22,10 +21,8 @@ def drift(times):
 
 
 def estimator_of(matching=True, **changes):
-    kind = MATCHERS[MatcherName.DISTRIBUTIONS]
-    estimator = ScanByScan(
-        SETTINGS, OdometryErrors(speed_deviation=0.05), kind.build(kind.parameters().changed(changes))
-    )
+    matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
+    estimator = ScanByScan(SETTINGS, OdometryErrors(speed_deviation=0.05), matcher)
     estimator.matching = matching
     return estimator
 

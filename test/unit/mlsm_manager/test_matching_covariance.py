@@ -5,8 +5,7 @@ import pytest
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 from scipy.stats import chi2
 
-from mlsm_manager.matching.matchers.distribution_matcher import DistributionMatcher
-from mlsm_manager.matching.matchers.parameters import DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
 
 pytestmark = pytest.mark.long

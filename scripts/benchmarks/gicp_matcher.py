@@ -5,18 +5,18 @@ It starts from the prior's pose and finds a pose only: it neither searches nor e
 
 import importlib
 import time
+from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from mlsm_manager.matching.matchers.parameters import GicpMatcherParameters
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from node_support.geometry import composed, inverse, transformed, wrapped
-from node_support.parameters import ParameterError
+from node_support.parameters import ParameterError, ParameterSet, parameter
 
 # m^2: of an echo, as the range resolution of 50 m in 500 bins; across the plane of all points it keeps them there.
 _ECHO_VARIANCE = 0.1**2
@@ -37,6 +37,22 @@ class _Found(NamedTuple):
     used: int
 
 
+@dataclass(frozen=True)
+class GicpMatcherParameters(ParameterSet):
+    """Parameters of Open3D's generalised ICP."""
+
+    min_points: int = parameter(15, "a scan with fewer points on the map is not matched", low=3, high=10000)
+    max_position_deviation: float = parameter(
+        0.5, "a fix with a greater standard deviation in its least certain direction is rejected",
+        unit="m", low=0.001, high=100.0,
+    )  # fmt: skip
+    max_jump: float = parameter(
+        4.0, "greatest distance of a fix from the expected pose, in the prior's standard deviations",
+        low=1.0, high=100.0,
+    )  # fmt: skip
+    gicp_distance: float = parameter(2.0, "greatest distance from an echo to its block", unit="m", low=0.01, high=100.0)
+
+
 class GicpMatcher:
     """Matches echoes with the local distributions of the map."""
 
@@ -46,7 +62,7 @@ class GicpMatcher:
         try:
             self._open3d = importlib.import_module("open3d")
         except ImportError:
-            raise ParameterError("matcher = GICP: needs Open3D; install it with: apt install python3-open3d") from None
+            raise ParameterError("GICP needs Open3D; install it with: apt install python3-open3d") from None
 
     def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; see Matcher."""

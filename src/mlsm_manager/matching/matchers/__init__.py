@@ -1,1 +1,0 @@
-"""The matchers, their table and their parameters."""
