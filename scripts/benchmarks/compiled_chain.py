@@ -13,12 +13,11 @@ import numpy as np
 from std_msgs.msg import Header
 
 from benchmarks.basin_messages import basin_messages
-from benchmarks.in_turn import kernels, ratio_figure
+from benchmarks.in_turn import ratio_figure
 from benchmarks.map_figures import RESOLUTION
 from benchmarks.table import Row
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.kernels import Kernel
 from sonar_processing.beams.placed_beam import PlacedBeam
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
@@ -53,15 +52,15 @@ def scans_of(beams: List[PlacedBeam]) -> List[List[PlacedBeam]]:
     return scans
 
 
-def run(scans: List[List[PlacedBeam]], kernel: Kernel, whole: bool) -> Tuple[np.ndarray, int, int]:
+def run(scans: List[List[PlacedBeam]], whole: bool) -> Tuple[np.ndarray, int, int]:
     """Return the CPU seconds of each stage, summed over the scans (5,), and the numbers of points and blocks.
 
     whole: whether the markers are those of all blocks, as the thesis's and the C++'s, or of what changed, as ours live.
     """
-    assembler, markers = ScanAssembler(SonarToCloudParameters()), BlockMarkers(kernel=kernel)
+    assembler, markers = ScanAssembler(SonarToCloudParameters()), BlockMarkers()
     thresholder = Thresholder(ThresholderParameters())
     remover = OutlierRemover(OutlierRemoverParameters())
-    surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=kernel)
+    surface_map = MultiLevelSurfaceMap(RESOLUTION)
     seconds, points = np.zeros(len(STAGES)), 0
     for scan in scans:
         times = [time.process_time()]
@@ -105,11 +104,7 @@ def rows() -> List[Row]:
     if shutil.which("g++") is None:
         return [("whole chain by C++", "not measured: no g++", "")]
     scans = scans_of(recorded_beams())
-    variants = {
-        f"{kernel.value}, {'all' if whole else 'changed'} markers": (kernel, whole)
-        for kernel in kernels()
-        for whole in (True, False)
-    }
+    variants = {"all markers": True, "changed markers": False}
     ours: Dict[str, List[np.ndarray]] = {name: [] for name in variants}
     theirs: List[List[float]] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -118,7 +113,7 @@ def rows() -> List[Row]:
         _write(scans, data)
         for turn in range(ROUNDS + 1):
             *seconds, points, blocks, _ = map(float, subprocess.check_output([str(program), str(data)]).split())
-            taken = {name: _checked(run(scans, *variant), points, blocks) for name, variant in variants.items()}
+            taken = {name: _checked(run(scans, whole), points, blocks) for name, whole in variants.items()}
             if turn:  # The first round loads and fills caches
                 theirs.append(seconds)
                 for name in variants:

@@ -2,7 +2,6 @@
 
 import time
 from functools import partial
-from importlib.util import find_spec
 from io import BytesIO
 from typing import Dict, List
 
@@ -12,7 +11,6 @@ from std_msgs.msg import Header
 from benchmarks.table import Row, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.kernels import Kernel
 
 RESOLUTION = 0.5
 SCAN_RADIUS = 50.0
@@ -28,11 +26,9 @@ def scan(rng: np.random.Generator, center: np.ndarray, points: int) -> np.ndarra
     return result
 
 
-def grown_map(
-    blocks: int, extent: float, rng: np.random.Generator, kernel: Kernel = Kernel.NUMPY
-) -> MultiLevelSurfaceMap:
+def grown_map(blocks: int, extent: float, rng: np.random.Generator) -> MultiLevelSurfaceMap:
     """Return a map of at least `blocks` blocks."""
-    surface_map = MultiLevelSurfaceMap(RESOLUTION, kernel=kernel)
+    surface_map = MultiLevelSurfaceMap(RESOLUTION)
     while len(surface_map) < blocks:
         surface_map.insert(scan(rng, rng.uniform(-extent, extent, 2), 20_000))
     return surface_map
@@ -59,28 +55,21 @@ def insertion_rows() -> List[Row]:
     ]
 
 
-def compiled_rows() -> List[Row]:
-    """Measure insertion by compiled loops against numpy in turn, on points all over a disc and on few cells."""
-    if find_spec("numba") is None:
-        return [("insertion by compiled loops", "not measured: no numba", "1.6-10 million points/s")]
-    rows = []
+def density_rows() -> List[Row]:
+    """Measure insertion of points all over a disc and of points on few cells."""
+    rows, points = [], 60_000
     for name, radius in (
         ("nearly every point its own block", SCAN_RADIUS),
         ("20 points to a block", SCAN_RADIUS / 8.0),
     ):
-        seconds: Dict[Kernel, List[float]] = {kernel: [] for kernel in Kernel}
-        rng = np.random.default_rng(3)
-        maps = {kernel: grown_map(SMALL, 0.0, np.random.default_rng(1), kernel) for kernel in Kernel}
-        points = 60_000
+        rng, seconds = np.random.default_rng(3), []
+        surface_map = grown_map(SMALL, 0.0, np.random.default_rng(1))
         for _ in range(11):
             new = scan(rng, np.zeros(2), points)
             new[:, :2] *= radius / SCAN_RADIUS
-            for kernel, surface_map in maps.items():
-                call = partial(surface_map.insert, new)
-                seconds[kernel].append(median_seconds(call, repeats=1, clock=time.process_time))
-        for kernel, values in seconds.items():
-            rate = f"{points / float(np.median(values)) / 1e6:.2f} million points/s of a core"
-            rows.append((f"insert by {kernel.value.lower()}, {name}", rate, "C++: 1.6-10"))
+            seconds.append(median_seconds(partial(surface_map.insert, new), repeats=1, clock=time.process_time))
+        rate = f"{points / float(np.median(seconds)) / 1e6:.2f} million points/s of a core"
+        rows.append((f"insert, {name}", rate, "C++: 1.6-10"))
     return rows
 
 
@@ -101,4 +90,4 @@ def marker_rows() -> List[Row]:
 
 def rows() -> List[Row]:
     """Return the figures of the map."""
-    return insertion_rows() + compiled_rows() + marker_rows()
+    return insertion_rows() + density_rows() + marker_rows()

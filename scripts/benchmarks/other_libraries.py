@@ -11,7 +11,6 @@ from benchmarks.in_turn import OURS, comparison_rows
 from benchmarks.map_figures import RESOLUTION
 from benchmarks.table import Row
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.kernels import Kernel
 from sonar_processing.filters.outliers import radius_inliers, statistical_inliers
 
 NEIGHBORS, DEVIATIONS = 20, 1.0
@@ -92,8 +91,6 @@ def insertion_rows() -> List[Row]:
         OURS: lambda: MultiLevelSurfaceMap(RESOLUTION).insert,
         "a plain dict of cells": lambda: CellDictionary(RESOLUTION).insert,
     }
-    if find_spec("numba") is not None:
-        makers["our compiled loops"] = lambda: MultiLevelSurfaceMap(RESOLUTION, kernel=Kernel.NUMBA).insert
     absent: List[Row] = []
     if find_spec("pyoctomap") is None:
         absent = [("insertion into OctoMap", "not measured: no pyoctomap", "")]

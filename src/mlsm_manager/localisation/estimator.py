@@ -15,13 +15,12 @@ from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
 from mlsm_manager.scan_matching.result import Matcher, MatchResult
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
+from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import transformed
-from node_support.kernels import Kernel
 
 _MOST_WAITING = 8
 """Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""
@@ -42,7 +41,6 @@ class MapSettings:
     expected_blocks: int
     fewest_blocks: int
     carver: Optional[Carver] = None
-    kernel: Kernel = Kernel.NUMPY
 
 
 class Estimator(ABC):

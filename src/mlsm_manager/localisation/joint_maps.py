@@ -25,8 +25,8 @@ class JointMaps:
 
     def __init__(self, settings: MapSettings) -> None:
         own = settings
-        self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.kernel, own.carver)
-        self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.kernel, own.carver, most_followed=0)
+        self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.carver)
+        self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.carver, most_followed=0)
 
     @classmethod
     def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks]) -> "JointMaps":

@@ -17,7 +17,6 @@ from mlsm_manager.surface_map.free_space.pairing import pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Overlay
 from mlsm_manager.surface_map.running_copy import RunningCopy, finished
-from node_support.kernels import Kernel
 
 _STRAYED = 0.5
 """Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
@@ -40,15 +39,13 @@ class KeyframeCarving:
     Keyframes that are settled carve for ever, in the order of time. What the others say is kept beside the map.
     """
 
-    def __init__(
-        self, resolution: float, limit: float, carver: Optional[Carver], most_followed: int, kernel: Kernel
-    ) -> None:
+    def __init__(self, resolution: float, limit: float, carver: Optional[Carver], most_followed: int) -> None:
         """`carver`: None where nothing is to be carved. most_followed: keyframes that may still move and whose beams
-        are followed with each scan; with 0 only those that settle carve. kernel: see MultiLevelSurfaceMap.
+        are followed with each scan; with 0 only those that settle carve.
         """
         self._carver = carver
         self._most_followed = most_followed
-        self._free = MultiLevelSurfaceMap(resolution, limit, kernel=kernel)
+        self._free = MultiLevelSurfaceMap(resolution, limit)
         self._looks: Deque[Optional[_Look]] = deque()
         self._hit_cells, self._hit_by = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 

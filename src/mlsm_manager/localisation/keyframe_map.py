@@ -9,11 +9,10 @@ import numpy as np
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
 from mlsm_manager.localisation.placement import Placement
-from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
+from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
-from node_support.kernels import Kernel
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,6 @@ class KeyframeMap:
         resolution: float,
         limit: float,
         expected_blocks: int = 0,
-        kernel: Kernel = Kernel.NUMPY,
         carver: Optional[Carver] = None,
         most_followed: int = MOST_FOLLOWED,
     ) -> None:
@@ -44,9 +42,8 @@ class KeyframeMap:
 
         The rest as MultiLevelSurfaceMap.
         """
-        self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks, kernel)
-        self._free = KeyframeCarving(resolution, limit, carver, most_followed, kernel)
-        self._kernel = kernel
+        self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks)
+        self._free = KeyframeCarving(resolution, limit, carver, most_followed)
         self._moving: Deque[Cloud] = deque()
         self._overlay = Overlay(self._map)
         self._above = self._new().blocks
@@ -54,7 +51,7 @@ class KeyframeMap:
         self._left_out = 0
 
     def _new(self) -> MultiLevelSurfaceMap:
-        return MultiLevelSurfaceMap(self._map.resolution, self._map.limit, kernel=self._kernel)
+        return MultiLevelSurfaceMap(self._map.resolution, self._map.limit)
 
     @property
     def map(self) -> MultiLevelSurfaceMap:
@@ -123,7 +120,7 @@ class KeyframeMap:
             return drawn
         self._due = placement
         self._left_out += 1
-        return Drawn(self._map.admitted(placement.points(self._moving[-1])).report, drawn.carved)
+        return Drawn(self._map.report(placement.points(self._moving[-1])), drawn.carved)
 
     def settle(self, placement: Placement, until: float = np.inf) -> None:
         """Draw all keyframes that end by `until` [s] for the last time, and forget those after it."""

@@ -4,7 +4,6 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any, Dict, Optional, Sequence
 
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint import Joint
 from mlsm_manager.localisation.joint_parameters import EstimatorName, JointParameters
@@ -18,7 +17,6 @@ from mlsm_manager.surface_map.export.colors import ColorBy
 from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.headers import StampParameters
-from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 # A block takes 112 bytes with its part of the index: 1.8 GB, more than a vehicle's computer can spare.
@@ -85,20 +83,13 @@ class LocaliserParameters(
     def map_settings(self) -> MapSettings:
         """Return what the grids are made from."""
         return MapSettings(
-            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points, self.carver,
-            self.chosen_kernel,
+            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points, self.carver
         )  # fmt: skip
 
     @property
     def carver(self) -> Optional[Carver]:
         """What marks free space and takes blocks away that beams go through; None where that is not wanted."""
         return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
-
-    @property
-    def chosen_kernel(self) -> Kernel:
-        """What inserts points into the map that is shown."""
-        compiled = self.solver_kernel.resolved is SolverKernel.NUMBA
-        return Kernel.NUMBA if compiled else Kernel.NUMPY
 
     @property
     def matches_from_start(self) -> bool:
@@ -153,10 +144,6 @@ class MlsmNodeParameters(ParameterSet):
         1.0, "shortest time between two messages of the map, in wall time; the next change after it is sent at once",
         unit="s", low=0.05, high=3600.0, tunable=False,
     )  # fmt: skip
-    insertion: Kernel = parameter(
-        Kernel.NUMPY, "what inserts points and makes markers: NUMBA is several times faster and needs python3-numba",
-        tunable=False,
-    )  # fmt: skip
     color_by: ColorBy = parameter(ColorBy.TYPE, "what the colour of a block's marker tells", tunable=False)
     grid_low: float = parameter(
         -1000.0, "lowest height that MLSM/grid shows", unit="m", low=-20000.0, high=20000.0, tunable=False
@@ -190,7 +177,6 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
                 f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
             )
-        check_kernel("insertion", self.insertion)
         if self.map_frame == self.odom_frame:
             raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
 
@@ -198,11 +184,6 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     def matches_from_start(self) -> bool:
         """Whether scans are matched from the start."""
         return self.start_matching
-
-    @property
-    def chosen_kernel(self) -> Kernel:
-        """What inserts points into the map that is shown."""
-        return self.insertion
 
     @property
     def calibration(self) -> Dict[str, Any]:

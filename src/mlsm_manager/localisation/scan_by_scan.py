@@ -11,11 +11,11 @@ from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, u
 from mlsm_manager.scan_matching.result import MatchResult, corrected_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS
-from mlsm_manager.surface_map.admission import InsertReport
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import Layer
 from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
 from mlsm_manager.surface_map.free_space.carving import CarveReport
+from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed
 
@@ -35,7 +35,7 @@ class ScanByScan(Estimator):
     def _new_maps(self) -> List[MultiLevelSurfaceMap]:
         own = self.settings
         return [
-            MultiLevelSurfaceMap(own.resolution, own.limit, own.expected_blocks, own.kernel),
+            MultiLevelSurfaceMap(own.resolution, own.limit, own.expected_blocks),
             MultiLevelSurfaceMap(own.match_resolution, own.limit),
             MultiLevelSurfaceMap(own.resolution, own.limit),
         ]

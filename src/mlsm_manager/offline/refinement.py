@@ -38,7 +38,7 @@ class Refined:
 def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
     """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
     closing = closed(solver, solved_best(solver))
-    surfaces = KeyframeMap(settings.resolution, settings.limit, kernel=settings.kernel, carver=settings.carver)
+    surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(Cloud.of_scan(scan))
     surfaces.settle(SolvedPlacement(solver.log, solver.odometry, closing.batch.state))

@@ -69,7 +69,7 @@ class _Tiles(rospy.SubscribeListener):
     def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
         self._localiser = localiser
         self._frame = parameters.map_frame
-        self._markers = BlockMarkers(parameters.color_by, parameters.insertion)
+        self._markers = BlockMarkers(parameters.color_by)
         self._lock = threading.Lock()
         self._is_replaced = True
         self._send_all = guarded(health, self._again)

@@ -9,10 +9,9 @@ from geometry_msgs.msg import Quaternion, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from mlsm_manager.surface_map.block_shapes import THINNEST, BoxLists, box_maker, box_size, box_type
+from mlsm_manager.surface_map.block_shapes import THINNEST, BoxLists, box_lists, box_size, box_type
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.export.colors import ColorBy, Limits, block_colors, color_limits
-from node_support.kernels import Kernel
 
 Tile = Tuple[int, int]
 COLORS: Dict[BlockType, ColorRGBA] = {
@@ -49,10 +48,8 @@ class PackedMarkerArray(MarkerArray):
 class BlockMarkers:
     """Makes the markers of changed tiles and of the whole map; remembers what rviz may hold, to delete what is gone."""
 
-    def __init__(self, color_by: ColorBy = ColorBy.TYPE, kernel: Kernel = Kernel.NUMPY) -> None:
-        """kernel: what makes the boxes. Raises ImportError for one that is not installed."""
+    def __init__(self, color_by: ColorBy = ColorBy.TYPE) -> None:
         self._color_by = color_by
-        self._box_lists = box_maker(kernel)
         self._numbers: Dict[Tile, int] = {}
         self._shown: Dict[Tile, int] = {}
         """The classes of boxes in each tile, one bit each, from THINNEST on."""
@@ -87,7 +84,7 @@ class BlockMarkers:
 
     def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, int]]:
         """Return the serialised markers of blocks, and which classes of boxes there are in each tile."""
-        boxes = self._box_lists(blocks)
+        boxes = box_lists(blocks)
         cubes, powers = self._cubes(boxes, blocks), boxes.powers.tolist()
         frames = {power: _Frame(power, boxes.resolution, header) for power in set(powers)}
         packed, kinds = [], {}

@@ -6,15 +6,13 @@ are.
 """
 
 from dataclasses import dataclass
-from typing import Callable, Tuple
+from typing import Tuple
 
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
-from node_support.kernels import Kernel
-from node_support.numba_cache import prepare_cache
 
 # Power of two: a sixteenth of a cell is the thinnest box that still shows.
 THINNEST = -4
@@ -37,24 +35,6 @@ class BoxLists:
     resolution: float
 
 
-BoxMaker = Callable[[Blocks], BoxLists]
-"""Returns the boxes that cover every block from its bottom to its top across its cell.
-
-Blocks thinner than 2 ** THINNEST cells are drawn that thick.
-"""
-
-
-def box_maker(kernel: Kernel) -> BoxMaker:
-    """Return what makes boxes. Raises ImportError, which says what to install, for NUMBA without numba."""
-    if kernel is Kernel.NUMPY:
-        return box_lists
-    prepare_cache()
-    from mlsm_manager.surface_map.compiled_shapes import compile_loops, compiled_box_lists
-
-    compile_loops()
-    return compiled_box_lists
-
-
 def box_size(resolution: float, power: int) -> Tuple[float, float, float]:
     """Return width, length and height of the boxes of a class, m."""
     return resolution, resolution, resolution * 2.0**power
@@ -66,7 +46,10 @@ def box_type(power: int) -> BlockType:
 
 
 def box_lists(blocks: Blocks) -> BoxLists:
-    """Make boxes; see BoxMaker."""
+    """Return the boxes that cover every block from its bottom to its top across its cell.
+
+    Blocks thinner than 2 ** THINNEST cells are drawn that thick.
+    """
     centers, power, owners = _boxes(blocks)
     tile = cell_keys(blocks.cells >> TILE_BITS)[owners]
     order = np.lexsort((power, tile))

@@ -3,24 +3,25 @@
 import numpy as np
 
 from mlsm_manager.surface_map.large_array import LargeArray
+from node_support.numba_cache import compiled
 
 NO_BLOCK = -1
-EMPTY = np.iinfo(np.int64).min
-SEGMENT_BITS = 12
+_EMPTY = np.iinfo(np.int64).min
+_SEGMENT_BITS = 12
 """A segment has 4096 places (48 kB): splitting one takes well below a millisecond."""
-_PLACES = 1 << SEGMENT_BITS
-LEAST_LOAD, LOAD_SPREAD = 0.58, 0.2
+_PLACES = 1 << _SEGMENT_BITS
+_LEAST_LOAD, _LOAD_SPREAD = 0.58, 0.2
 """Share of a segment in use from which on it is split. The shares differ from segment to segment, because all fill at
 the same rate and would otherwise be split at the same time."""
 _MEAN_LOAD = 0.52
 """With so many expected cells in the mean no segment reaches the least share: that is 5 deviations away."""
-GOLDEN_RATIO = 0.6180339887498949
+_GOLDEN_RATIO = 0.6180339887498949
 # The golden ratio times 2^64, a prime of xxHash and one of splitmix64: they spread neighbouring cells over the table.
-MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
-MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
-FINISHER = np.uint64(0xBF58476D1CE4E5B9)
-_HALF = np.uint64(32)
-LOCAL_SHIFT = np.uint64(64 - 32 - SEGMENT_BITS)
+_MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
+_MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
+_FINISHER = np.uint64(0xBF58476D1CE4E5B9)
+_HALF, _LOW, _LAST_PLACE = np.uint64(32), np.int64(0xFFFFFFFF), np.uint64(_PLACES - 1)
+_LOCAL_SHIFT = np.uint64(64 - 32 - _SEGMENT_BITS)
 
 
 def cell_keys(cells: np.ndarray) -> np.ndarray:
@@ -68,69 +69,33 @@ class CellIndex:
 
         Places are good until the next call.
         """
-        self._make_room(keys)
+        if len(self._full_with(keys)):
+            new = keys[self._found(keys) < 0]
+            full = self._full_with(new)
+            while len(full):
+                self._split(full)
+                full = self._full_with(new)
         return self._placed(keys)
 
     def find(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
-        heads = np.full(keys.size, NO_BLOCK, dtype=np.int32)
-        place = self._found(keys)
-        known = place >= 0
-        heads[known] = self.heads[place[known]]
-        return heads
+        places = self._found(keys)
+        return np.where(places >= 0, self.heads[places], np.int32(NO_BLOCK))
 
     def _found(self, keys: np.ndarray) -> np.ndarray:
-        """Return (n,) the places of `keys` (n,), -1 of those that are not there."""
-        places, held_keys = np.full(keys.size, -1), self._keys.values
-        place, pending = self._first_places(keys), np.arange(keys.size)
-        while pending.size:
-            held = held_keys[place]
-            found = held == keys[pending]
-            places[pending[found]] = place[found]
-            further = ~found & (held != EMPTY)
-            pending, place = pending[further], _following(place[further])
-        return places
+        return _found(np.ascontiguousarray(keys), self._directory, self._bits, self._keys.values)
 
     def _placed(self, keys: np.ndarray) -> np.ndarray:
-        """Return (n,) the places of `keys` (n,); those that are new take one."""
-        places, held_keys = self._first_places(keys), self._keys.values
-        pending = np.arange(keys.size)
-        while pending.size:
-            place, wanted = places[pending], keys[pending]
-            free = held_keys[place] == EMPTY
-            held_keys[place[free]] = wanted[free]
-            # Of several keys that claimed one free place the last has got it; the others look further.
-            taken = place[free & (held_keys[place] == wanted)]
-            self._used += np.bincount(taken >> SEGMENT_BITS, minlength=len(self._used))
-            pending = pending[held_keys[place] != wanted]
-            places[pending] = _following(places[pending])
-        return places
+        return _placed(keys, self._directory, self._bits, self._keys.values, self._used)
 
-    def _make_room(self, keys: np.ndarray) -> None:
-        """Split segments until all `keys` (n,) have room."""
-        segments = self._first_places(keys) >> SEGMENT_BITS
-        full = self._full_with(segments)
-        if not full.any():
-            return
-        new = keys[full[segments]]
-        new = new[self._found(new) < 0]
-        while True:
-            full = self._full_with(self._first_places(new) >> SEGMENT_BITS)
-            if not full.any():
-                return
-            self._split(np.flatnonzero(full))
-
-    def _full_with(self, segments: np.ndarray) -> np.ndarray:
-        """Return which segments (s,) are full with one more key in each of `segments` (n,)."""
-        number = np.arange(len(self._used))
-        load = LEAST_LOAD + LOAD_SPREAD * (number * GOLDEN_RATIO % 1.0)
-        return self._used + np.bincount(segments, minlength=len(number)) > load * _PLACES
+    def _full_with(self, keys: np.ndarray) -> np.ndarray:
+        return _full_segments(keys, self._directory, self._bits, self._used)
 
     def _split(self, segments: np.ndarray) -> None:
         """Give half of the range of hashes of each of `segments` (n,) to a new one, and the keys with it."""
         places = _places_of(segments)
         keys, heads = self._keys.values[places], self.heads[places]
-        taken = keys != EMPTY
+        taken = keys != _EMPTY
         new = len(self._used) + np.arange(len(segments))
         depth = self._depth[segments] + 1
         self._depth[segments] = depth
@@ -153,24 +118,67 @@ class CellIndex:
 
     def _clear(self, segments: np.ndarray) -> None:
         places = _places_of(segments)
-        self._keys.values[places], self.heads[places] = EMPTY, NO_BLOCK
+        self._keys.values[places], self.heads[places] = _EMPTY, NO_BLOCK
         self._used[segments] = 0
-
-    def _first_places(self, keys: np.ndarray) -> np.ndarray:
-        """Return (n,) the places at which the search for `keys` (n,) begins."""
-        mixed = (keys >> 32).astype(np.uint64) * MULTIPLIER_X + (keys & 0xFFFFFFFF).astype(np.uint64) * MULTIPLIER_Y
-        mixed = (mixed ^ (mixed >> _HALF)) * FINISHER
-        # Two shifts: numpy does not define one by all 64 bits.
-        entry = (mixed >> _HALF) >> np.uint64(32 - self._bits)
-        local = (mixed >> LOCAL_SHIFT) & np.uint64(_PLACES - 1)
-        return (self._directory[entry.astype(np.int64)] << SEGMENT_BITS) + local.astype(np.int64)
-
-
-def _following(places: np.ndarray) -> np.ndarray:
-    """Return the places (n,) that are looked at after `places` (n,): the next ones, around each segment."""
-    return (places & ~(_PLACES - 1)) | ((places + 1) & (_PLACES - 1))
 
 
 def _places_of(segments: np.ndarray) -> np.ndarray:
     """Return all places of segments (n,), (n * _PLACES,)."""
-    return ((segments[:, np.newaxis] << SEGMENT_BITS) + np.arange(_PLACES)).ravel()
+    return ((segments[:, np.newaxis] << _SEGMENT_BITS) + np.arange(_PLACES)).ravel()
+
+
+@compiled()
+def _first_place(key, directory, bits):
+    """Return the place at which the search for a key begins."""
+    x, y = np.uint64(key >> 32), np.uint64(key & _LOW)
+    mixed = x * _MULTIPLIER_X + y * _MULTIPLIER_Y
+    mixed = (mixed ^ (mixed >> _HALF)) * _FINISHER
+    # Two shifts: one by all 64 bits is not defined.
+    entry = (mixed >> _HALF) >> np.uint64(32 - bits)
+    return (directory[np.int64(entry)] << _SEGMENT_BITS) + np.int64((mixed >> _LOCAL_SHIFT) & _LAST_PLACE)
+
+
+@compiled()
+def _searched(key, directory, bits, held_keys):
+    """Return the place that holds a key, or else the free one that it may take: places are searched in a ring."""
+    place = _first_place(key, directory, bits)
+    while held_keys[place] != key and held_keys[place] != _EMPTY:
+        place = (place & ~(_PLACES - 1)) | ((place + 1) & (_PLACES - 1))
+    return place
+
+
+@compiled()
+def _found(keys, directory, bits, held_keys):
+    """Return (n,) the places of `keys` (n,), -1 of those that are not there."""
+    places = np.empty(len(keys), np.int64)
+    for number in range(len(keys)):
+        place = _searched(keys[number], directory, bits, held_keys)
+        places[number] = place if held_keys[place] != _EMPTY else -1
+    return places
+
+
+@compiled()
+def _placed(keys, directory, bits, held_keys, used):
+    """Return (n,) the places of `keys` (n,); those that are new take one."""
+    places = np.empty(len(keys), np.int64)
+    for number in range(len(keys)):
+        place = _searched(keys[number], directory, bits, held_keys)
+        if held_keys[place] == _EMPTY:
+            held_keys[place] = keys[number]
+            used[place >> _SEGMENT_BITS] += 1
+        places[number] = place
+    return places
+
+
+@compiled()
+def _full_segments(keys, directory, bits, used):
+    """Return the segments (k,) that would be full if all `keys` (n,) were new."""
+    more = np.zeros(len(used), np.int64)
+    for number in range(len(keys)):
+        more[_first_place(keys[number], directory, bits) >> _SEGMENT_BITS] += 1
+    full, count = np.empty(len(used), np.int64), 0
+    for segment in range(len(used)):
+        load = _LEAST_LOAD + _LOAD_SPREAD * (segment * _GOLDEN_RATIO % 1.0)
+        full[count] = segment
+        count += used[segment] + more[segment] > load * _PLACES
+    return full[:count]

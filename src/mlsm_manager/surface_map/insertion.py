@@ -1,101 +1,199 @@
-"""How points become blocks of a store, by numpy or by compiled loops that give the same blocks to the last bit."""
+"""Insertion of points and of blocks into a store: compiled loops merge them with the blocks that their cells hold."""
 
-from typing import Callable, NamedTuple
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.admission import InsertReport, admitted
 from mlsm_manager.surface_map.block_store import BlockStore
-from mlsm_manager.surface_map.blocks import cells_of
-from mlsm_manager.surface_map.cell_index import cell_keys
-from mlsm_manager.surface_map.linkage import Extents, Intervals, concatenated, group_points, joined, link, merge
-from node_support.kernels import Kernel
-from node_support.numba_cache import prepare_cache
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks
+from mlsm_manager.surface_map.cell_index import NO_BLOCK, cell_keys
+from mlsm_manager.surface_map.point_groups import VALUES, Groups, finite_within, grouped_points, sorted_by_cell
+from node_support.numba_cache import compiled
 
 
-class Insertion(NamedTuple):
-    """cells: (c,) keys of the cells that points went into, sorted. report: what became of all points."""
+@dataclass(frozen=True)
+class InsertReport:
+    """What became of the points of one insertion."""
 
-    cells: np.ndarray
-    report: InsertReport
-
-
-PointInserter = Callable[[BlockStore, np.ndarray, float, float], Insertion]
-"""Takes store, points (n, 4), the resolution and the limit of coordinates [m]."""
+    inserted: int
+    not_finite: int
+    outside: int
 
 
-def point_inserter(kernel: Kernel) -> PointInserter:
-    """Return what inserts points. Raises ImportError, which says what to install, for NUMBA without numba."""
-    if kernel is Kernel.NUMPY:
-        return insert_points
-    prepare_cache()
-    from mlsm_manager.surface_map.compiled_insertion import compile_loops, insert_points_compiled
-
-    compile_loops()
-    return insert_points_compiled
+def admitted(points: np.ndarray, limit: float) -> Tuple[np.ndarray, InsertReport]:
+    """Return which points (n, 4) are finite and have no coordinate beyond `limit` [m], and what became of all."""
+    kept, not_finite = finite_within(np.ascontiguousarray(points, dtype=np.float64), limit)
+    return kept, InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
 
 
-def insert_points(store: BlockStore, points: np.ndarray, resolution: float, limit: float) -> Insertion:
-    """Insert points; see PointInserter."""
-    kept, report = admitted(points, limit)
-    if not len(kept):
-        return Insertion(np.empty(0, dtype=np.int64), report)
-    groups = group_points(kept, cell_keys(cells_of(kept, resolution)), resolution)
-    return Insertion(insert_groups(store, groups, resolution), report)
-
-
-def insert_groups(store: BlockStore, groups: Intervals, resolution: float) -> np.ndarray:
-    """Insert sorted intervals that lie at least the resolution apart; return the keys (c,) of their cells, sorted."""
-    cells = groups.cell[np.flatnonzero(np.append(True, groups.cell[1:] != groups.cell[:-1]))]
-    slots = store.slots(cells)
-    if len(store):
-        rows, owner = _write_merged(store, groups, store.extents(cells, slots), resolution)
-    else:
-        rows, owner = store.take(len(groups)), groups.cell
-        store.write(rows, groups)
-    store.chain(rows, owner, slots)
+def insert_points(store: BlockStore, points: np.ndarray, resolution: float) -> np.ndarray:
+    """Insert admitted points (n, 4); return the keys (c,) of the cells that they went into, sorted."""
+    cells, groups = grouped_points(points, resolution)
+    _insert_groups(store, cells, groups, resolution)
     return cells
 
 
-def _write_merged(store: BlockStore, groups: Intervals, stored: Extents, resolution: float) -> tuple:
-    """Write what new and stored intervals make together; return rows and cells of all that their cells hold now.
+def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
+    """Insert blocks of the store's resolution, which may overlap; return the keys (c,) of their cells, sorted."""
+    cells, order, starts = sorted_by_cell(cell_keys(blocks.cells), blocks.bottom)
+    owner = np.repeat(np.arange(len(cells)), np.diff(starts))
+    _insert_groups(store, cells, Groups(blocks.rows[order], owner, blocks.crossed[order]), blocks.resolution)
+    return cells
 
-    Most of what lies in the cells of a scan stays as it is, or is new and touches nothing: it is never read.
+
+def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups, resolution: float) -> None:
+    slots = store.slots(cells)
+    runs, fused = _linked(groups, store.arrays, slots, resolution)
+    if len(fused):
+        store.release(fused)
+    new = runs.row < 0
+    runs.row[new] = store.take(int(np.count_nonzero(new)))
+    store.announce(runs.row[runs.changed])
+    _write(runs, store.arrays, slots)
+
+
+@lru_cache(maxsize=None)
+def compile_loops() -> None:
+    """Compile all loops, or read them from numba's cache, once in a process: not when the first scan comes."""
+    store = BlockStore(0)
+    for writeable in (True, False):
+        points = np.zeros((2, 4))
+        points.flags.writeable = writeable
+        kept, _ = admitted(points, 1.0)
+    insert_points(store, kept, 1.0)
+    insert_blocks(store, store.blocks(store.rows_in_use, 1.0))
+    store.remove(store.rows_in_use, np.zeros(1, dtype=np.int64))
+
+
+class Runs(NamedTuple):
+    """All blocks (m) of the cells that something went into, by cell, then by bottom.
+
+    blocks: (m, ROW_WIDTH), of which only those that changed are filled in. row: (m,) number in the store, -1 where new.
+    cell: (m,) index of the cell. crossed: (m,) uint16, see Groups. changed: (m,) bool.
     """
-    elements = concatenated(groups.extents, stored)
-    starts = link(elements, resolution)
-    size = np.diff(np.append(starts, len(elements)))
-    alone, several = (elements.row[starts] < 0) & (size == 1), size > 1
-    number = np.cumsum(elements.row < 0) - 1
-    single = groups.take(number[starts[alone]])
-    together = _merged(store, groups, elements, number, size) if several.any() else None
-    rows = _rows_of_runs(store, elements, starts, size)
-    store.write(rows[alone], single)
-    if together is not None:
-        store.write(rows[several], together)
-    return rows, elements.cell[starts]
+
+    blocks: np.ndarray
+    row: np.ndarray
+    cell: np.ndarray
+    crossed: np.ndarray
+    changed: np.ndarray
 
 
-def _rows_of_runs(store: BlockStore, elements: Extents, starts: np.ndarray, size: np.ndarray) -> np.ndarray:
-    """Return the row (m,) of each run: the highest of its stored blocks, the others are given back, or else a new one.
+@compiled()
+def _linked(groups, store, slots, resolution):
+    """Return the Runs of the cells at `slots` (c,) after the groups went into them, each cell at least one, and the row
+    numbers (f,) of stored blocks that are part of others by then.
 
-    What was stored must have been read before.
+    A merged block keeps the highest row of its parts. What is new resets its crossings: a beam has just hit it.
     """
-    rows = np.maximum.reduceat(elements.row, starts)
-    fused = (elements.row >= 0) & (elements.row != np.repeat(rows, size))
-    if fused.any():
-        store.release(elements.row[fused])
-    new = rows < 0
-    rows[new] = store.take(int(np.count_nonzero(new)))
-    return rows
+    new_rows, new_cell, new_crossed = groups
+    most = len(new_rows) + _stored_count(store.following, store.heads, slots)
+    blocks, row, owner = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
+    crossed, changed = np.zeros(most, np.uint16), np.empty(most, np.bool_)
+    parts, part_rows = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64)
+    stored, fused = np.empty(most, np.int64), np.empty(most, np.int64)
+    made, gone, group = 0, 0, 0
+    for cell in range(len(slots)):
+        held = _stored_by_bottom(store.rows, store.following, store.heads[slots[cell]], stored)
+        reached, length, following = -np.inf, 0, 0
+        while True:
+            new_bottom = new_rows[group, BOTTOM] if group < len(new_rows) and new_cell[group] == cell else np.inf
+            old_bottom = store.rows[stored[following], BOTTOM] if following < held else np.inf
+            bottom = min(new_bottom, old_bottom)
+            if length and (bottom == np.inf or bottom - reached >= resolution):
+                changed[made], owner[made] = length > 1 or part_rows[0] < 0, cell
+                if changed[made]:
+                    _pool(parts[:length], blocks[made])
+                row[made], gone = _row_of(part_rows[:length], fused, gone)
+                made, length, reached = made + 1, 0, -np.inf
+            if bottom == np.inf:
+                break
+            if new_bottom <= old_bottom:
+                parts[length], part_rows[length] = new_rows[group], -1
+                crossed[made] = max(crossed[made], new_crossed[group])
+                group += 1
+            else:
+                parts[length], part_rows[length] = store.rows[stored[following]], stored[following]
+                following += 1
+            reached = max(reached, parts[length, TOP])
+            length += 1
+    return Runs(blocks[:made], row[:made], owner[:made], crossed[:made], changed[:made]), fused[:gone]
 
 
-def _merged(store: BlockStore, groups: Intervals, elements: Extents, number: np.ndarray, size: np.ndarray) -> Intervals:
-    """Return what runs of several elements make together. number: (n,) of the group that each new element is."""
-    several = size > 1
-    members = np.flatnonzero(np.repeat(several, size))
-    is_new = elements.row[members] < 0
-    held = store.intervals(elements.take(members[~is_new]))
-    parts = joined(groups.take(number[members[is_new]]), held)
-    place = np.where(is_new, np.cumsum(is_new) - 1, len(parts) - len(held) + np.cumsum(~is_new) - 1)
-    return merge(parts.take(place), np.cumsum(size[several]) - size[several])
+@compiled()
+def _stored_count(following, heads, slots):
+    """Return how many blocks the cells at `slots` (c,) hold."""
+    count = 0
+    for slot in slots:
+        row = heads[slot]
+        while row != NO_BLOCK:
+            count += 1
+            row = following[row]
+    return count
+
+
+@compiled()
+def _stored_by_bottom(rows, following, head, stored):
+    """Write the row numbers of a cell into `stored`, sorted by bottom, and return how many there are."""
+    held, row = 0, head
+    while row != NO_BLOCK:
+        place = held
+        while place > 0 and rows[stored[place - 1], BOTTOM] > rows[row, BOTTOM]:
+            stored[place] = stored[place - 1]
+            place -= 1
+        stored[place] = row
+        held += 1
+        row = following[row]
+    return held
+
+
+@compiled()
+def _pool(parts, block):
+    """Write what intervals (p, ROW_WIDTH) make together into `block` (ROW_WIDTH,).
+
+    Mean and variance are pooled exactly (Chan, Golub and LeVeque 1979); equation 6.6 of the thesis underestimates the
+    variance.
+    """
+    block[:] = parts[0]
+    if len(parts) == 1:
+        return
+    for part in range(1, len(parts)):
+        block[COUNT] += parts[part, COUNT]
+        block[TOP] = max(block[TOP], parts[part, TOP])
+    for column in range(VALUES):
+        first, total, squares = parts[0, column], 0.0, 0.0
+        for part in range(len(parts)):
+            total += (parts[part, column] - first) * parts[part, COUNT]
+        mean = first + total / block[COUNT]
+        for part in range(len(parts)):
+            shift = parts[part, column] - mean
+            squares += parts[part, VALUES + column] + shift * shift * parts[part, COUNT]
+        block[column], block[VALUES + column] = mean, squares
+
+
+@compiled()
+def _row_of(rows, fused, gone):
+    """Return the highest of the stored rows (p,), -1 without one, and how many rows are free by now: the others too."""
+    kept = np.int64(-1)
+    for row in rows:
+        kept = max(kept, row)
+    for row in rows:
+        if 0 <= row < kept:
+            fused[gone] = row
+            gone += 1
+    return kept, gone
+
+
+@compiled()
+def _write(runs, store, slots):
+    """Write the runs, which all have rows, into the store; `slots` (c,) are the cells' places."""
+    for run in range(len(runs.row)):
+        row, cell = runs.row[run], runs.cell[run]
+        if runs.changed[run]:
+            store.rows[row], store.crossed[row] = runs.blocks[run], runs.crossed[run]
+        if run == 0 or runs.cell[run - 1] != cell:
+            store.heads[slots[cell]] = row
+        is_last = run + 1 == len(runs.row) or runs.cell[run + 1] != cell
+        store.following[row] = NO_BLOCK if is_last else runs.row[run + 1]

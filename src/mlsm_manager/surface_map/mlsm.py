@@ -4,16 +4,12 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.admission import Admitted, InsertReport, admitted
 from mlsm_manager.surface_map.block_store import BlockStore
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
-from mlsm_manager.surface_map.cell_order import cell_order
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
-from mlsm_manager.surface_map.insertion import insert_groups, point_inserter
-from mlsm_manager.surface_map.linkage import intervals_of, linked_alone
+from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
 from mlsm_manager.surface_map.running_copy import RunningCopy
-from node_support.kernels import Kernel
 
 
 class MultiLevelSurfaceMap:
@@ -22,22 +18,13 @@ class MultiLevelSurfaceMap:
     The cost of inserting a scan depends on the scan and on the blocks of the cells it touches, not on the map.
     """
 
-    def __init__(
-        self,
-        resolution: float,
-        limit: float = 10000.0,
-        expected_blocks: int = 0,
-        kernel: Kernel = Kernel.NUMPY,
-    ) -> None:
-        """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted.
-
-        Raises ImportError for a kernel that is not installed.
-        """
+    def __init__(self, resolution: float, limit: float = 10000.0, expected_blocks: int = 0) -> None:
+        """`resolution`: side of a cell, m. Points beyond `limit` [m] from the origin in any axis are not inserted."""
+        compile_loops()
         self.resolution = resolution
         self.limit = limit
-        self._store = BlockStore(expected_blocks, kernel)
+        self._store = BlockStore(expected_blocks)
         self._changed = ChangedTiles()
-        self._insert_points = point_inserter(kernel)
 
     def __len__(self) -> int:
         """Return the number of blocks."""
@@ -112,15 +99,7 @@ class MultiLevelSurfaceMap:
         if not len(rows):
             return
         cells = np.unique(cell_keys(self._store.blocks(rows, self.resolution).cells))
-        slots = self._store.slots(cells)
-        held = self._store.extents(cells, slots)
-        kept = held.take(np.flatnonzero(~np.isin(held.row, rows)))
-        kept = kept.take(cell_order(kept.cell, kept.bottom))
-        self._store.release(rows)
-        still = np.isin(cells, kept.cell)
-        self._store.empty(slots[~still])
-        if still.any():
-            self._store.chain(kept.row, kept.cell, slots[still])
+        self._store.remove(rows, cells)
         self._changed.note(cells)
 
     def insert(self, points: np.ndarray) -> InsertReport:
@@ -128,13 +107,13 @@ class MultiLevelSurfaceMap:
 
         Points that are not finite or beyond the limit are left out and counted.
         """
-        cells, report = self._insert_points(self._store, points, self.resolution, self.limit)
-        self._changed.note(cells)
+        kept, report = admitted(points, self.limit)
+        self._changed.note(insert_points(self._store, kept, self.resolution))
         return report
 
-    def admitted(self, points: np.ndarray) -> Admitted:
-        """Return those of points (n, 4) that `insert` would take, and what it would report."""
-        return admitted(points, self.limit)
+    def report(self, points: np.ndarray) -> InsertReport:
+        """Return what `insert` would report of points (n, 4)."""
+        return admitted(points, self.limit)[1]
 
     def insert_blocks(self, blocks: Blocks) -> InsertReport:
         """Insert blocks of the same resolution; each goes where its mean lies, as if its points came with it.
@@ -146,10 +125,7 @@ class MultiLevelSurfaceMap:
             raise ValueError(f"resolution {blocks.resolution:g} m: must be the map's, {self.resolution:g} m")
         reach = np.abs(np.column_stack([blocks.mean[:, :2], blocks.bottom, blocks.height])).max(axis=1)
         kept = blocks.take(reach <= self.limit)
-        if len(kept):
-            cells = cell_keys(cells_of(kept.mean, self.resolution))
-            groups = linked_alone(intervals_of(kept, cells), self.resolution)
-            self._changed.note(insert_groups(self._store, groups, self.resolution))
+        self._changed.note(insert_blocks(self._store, kept))
         inserted = int(kept.count.sum())
         return InsertReport(inserted, 0, int(blocks.count.sum()) - inserted)
 

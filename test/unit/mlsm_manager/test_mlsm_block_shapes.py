@@ -7,10 +7,9 @@ from hypothesis import strategies as st
 from made_blocks import blocks_of
 from made_boxes import boxes_by_list
 
-from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists, box_maker
+from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists
 from mlsm_manager.surface_map.blocks import BlockType
 from mlsm_manager.surface_map.changed_tiles import TILE_BITS
-from node_support.kernels import Kernel
 
 BOTTOMS = st.floats(-50.0, 50.0)
 DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))
@@ -91,22 +90,6 @@ def test_a_box_lies_in_its_tile_and_knows_its_block():
         assert {tuple(tile) for tile in (blocks.cells[boxes.owners] >> TILE_BITS).tolist()} == {boxes.tile}
 
 
-@given(st.lists(st.tuples(BOTTOMS, DEPTHS), max_size=60), st.sampled_from([0.1, 0.5, 1.0]), st.integers(-40, 40))
-def test_compiled_loops_make_the_same_boxes(intervals, resolution, cell):
-    pytest.importorskip("numba")
-    blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], resolution)
-    blocks.rows[:, :2] += cell * resolution
-    # Neighbours in the store need not be neighbours in space.
-    blocks = blocks.take(np.argsort(blocks.bottom))
-    expected, compiled = box_lists(blocks), box_maker(Kernel.NUMBA)(blocks)
-    for name in ("tiles", "powers", "starts", "owners"):
-        np.testing.assert_array_equal(getattr(compiled, name), getattr(expected, name), name)
-    np.testing.assert_allclose(compiled.centers, expected.centers, rtol=0.0, atol=1e-12)
-
-
-@pytest.mark.parametrize("kernel", list(Kernel))
-def test_no_blocks_make_no_boxes(kernel):
-    if kernel is Kernel.NUMBA:
-        pytest.importorskip("numba")
-    boxes = box_maker(kernel)(blocks_of([]))
+def test_no_blocks_make_no_boxes():
+    boxes = box_lists(blocks_of([]))
     assert (len(boxes.tiles), len(boxes.powers), boxes.starts.tolist(), len(boxes.centers)) == (0, 0, [0], 0)

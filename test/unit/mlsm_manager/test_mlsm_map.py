@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from map_comparison import partition
 
-from mlsm_manager.surface_map.admission import InsertReport
+from mlsm_manager.surface_map import cell_index, insertion, point_groups
 from mlsm_manager.surface_map.blocks import BlockType, cells_of
+from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 
@@ -165,3 +166,19 @@ def test_the_points_given_are_not_written_to():
     points = np.array([[0.3, 0.3, 0.2, 1.0], [0.1, 0.1, 0.1, np.nan]])
     points.setflags(write=False)
     assert MultiLevelSurfaceMap(0.5).insert(points).inserted == 1
+
+
+@pytest.mark.parametrize("writeable", [True, False])
+@pytest.mark.parametrize("dtype", [np.float64, np.float32])
+def test_no_loop_is_compiled_after_the_map_was_made(dtype, writeable):
+    surface_map = MultiLevelSurfaceMap(0.5)
+    loops = [loop for module in (cell_index, insertion, point_groups) for loop in vars(module).values()]
+    loops = [loop for loop in loops if hasattr(loop, "signatures")]
+    compiled = [len(loop.signatures) for loop in loops]
+    points = np.zeros((3, 4), dtype)
+    points.setflags(write=writeable)
+    surface_map.insert(points)
+    surface_map.insert_blocks(surface_map.blocks)
+    surface_map.remove(surface_map.find(surface_map.blocks.cells)[1])
+    assert len(loops) >= 3
+    assert [len(loop.signatures) for loop in loops] == compiled

@@ -42,6 +42,16 @@ def test_blocks_that_overlap_among_themselves_become_one():
     assert partition(merged.blocks) == [((0, 0), 0.0, 1.2, 6, 1)]
 
 
+def test_inserted_blocks_keep_their_crossings_and_end_those_of_what_they_meet():
+    surface_map, other = MultiLevelSurfaceMap(0.5), MultiLevelSurfaceMap(0.5)
+    for one, place, crossings in ((surface_map, 0.1, 9), (other, 0.1, 3), (other, 5.1, 4)):
+        one.insert(np.array([[place, 0.1, 0.0, 1.0]]))
+        _, rows, _ = one.find(np.array([[int(place / 0.5), 0]]))
+        one.count_crossings(rows, np.array([crossings]))
+    surface_map.insert_blocks(other.blocks)
+    assert surface_map.blocks.crossed.tolist() == [3, 4]
+
+
 def test_blocks_of_another_resolution_are_refused():
     with pytest.raises(ValueError, match=r"resolution 0\.25 m: must be the map's, 0\.5 m"):
         MultiLevelSurfaceMap(0.5).insert_blocks(random_map(resolution=0.25).blocks)

@@ -5,10 +5,9 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import Blocks, cells_of
-from mlsm_manager.surface_map.cell_index import cell_keys
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.files.map_file import StoredMap
-from mlsm_manager.surface_map.linkage import intervals_of, joined, link
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 
 @dataclass(frozen=True)
@@ -41,17 +40,19 @@ def difference(first: Blocks, second: Blocks) -> Difference:
 
 def _groups(first: Blocks, second: Blocks) -> Tuple[np.ndarray, np.ndarray]:
     """Return for blocks (n,) and (m,) the number of the block that they would be part of in one map."""
-    if not len(first) or not len(second):
-        return np.arange(len(first)), len(first) + np.arange(len(second))
-    intervals, others = (
-        intervals_of(blocks, cell_keys(cells_of(blocks.mean, blocks.resolution))) for blocks in (first, second)
-    )
-    both = joined(replace(intervals, row=np.arange(len(first))), others)
-    order = np.lexsort((both.bottom, both.cell))
-    starts = link(both.take(order), first.resolution)
-    groups = np.empty(len(both), dtype=np.int64)
-    groups[order] = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(both))))
-    return groups[: len(first)], groups[len(first) :]
+    both = MultiLevelSurfaceMap(first.resolution, limit=np.inf, expected_blocks=len(first) + len(second))
+    both.insert_blocks(first)
+    both.insert_blocks(second)
+    return _holders(both, first), _holders(both, second)
+
+
+def _holders(surface_map: MultiLevelSurfaceMap, parts: Blocks) -> np.ndarray:
+    """Return the row (n,) of the map's block that each of `parts` (n) is part of."""
+    blocks, rows, owners = surface_map.find(parts.cells)
+    holds = (blocks.bottom <= parts.bottom[owners]) & (parts.bottom[owners] <= blocks.height)
+    holders = np.empty(len(parts), dtype=np.int64)
+    holders[owners[holds]] = rows[holds]
+    return holders
 
 
 def _tops(groups: np.ndarray, height: np.ndarray) -> np.ndarray:

@@ -1,12 +1,16 @@
-"""Compiled loops of insertion: points are chosen, sorted by cell and height, and grouped into intervals.
+"""The compiled loops that make intervals of height out of points: chosen, sorted by cell and height, split at gaps.
 
-An interval is a row as `blocks` describes it. Needs numba.
+A point belongs to a block when it is closer than the resolution to its top or bottom, or between them, and a point that
+belongs to several fuses them (thesis 6.5.6). In one cell that is single linkage in z: the partition that is left at
+the end does not depend on the order in which the points came. So a whole scan is sorted once and split at its gaps.
 """
 
+from typing import NamedTuple
+
 import numpy as np
-from numba import njit
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP
+from node_support.numba_cache import compiled
 
 VALUES = 4
 """Mean of x y z and strength, then as many sums of squares: the first columns of a row."""
@@ -16,45 +20,62 @@ _FIBONACCI = np.uint64(0x9E3779B97F4A7C15)
 _FINITE = np.finfo(np.float64).max
 
 
-@njit(cache=True)
-def groups_of(points, resolution, limit):
-    """Return what points (n, 4) make by themselves: the keys of their cells (c,), sorted; intervals (g, ROW_WIDTH), and
-    indices of their cells (g,); the number of points in them; and of those that are not finite.
+class Groups(NamedTuple):
+    """Intervals of height in cells, sorted by cell, then by bottom.
 
-    Points beyond `limit` [m] are left out.
+    rows: (g, ROW_WIDTH) as Blocks has them. cell: (g,) int64 index of the cell. crossed: (g,) uint16 number of beams
+    that crossed it since a point last fell into it.
     """
-    kept, cell, inserted, not_finite = _admitted(points, resolution, limit)
-    cells, order, starts = _sorted_by_cell(cell[:inserted], kept)
-    groups, owner = _grouped(kept, order, starts, resolution)
-    return cells, groups, owner, inserted, not_finite
+
+    rows: np.ndarray
+    cell: np.ndarray
+    crossed: np.ndarray
 
 
-@njit(cache=True)
-def _admitted(points, resolution, limit):
-    """Return the points that are finite and within the limit (m, 4), the keys of their cells (m,), their number m, and
-    how many are not finite; the arrays are longer than m.
+@compiled()
+def finite_within(points, limit):
+    """Return those of points (n, 4) that are finite and have no coordinate beyond `limit` [m], (m, 4) float64, and how
+    many are not finite.
     """
-    kept, cell = np.empty((len(points), 4)), np.empty(len(points), np.int64)
-    inserted, not_finite = 0, 0
+    kept, number, not_finite = np.empty((len(points), 4)), 0, 0
     for point in range(len(points)):
         is_inside, is_finite = True, True
         for column in range(4):
             value = np.float64(points[point, column])
-            kept[inserted, column] = value
+            kept[number, column] = value
             is_finite &= abs(value) <= _FINITE
             is_inside &= abs(value) <= limit or column == 3
         not_finite += not is_finite
-        if is_finite and is_inside:
-            x, y = np.floor(kept[inserted, 0] / resolution), np.floor(kept[inserted, 1] / resolution)
-            cell[inserted] = (np.int64(x) << 32) + np.int64(y)
-            inserted += 1
-    return kept, cell, inserted, not_finite
+        number += is_finite and is_inside
+    return kept[:number], not_finite
 
 
-@njit(cache=True)
-def _sorted_by_cell(cell, points):
-    """Return the keys (c,) in `cell` (n,), sorted; the order (n,) of the points by cell, height and place in the array;
-    and where each cell begins in that order (c + 1,).
+@compiled()
+def grouped_points(points, resolution):
+    """Return the keys (c,) of the cells of points (n, 4), sorted, and the Groups that the points make by themselves."""
+    cell = np.empty(len(points), np.int64)
+    for point in range(len(points)):
+        x, y = np.floor(points[point, 0] / resolution), np.floor(points[point, 1] / resolution)
+        cell[point] = (np.int64(x) << 32) + np.int64(y)
+    cells, order, starts = sorted_by_cell(cell, points[:, 2])
+    rows, owner = np.empty((len(points), ROW_WIDTH)), np.empty(len(points), np.int64)
+    groups = 0
+    for number in range(len(cells)):
+        start = starts[number]
+        for place in range(starts[number] + 1, starts[number + 1] + 1):
+            if place < starts[number + 1] and points[order[place], 2] - points[order[place - 1], 2] < resolution:
+                continue
+            _write_group(points, order, start, place, rows[groups])
+            owner[groups] = number
+            groups += 1
+            start = place
+    return cells, Groups(rows[:groups], owner[:groups], np.zeros(groups, np.uint16))
+
+
+@compiled()
+def sorted_by_cell(cell, height):
+    """Return the keys (c,) in `cell` (n,), sorted; the order (n,) that sorts by cell, height (n,) and place in the
+    array; and where each cell begins in that order (c + 1,).
     """
     keys, owner, sizes = _told_apart(cell)
     by_key = np.argsort(keys)
@@ -67,11 +88,11 @@ def _sorted_by_cell(cell, points):
         order[fill[owner[point]]] = point
         fill[owner[point]] += 1
     for rank in range(len(keys)):
-        _sort_by_height(order, starts[rank], starts[rank + 1], points)
+        _sort_by_height(order, starts[rank], starts[rank + 1], height)
     return keys[by_key], order, starts
 
 
-@njit(cache=True)
+@compiled()
 def _told_apart(cell):
     """Return the different keys (c,) in `cell` (n,) as they come, the index of each point's (n,), and how many points
     each has (c,): by hashing, into a table at most half full.
@@ -98,43 +119,27 @@ def _told_apart(cell):
     return keys[:found], owner, sizes[:found]
 
 
-@njit(cache=True)
-def _sort_by_height(order, start, end, points):
-    """Sort order[start:end] by the height of points (n, 4); equal ones stay in their order."""
+@compiled()
+def _sort_by_height(order, start, end, height):
+    """Sort order[start:end] by height (n,); equal ones stay in their order."""
     if end - start > _FEW:
         part = order[start:end].copy()
-        order[start:end] = part[np.argsort(points[:, 2][part], kind="mergesort")]
+        order[start:end] = part[np.argsort(height[part], kind="mergesort")]
         return
     for place in range(start + 1, end):
         point = order[place]
         below = place - 1
-        while below >= start and points[order[below], 2] > points[point, 2]:
+        while below >= start and height[order[below]] > height[point]:
             order[below + 1] = order[below]
             below -= 1
         order[below + 1] = point
 
 
-@njit(cache=True)
-def _grouped(points, order, starts, resolution):
-    """Return the intervals (g, ROW_WIDTH) that points (n, 4) make by themselves, and indices of their cells (g,)."""
-    rows, owner = np.empty((len(order), ROW_WIDTH)), np.empty(len(order), np.int64)
-    groups = 0
-    for cell in range(len(starts) - 1):
-        start = starts[cell]
-        for place in range(starts[cell] + 1, starts[cell + 1] + 1):
-            if place < starts[cell + 1] and points[order[place], 2] - points[order[place - 1], 2] < resolution:
-                continue
-            _write_group(points, order, start, place, rows[groups])
-            owner[groups] = cell
-            groups += 1
-            start = place
-    return rows[:groups], owner[:groups]
-
-
-@njit(cache=True)
+@compiled()
 def _write_group(points, order, start, end, row):
     count = np.float64(end - start)
     for column in range(VALUES):
+        # From one of the points on: a plain sum rounds, and the mean of points on a border would leave their cell.
         first, total, squares = points[order[start], column], 0.0, 0.0
         for place in range(start, end):
             total += points[order[place], column] - first
