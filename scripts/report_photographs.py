@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterator, List
 
-from benchmarks.recorded import ROOT, recorded
+from benchmarks.harness import ROOT, recorded
 from PIL import Image
 from selenium import webdriver
 from selenium.webdriver.chrome.options import Options

@@ -18,7 +18,8 @@ from diagnostic_msgs.msg import DiagnosticArray
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Float32
 
-from mlsm_manager.offline.picture import Path2d, draw_map
+from mlsm_manager.offline.picture import draw_map
+from mlsm_manager.offline.picture_contents import Path2d
 from mlsm_manager.surface_map.storage import read_ply
 from node_support.files import write_whole
 from sonar_simulator.world.sdf import load_sdf

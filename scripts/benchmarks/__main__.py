@@ -1,52 +1,48 @@
-"""Prints the figures of the sections that were asked for, all of them when none was."""
+"""Prints figures of the package on this machine as a table, those of all sections when none was asked for.
+
+scripts/bench STUDY measures what takes longer, with options of its own (scripts/bench STUDY --help).
+"""
 
 import argparse
+import sys
 from functools import partial
+from importlib import import_module
 from typing import Callable, Dict, List
 
 from benchmarks import (
-    carving_figures,
-    compiled_chain,
-    compiled_threshold,
-    growth_figures,
-    large_map_figures,
+    chain_figures,
     map_bag_figures,
     map_figures,
-    marina_figures,
     matching_figures,
-    other_libraries,
-    other_registrations,
     processing_figures,
     shape_figures,
     simulation_figures,
-    survey_figures,
-    tour_figures,
-    vehicle_figures,
 )
-from benchmarks.table import Row, print_table
+from benchmarks.harness import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
-    "growth": growth_figures.rows,
     "map": map_figures.rows,
-    "large-map": large_map_figures.rows,
-    "carving": carving_figures.rows,
+    "large-map": map_figures.large_rows,
+    "carving": map_bag_figures.carving_rows,
     "map-bag": map_bag_figures.rows,
-    "marina": marina_figures.rows,
     "matching": matching_figures.rows,
-    "chain": compiled_chain.rows,
-    "others": lambda: compiled_threshold.rows() + other_libraries.rows() + other_registrations.rows(),
+    "chain": chain_figures.rows,
     "processing": processing_figures.rows,
     "simulation": simulation_figures.rows,
-    "vehicle": vehicle_figures.rows,
     "shapes": shape_figures.rows,
-    "survey": survey_figures.rows,
-    "tours": tour_figures.rows,
 }
+STUDIES = ("canals", "heads", "long_run", "open_water", "silence", "twins", "without_dvl")
 
 
 def main() -> None:
-    """Print one table."""
-    parser = argparse.ArgumentParser(prog="scripts/bench", description=__doc__)
+    """Print one table, or run a study."""
+    if sys.argv[1:2] and sys.argv[1] in STUDIES:
+        import_module(f"benchmarks.{sys.argv.pop(1)}").main()
+        return
+    parser = argparse.ArgumentParser(
+        "scripts/bench", description=__doc__, epilog=f"STUDY: {', '.join(STUDIES)}",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )  # fmt: skip
     for name in SECTIONS:
         parser.add_argument(f"--{name}", action="append_const", const=name, dest="chosen", help=f"figures of {name}")
     parser.add_argument("--first-seed", type=int, default=0, help="of --matching: other seeds than the published ones")

@@ -3,17 +3,14 @@
 A vehicle with a compass alone goes from one basin through a canal, 200 m long and 20 m wide, into another basin.
 """
 
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 
-from benchmarks.command_line import benchmark_parser
-from benchmarks.solver_input import solver_input
-from benchmarks.twins.odometry import lasting, reported
-from benchmarks.twins.parameters import TwinParameters
-from benchmarks.twins.sonar import heard
-from benchmarks.twins.water import RESOLUTION, Water, water_of
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from benchmarks.harness import benchmark_parser
+from benchmarks.paths import live_figures, solved_live
+from benchmarks.twin_conditions import TwinParameters, lasting, reported
+from benchmarks.twin_water import RESOLUTION, Water, heard, water_of
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
@@ -33,16 +30,6 @@ _SPEED, _SPEED_NOISE, _SPEED_TIME = 0.28, 0.05, 40.0  # m/s, m/s, s: of the reco
 _WEAVE, _WEAVE_TIME = 0.25, 7.0  # rad, s: by which the recorded vehicle leaves its course
 _BEAM_SECONDS, _BEAM_ANGLE, _BIN = 0.069, np.radians(1.8), 0.1  # of the recorded head: a turn in 13.8 s
 _START_NS = 10**12
-
-
-class Figures(NamedTuple):
-    """From the canal on. mean, most: error [m]. told: largest deviation [m]. within: share within three of them."""
-
-    mean: float
-    most: float
-    told: float
-    within: float
-    nees: float
 
 
 def made_canal(posts: int, rng: np.random.RandomState) -> Water:
@@ -95,17 +82,6 @@ def recording(posts: int, seed: int, binary: bool) -> Tuple[Recording, Track]:
     return Recording(beams, 0, compass, None), truth
 
 
-def figures(solver: LiveSolver, truth: Track) -> Figures:
-    """Return how far the live path was from the truth, and whether it told so."""
-    estimates = [one for one in solver.estimates if truth.at(one.time)[0] > 0.0]
-    path = np.array([one.T_map_base[:2] for one in estimates])
-    error = path - (truth.at(np.array([one.time for one in estimates])) - truth.poses[0])[:, :2]
-    covariances = np.array([one.pose_covariance[:2, :2] for one in estimates])
-    squared = np.einsum("na,na->n", error, np.linalg.solve(covariances, error[..., np.newaxis])[..., 0])
-    distance, told = np.hypot(*error.T), np.sqrt(np.trace(covariances, axis1=1, axis2=2))
-    return Figures(distance.mean(), distance.max(), told.max(), (distance < 3.0 * told).mean(), squared.mean() / 2.0)
-
-
 def main() -> None:
     """Print one line per run."""
     parser = benchmark_parser("canals", __doc__)
@@ -117,16 +93,9 @@ def main() -> None:
     for posts in arguments.posts:
         for seed in range(arguments.seeds):
             made, truth = recording(posts, seed, not arguments.graded)
-            scans, parameters = solver_input(made, OdometryKind.HEADING, shape)
-            solver = LiveSolver(parameters, made.sonar_in_base)
-            for scan in scans:
-                solver.add(scan)
-            found = figures(solver, truth)
-            print(
-                f"{posts} posts, seed {seed}: {found.mean:.1f} m in the mean, {found.most:.1f} m at most, told "
-                f"{found.told:.1f} m at most; within three told deviations {100.0 * found.within:.0f} %, NEES per "
-                f"state {found.nees:.2f}", flush=True,
-            )  # fmt: skip
+            solver = solved_live(made, OdometryKind.HEADING, shape)
+            found = live_figures(solver, truth.at, lambda times, path=truth: path.at(times)[:, 0] > 0.0)
+            print(f"{posts} posts, seed {seed}, from the canal on: {found.line()}", flush=True)
 
 
 if __name__ == "__main__":

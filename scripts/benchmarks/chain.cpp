@@ -1,7 +1,7 @@
 // From beams to the markers of the map as a C++ programmer would write it, with PCL's rules for outliers and the thesis's
-// for blocks. Reads the beams from the file named: 16 doubles of T_target_sonar by rows, angle, range resolution and
-// stamp, the number of bins (int32, of which 0 ends a scan) and the strengths (uint8). Prints seconds of CPU for each
-// stage, summed over all scans, and how many points and blocks were left at the end.
+// for blocks. Reads the beams from the file named: 16 doubles of T_target_sonar by rows, angle and range resolution, the
+// number of bins (int32, of which 0 ends a scan) and the strengths (uint8). Prints seconds of CPU for each stage, summed
+// over all scans, and how many points and blocks were left at the end.
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -15,8 +15,8 @@
 #include <vector>
 
 struct Point { float x, y, z, padding, strength, more[3]; };
-struct Cloud { std::vector<Point> points; std::vector<double> stamps; };
-struct Beam { double pose[16], angle, resolution, stamp; std::vector<uint8_t> strengths; };
+using Cloud = std::vector<Point>;
+struct Beam { double pose[16], angle, resolution; std::vector<uint8_t> strengths; };
 
 const double MIN_RANGE = 0.5, HEIGHT_LIMIT = 100.0, RESOLUTION = 0.5, OTSU_MULTIPLIER = 1.4, DEVIATIONS = 1.0;
 const int NEIGHBORS = 20, LEAF_POINTS = 16;
@@ -38,8 +38,7 @@ static Cloud projected(const std::vector<Beam>& beams) {
       const Point point = {float(dx * range + T[3]), float(dy * range + T[7]), float(dz * range + T[11]), 1.0f,
                            float(beam.strengths[bin]), {0.0f, 0.0f, 0.0f}};
       if (range < MIN_RANGE || point.z > HEIGHT_LIMIT) continue;
-      cloud.points.push_back(point);
-      cloud.stamps.push_back(beam.stamp);
+      cloud.push_back(point);
     }
   }
   return cloud;
@@ -70,13 +69,10 @@ static double otsu(const std::vector<Point>& points) {
 }
 
 static Cloud thresholded(const Cloud& cloud) {
-  const double threshold = OTSU_MULTIPLIER * otsu(cloud.points);
+  const double threshold = OTSU_MULTIPLIER * otsu(cloud);
   Cloud strong;
-  for (size_t index = 0; index < cloud.points.size(); index++) {
-    if (cloud.points[index].strength > threshold) {
-      strong.points.push_back(cloud.points[index]);
-      strong.stamps.push_back(cloud.stamps[index]);
-    }
+  for (const Point& point : cloud) {
+    if (point.strength > threshold) strong.push_back(point);
   }
   return strong;
 }
@@ -152,9 +148,9 @@ class Tree {
 };
 
 static Cloud cleaned(const Cloud& cloud) {
-  const size_t number = cloud.points.size();
+  const size_t number = cloud.size();
   if (number < 3) return cloud;
-  const Tree tree(cloud.points);
+  const Tree tree(cloud);
   std::vector<double> means(number);
   double sum = 0.0, squares = 0.0;
   for (size_t index = 0; index < number; index++) {
@@ -165,9 +161,7 @@ static Cloud cleaned(const Cloud& cloud) {
   const double mean = sum / number, deviation = std::sqrt((squares - sum * sum / number) / (number - 1));
   Cloud kept;
   for (size_t index = 0; index < number; index++) {
-    if (means[index] > mean + DEVIATIONS * deviation) continue;
-    kept.points.push_back(cloud.points[index]);
-    kept.stamps.push_back(cloud.stamps[index]);
+    if (means[index] <= mean + DEVIATIONS * deviation) kept.push_back(cloud[index]);
   }
   return kept;
 }
@@ -265,7 +259,7 @@ static std::vector<std::vector<Beam>> read(const char* path) {
   std::ifstream file(path, std::ios::binary);
   std::vector<std::vector<Beam>> scans(1);
   Beam beam;
-  while (file.read(reinterpret_cast<char*>(&beam.pose), 19 * sizeof(double))) {
+  while (file.read(reinterpret_cast<char*>(&beam.pose), 18 * sizeof(double))) {
     int32_t bins;
     file.read(reinterpret_cast<char*>(&bins), 4);
     if (bins == 0) { scans.emplace_back(); continue; }
@@ -280,7 +274,7 @@ static std::vector<std::vector<Beam>> read(const char* path) {
 int main(int, char** arguments) {
   Map map;
   double seconds[5] = {0.0};
-  size_t points = 0, bytes = 0;
+  size_t points = 0;
   for (const std::vector<Beam>& beams : read(arguments[1])) {
     double times[6] = {cpu_seconds()};
     const Cloud cloud = projected(beams);
@@ -289,15 +283,15 @@ int main(int, char** arguments) {
     times[2] = cpu_seconds();
     const Cloud kept = cleaned(strong);
     times[3] = cpu_seconds();
-    for (const Point& point : kept.points) map.insert(point);
+    for (const Point& point : kept) map.insert(point);
     times[4] = cpu_seconds();
-    bytes += serialised(markers(map)).size();
+    serialised(markers(map));
     times[5] = cpu_seconds();
     for (int stage = 0; stage < 5; stage++) seconds[stage] += times[stage + 1] - times[stage];
-    points += kept.points.size();
+    points += kept.size();
   }
   size_t blocks = 0;
   for (const auto& cell : map.cells) blocks += cell.second.size();
   for (double stage : seconds) std::printf("%.9f ", stage);
-  std::printf("%zu %zu %zu\n", points, blocks, bytes);
+  std::printf("%zu %zu\n", points, blocks);
 }

@@ -6,7 +6,7 @@ from typing import Iterator
 
 import numpy as np
 
-from benchmarks.command_line import benchmark_parser
+from benchmarks.harness import benchmark_parser
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel

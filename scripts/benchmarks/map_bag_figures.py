@@ -1,42 +1,49 @@
-"""How much of a core map_bag takes for a whole real run; no truth is read."""
+"""How much of a core map_bag takes for whole real runs, and how much of that is carving; no truth is read."""
 
-import json
-import os
-import subprocess
-import sys
-import tempfile
-from pathlib import Path
-from typing import List, Tuple
+from typing import List
 
-from benchmarks.recorded import ROOT, recorded
-from benchmarks.table import Row
+import numpy as np
 
-NAME = "marina_whole_blind.bag"
+from benchmarks.harness import Row, cpu_seconds, mapped, missing_row, recorded
+from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
+from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
+from mlsm_manager.offline.recording import scans_of
+
+WHOLE, PART = "marina_whole_blind.bag", "marina_first.bag"
 _WANTED = {"": 500, "--refine": 150, "--refine --check": 150}
 """Times real time that are wanted, by the options."""
+_WARM_UP = 10
+"""Scans until there is a map to be matched with and free space to be known."""
 
 
 def rows() -> List[Row]:
-    """Return CPU time and times real time for each set of options; one line that says so without the recording."""
-    bag = recorded(NAME)
+    """Return CPU time and times real time for each set of options."""
+    bag, found = recorded(WHOLE), []
     if not bag.is_file():
-        return [("map_bag", "skipped", f"{NAME} is not in {bag.parent}; set UMC_DATA")]
-    return [_row(bag, options, wanted) for options, wanted in _WANTED.items()]
+        return [missing_row(WHOLE)]
+    for options, wanted in _WANTED.items():
+        summary, cpu = mapped(bag, *options.split())
+        speed = summary["times_real_time"] * summary["seconds"] / cpu
+        found.append((f"map_bag {WHOLE} {options}", f"{cpu:.1f} s CPU, {speed:.0f} times real time", f">= {wanted}"))
+    return found
 
 
-def _row(bag: Path, options: str, wanted: int) -> Row:
-    cpu, length = _spent(bag, *options.split())
-    name = " ".join(["map_bag", NAME, *options.split()])
-    return name, f"{cpu:.1f} s CPU, {length / cpu:.0f} times real time", f">= {wanted}"
+def carving_rows() -> List[Row]:
+    """Return the share of a scan's time that carving takes, with each estimator."""
+    return [_carving_row(estimator) for estimator in Estimator] if recorded(PART).is_file() else [missing_row(PART)]
 
 
-def _spent(bag: Path, *options: str) -> Tuple[float, float]:
-    """Return the CPU seconds of a run with its imports, and how many seconds were recorded."""
-    with tempfile.TemporaryDirectory() as out:
-        before = os.times()
-        command = [sys.executable, str(ROOT / "nodes/map_bag"), str(bag), "--out", out, *options]
-        subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-        after = os.times()
-        summary = json.loads((Path(out) / "summary.json").read_text())
-    cpu = after.children_user + after.children_system - before.children_user - before.children_system
-    return cpu, summary["times_real_time"] * summary["seconds"]
+def _carving_row(estimator: Estimator) -> Row:
+    options = map_bag_arguments([str(recorded(PART)), "--out", "nowhere", "--set", f"estimator={estimator.value}"])
+    recording = read_recording(recorded(PART), options.request)
+    parameters = with_odometry(options.parameters, odometry_of(recording.track).kind, options.fixed)
+    carving, plain = (
+        parameters.changed({"carve": carve}).build_localiser(recording.sonar_in_base) for carve in (True, False)
+    )
+    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
+    seconds = [[cpu_seconds(lambda m=m, s=scan: m.take_scan(s)) for m in (carving, plain)] for scan in scans]
+    with_it, without = np.mean(seconds[_WARM_UP:], axis=0)
+    text = f"{100 * (1.0 - without / with_it):.0f} % of {1e3 * with_it:.0f} ms of a core"
+    return f"carving, {estimator.value}, {len(scans)} scans of a marina", text, "< 20 %"

@@ -1,29 +1,31 @@
-"""Insertion into the map, and the map's markers."""
+"""The map: insertion, carving, fetching and markers in small and large ones, its files and its memory."""
 
-import time
-from functools import partial
 from io import BytesIO
-from typing import Dict, List
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import List
 
 import numpy as np
 from std_msgs.msg import Header
 
-from benchmarks.table import Row, median_seconds
+from benchmarks.harness import Row, cpu_seconds, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
+from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map, write_map
+from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
+from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5
-SCAN_RADIUS = 50.0
-SMALL, LARGE = 10_000, 1_000_000
+MILLION = 1_000_000
+_SMALL, _LARGE, _POINTS = 10_000, MILLION, 60_000
+_SCAN_RADIUS, _REACH = 50.0, 70.0
+_ECHOES, _BEAM_WIDTH, _SCANS = 400, 0.0436, 20
 
 
 def scan(rng: np.random.Generator, center: np.ndarray, points: int) -> np.ndarray:
     """Return random points (n, 4) all over a disc and its depth: the hardest case, nearly every point its own block."""
-    result = np.empty((points, 4))
-    result[:, :2] = center + rng.uniform(-SCAN_RADIUS, SCAN_RADIUS, (points, 2))
-    result[:, 2] = rng.uniform(-5.5, 0.0, points)
-    result[:, 3] = rng.uniform(0.0, 127.0, points)
-    return result
+    low, high = np.array([[-_SCAN_RADIUS, -_SCAN_RADIUS, -5.5, 0.0], [_SCAN_RADIUS, _SCAN_RADIUS, 0.0, 127.0]])
+    return rng.uniform(low, high, (points, 4)) + np.append(center, [0.0, 0.0])
 
 
 def grown_map(blocks: int, extent: float, rng: np.random.Generator) -> MultiLevelSurfaceMap:
@@ -34,60 +36,92 @@ def grown_map(blocks: int, extent: float, rng: np.random.Generator) -> MultiLeve
     return surface_map
 
 
-def insertion_rows() -> List[Row]:
-    """Measure insertion into a small and a large map, in turn, so that both see the same machine."""
+def rows() -> List[Row]:
+    """Return insertion into a small and a large map, in turn, so that both see the same machine, and markers."""
     rng = np.random.default_rng(1)
-    maps = {SMALL: grown_map(SMALL, 0.0, rng), LARGE: grown_map(LARGE, 900.0, rng)}
-    seconds: Dict[int, List[float]] = {SMALL: [], LARGE: []}
-    points = 60_000
+    maps = [grown_map(_SMALL, 0.0, rng), grown_map(_LARGE, 900.0, rng)]
+    taken = []
     for _ in range(15):
-        new = scan(rng, np.zeros(2), points)
-        for size, surface_map in maps.items():
-            seconds[size].append(median_seconds(lambda m=surface_map, s=new: m.insert(s), repeats=1))
-    medians = {size: float(np.median(values)) for size, values in seconds.items()}
-    ratio = float(np.median(np.array(seconds[LARGE]) / np.array(seconds[SMALL])))
-    large = maps[LARGE]
+        new = scan(rng, np.zeros(2), _POINTS)
+        taken.append([cpu_seconds(lambda m=surface_map, s=new: m.insert(s)) for surface_map in maps])
+    small, large = (f"{_POINTS / seconds / 1e6:.2f} million points/s" for seconds in np.median(taken, axis=0))
+    ratio, size = np.median([after / before for before, after in taken]), maps[1].nbytes / len(maps[1])
+    blocks, markers = grown_map(20_000, 20.0, np.random.default_rng(2)).blocks, BlockMarkers()
+    published = median_seconds(lambda: markers.whole(blocks, Header(frame_id="map")).serialize(BytesIO()))
     return [
-        (f"insert into {LARGE} blocks", f"{points / medians[LARGE] / 1e6:.2f} million points/s", ">= 0.5"),
-        (f"insert into {SMALL} blocks", f"{points / medians[SMALL] / 1e6:.2f} million points/s", ">= 0.5"),
+        (f"insert into {_LARGE} blocks", large, ">= 0.5"),
+        (f"insert into {_SMALL} blocks", small, ">= 0.5"),
         ("time in the large map / in the small one", f"{ratio:.2f}", "<= 1.2"),
-        (f"memory in use by {len(large)} blocks", f"{large.nbytes / len(large):.0f} bytes/block", "<= 120"),
+        (f"memory in use by {len(maps[1])} blocks", f"{size:.0f} bytes/block", "<= 120"),
+        (f"markers of {len(blocks)} blocks", f"{1e3 * published:.1f} ms", "a few ms"),
     ]
 
 
-def density_rows() -> List[Row]:
-    """Measure insertion of points all over a disc and of points on few cells."""
-    rows, points = [], 60_000
-    for name, radius in (
-        ("nearly every point its own block", SCAN_RADIUS),
-        ("20 points to a block", SCAN_RADIUS / 8.0),
-    ):
-        rng, seconds = np.random.default_rng(3), []
-        surface_map = grown_map(SMALL, 0.0, np.random.default_rng(1))
-        for _ in range(11):
-            new = scan(rng, np.zeros(2), points)
-            new[:, :2] *= radius / SCAN_RADIUS
-            seconds.append(median_seconds(partial(surface_map.insert, new), repeats=1, clock=time.process_time))
-        rate = f"{points / float(np.median(seconds)) / 1e6:.2f} million points/s of a core"
-        rows.append((f"insert, {name}", rate, "C++: 1.6-10"))
-    return rows
-
-
-def marker_rows() -> List[Row]:
-    """Measure one publication of 20,000 blocks."""
+def large_rows() -> List[Row]:
+    """Return the figures of files of a million blocks, and of scans in a small map and in one of ten million."""
     rng = np.random.default_rng(2)
-    surface_map = grown_map(20_000, 20.0, rng)
-    markers, buffer = BlockMarkers(), BytesIO()
+    return [*_file_rows(), *(row for size in (_SMALL, 10 * MILLION) for row in _scan_rows(_sea_floor(size, rng), rng))]
+
+
+def _sea_floor(blocks: int, rng: np.random.Generator, points_per_block: int = 1) -> MultiLevelSurfaceMap:
+    """Return a map of a floor in a square, one block per cell, so many points in each."""
+    side = int(np.ceil(np.sqrt(blocks)))
+    surface_map = MultiLevelSurfaceMap(RESOLUTION)
+    for band in np.array_split(np.arange(side), max(blocks // MILLION, 1)):
+        x, y = (axis.ravel() for axis in np.meshgrid(band, np.arange(side), indexing="ij"))
+        cells = np.repeat(np.column_stack([x, y]) - side // 2, points_per_block, axis=0)
+        places = (cells + rng.uniform(0.0, 1.0, cells.shape)) * RESOLUTION
+        depth = -10.0 + np.sin(places[:, 0] / 30.0) + rng.normal(0.0, 0.05, len(places))
+        surface_map.insert(np.column_stack([places, depth, rng.uniform(0.0, 127.0, len(places))]))
+    return surface_map
+
+
+def _file_rows() -> List[Row]:
+    """Measure saving and loading, up to a map that takes points, and the bytes."""
+    blocks = _sea_floor(MILLION, np.random.default_rng(1), 4).blocks
+    with TemporaryDirectory() as folder:
+        path = Path(folder) / "floor.mlsm"
+        save = median_seconds(lambda: write_map(path, StoredMap("map", {Layer.SHOWN: blocks})), 1)
+        load = median_seconds(lambda: MultiLevelSurfaceMap(RESOLUTION).insert_blocks(read_map(path).shown), 1)
+        size = path.stat().st_size / len(blocks)
+    return [
+        (f"save {len(blocks)} blocks", f"{save:.2f} s", "< 2 s"),
+        (f"load {len(blocks)} blocks into a map", f"{load:.2f} s", "< 2 s"),
+        ("size of the file", f"{size:.1f} bytes/block", "<= 40"),
+    ]
+
+
+def _scan_rows(surface_map: MultiLevelSurfaceMap, rng: np.random.Generator) -> List[Row]:
+    """Measure what a scan costs in a map."""
+    markers, free, carver = BlockMarkers(), MultiLevelSurfaceMap(RESOLUTION), Carver(CarvingParameters(), _BEAM_WIDTH)
+    surface_map.take_changed_tiles()
+    box, buffer, taken = np.full(2, _REACH), BytesIO(), []
 
     def publish() -> None:
-        buffer.seek(0)
-        markers.whole(surface_map.blocks, Header(frame_id="map")).serialize(buffer)
+        tiles = surface_map.take_changed_tiles()
+        message = markers.changed(surface_map.in_tiles(tiles), map(tuple, tiles.tolist()), Header(frame_id="map"))
+        message.serialize(buffer)
 
-    seconds = median_seconds(publish)
-    size = f"{len(surface_map)} blocks, {len(buffer.getvalue()) / 1e6:.1f} MB"
-    return [(f"markers of {size}", f"{1e3 * seconds:.1f} ms", "a few ms")]
+    for _ in range(_SCANS):
+        points = _echoes(rng)
+        beams = FirstEchoes.of_points(points, np.arange(_ECHOES), points[:, :3] * [0.0, 0.0, 1.0])
+        calls = {
+            f"insert {_ECHOES} echoes": lambda p=points: surface_map.insert(p),
+            f"carve {_ECHOES} beams": lambda p=points, b=beams: carver.carve(surface_map, free, b, p),
+            "markers of a scan's change": publish,
+            f"fetch {2 * _REACH:.0f} m x {2 * _REACH:.0f} m for a match": lambda: surface_map.in_box(-box, box),
+        }
+        taken.append([cpu_seconds(call) for call in calls.values()])
+    wanted = ("no slower", "no slower", "< 20 ms", "<= 17 ms")
+    figures = [f"{1e3 * seconds:.1f} ms" for seconds in np.median(taken, axis=0)]
+    size = f"{surface_map.nbytes / len(surface_map):.0f} bytes/block"
+    found = [*zip(calls, figures, wanted), ("memory", size, "<= 156")]
+    return [(f"{what}, map of {len(surface_map)} blocks", *rest) for what, *rest in found]
 
 
-def rows() -> List[Row]:
-    """Return the figures of the map."""
-    return insertion_rows() + density_rows() + marker_rows()
+def _echoes(rng: np.random.Generator) -> np.ndarray:
+    """Return the points (n, 4) of one scan around the map's middle: echoes at wandering ranges."""
+    angle = np.linspace(0.0, 2.0 * np.pi, _ECHOES, endpoint=False)
+    reach = _SCAN_RADIUS * (0.6 + 0.3 * np.sin(3.0 * angle + rng.uniform(0.0, 6.0))) + rng.normal(0.0, 0.2, _ECHOES)
+    level = np.tile([-2.0, 60.0], (_ECHOES, 1))
+    return np.column_stack([reach * np.cos(angle), reach * np.sin(angle), level])

@@ -1,12 +1,161 @@
-"""The figures of scan matching."""
+"""Matching one scan: from how far off it finds its place, and whether one that has no place, or several, is refused."""
 
-from typing import List
+import time
+from dataclasses import dataclass
+from typing import Callable, Dict, List, Tuple
 
-from benchmarks import matching_false, matching_moves, matching_moving, matching_starts
-from benchmarks.table import Row
+import numpy as np
+import yaml
+
+from benchmarks.harness import ROOT, Row
+from benchmarks.scans import KINDS, ScanMaker, SonarKind, noise_scan, still
+from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.result import Matcher, MatchResult, Prior
+from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry import composed, inverse, wrapped
+from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
+
+STARTS = 100
+NEAR, NEAR_YAW = 0.5, np.radians(3.0)
+_FIXED = 1e-3
+SCANS = 250  # in each situation without a place
+WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0)), "candidates": 12}
+_SIGMAS = 4.0
+_DEVIATIONS = np.array([1.5, 1.5, 0.15, 1e-3, 1e-3, 1e-4, 1e-3, 1e-3])
+Case = Tuple[Scan, Blocks, np.ndarray]
+"""A scan, a map and the true pose (3,) in it."""
+
+
+def tour_map(maker: ScanMaker) -> Blocks:
+    """Return the map of the basin's tour: a still scan wherever the vehicle rests."""
+    surface_map = MultiLevelSurfaceMap(0.5)
+    for number, pose in enumerate(tour_stops()):
+        surface_map.insert(maker.scan(still(pose), still(pose), seed=number).points)
+    return surface_map.blocks
+
+
+def tour_stops() -> np.ndarray:
+    """Return (n, 3) the places where the vehicle of the basin's tour rests."""
+    script = yaml.safe_load((ROOT / "yaml/basin_tour.yaml").read_text())
+    vehicle = VehicleScript.from_yaml_data(script["moves"], script["start"])
+    times = np.arange(8.0, vehicle.duration, 48.0)
+    poses = [vehicle.pose(time) for time in times]
+    return np.array([[pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])] for pose in poses])
+
+
+def start_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
+    """Return how many of the starts converge, narrow and wide."""
+    maker = ScanMaker("basin", kind)
+    target = tour_map(maker)
+    rows: List[Row] = []
+    for distance, angle, changes, limit in ((3.0, 20.0, {}, 50), (6.0, 45.0, WIDE, 100)):
+        matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
+        seeds = range(first_seed, first_seed + STARTS)
+        starts = [started(maker, target, matcher, distance, np.radians(angle), seed) for seed in seeds]
+        found = np.array([one.found for one in starts])
+        accepted = np.array([one.result.accepted for one in starts])
+        seconds = [one.seconds for one in starts]
+        title = f"starts {distance:g} m and {angle:g} deg off, basin, {kind}"
+        rows.append((f"{title}: converge", f"{found.sum()} of {STARTS}", ">= 99"))
+        rows.append((f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {STARTS}", "0"))
+        rows.append((f"{title}: time of a core", f"{1e3 * np.median(seconds):.0f} ms", f"<= {limit} ms"))
+    return rows
+
+
+@dataclass(frozen=True)
+class Start:
+    """What came of a match of a scan that was taken at a true pose (3,). seconds: of a core."""
+
+    true_pose: np.ndarray
+    result: MatchResult
+    seconds: float
+
+    @property
+    def error(self) -> float:
+        """Distance from the true place, m."""
+        return float(np.hypot(*(self.result.pose - self.true_pose)[:2]))
+
+    @property
+    def found(self) -> bool:
+        """Whether the match was accepted and is at the true place."""
+        yaw = abs(float(wrapped(self.result.pose[2] - self.true_pose[2])))
+        return self.result.accepted and self.error < NEAR and yaw < NEAR_YAW
+
+
+def started(maker: ScanMaker, target: Blocks, matcher: Matcher, distance: float, angle: float, seed: int) -> Start:
+    """Match a scan taken near a stop of the tour, from an expectation that is `distance` [m] and `angle` [rad] off."""
+    rng = np.random.default_rng(seed)
+    stops = tour_stops()
+    pose = stops[seed % len(stops)] + rng.uniform([-3.0, -3.0, -0.5], [3.0, 3.0, 0.5])
+    scan = maker.scan(still(pose), still(pose), seed=1000 + seed)
+    bearing = rng.uniform(-np.pi, np.pi)
+    expected = pose + np.array([distance * np.cos(bearing), distance * np.sin(bearing), rng.choice([-angle, angle])])
+    deviations = np.array([distance / 1.5, distance / 1.5, angle / 1.5, _FIXED, _FIXED, _FIXED / 10.0, _FIXED, _FIXED])
+    prior = Prior(composed(expected, inverse(pose)), np.zeros(3), np.zeros(2), np.diag(deviations**2))
+    begin = time.thread_time()
+    result = matcher.match(scan, target, prior)
+    seconds = time.thread_time() - begin
+    return Start(pose, result, seconds)
+
+
+def cases(kind: SonarKind) -> Dict[str, Callable[[int], Case]]:
+    """Return for each situation what makes its case number n."""
+    basin = tour_map(ScanMaker("basin", kind))
+    makers = {name: ScanMaker(name, kind) for name in ("basin", "empty sea", "straight wall")}
+
+    def alone(world: str, seed: int) -> Case:
+        rng = np.random.default_rng(seed)
+        first, second = np.zeros(3), rng.uniform([-5.0, -2.0, -0.2], [5.0, 2.0, 0.2])
+        surface_map = MultiLevelSurfaceMap(0.5)
+        surface_map.insert(makers[world].scan(still(first), still(first), 2 * seed).points)
+        return makers[world].scan(still(second), still(second), 2 * seed + 1), surface_map.blocks, second
+
+    def noise(seed: int) -> Case:
+        return noise_scan(int(np.random.default_rng(seed).integers(30, 300)), seed), basin, np.zeros(3)
+
+    def elsewhere(seed: int) -> Case:
+        rng = np.random.default_rng(seed)
+        believed = rng.uniform([-45.0, -12.0, -3.1], [45.0, 12.0, 3.1])
+        true = np.array([-np.sign(believed[0]) * rng.uniform(20.0, 45.0), rng.uniform(-12.0, 12.0), believed[2] + 1.6])
+        scan = makers["basin"].scan(still(true), still(believed), seed)
+        return scan, basin, true
+
+    return {
+        "an empty sea": lambda seed: alone("empty sea", seed),
+        "a single straight wall": lambda seed: alone("straight wall", seed),
+        "pure noise": noise,
+        "a map of another place": elsewhere,
+    }
+
+
+def false_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
+    """Return how many scans were accepted with a covariance that excludes the truth."""
+    matcher = DistributionMatcher(DistributionMatcherParameters())
+    rows: List[Row] = []
+    for title, make in cases(kind).items():
+        seeds = range(first_seed, first_seed + SCANS)
+        outcomes = [_outcome(matcher, make(seed), seed) for seed in seeds]
+        wrong, accepted = sum(o[0] for o in outcomes), sum(o[1] for o in outcomes)
+        text = f"{wrong} of {SCANS} ({accepted} accepted)"
+        rows.append((f"false fixes on {title}, {kind}", text, "0"))
+    return rows
+
+
+def _outcome(matcher: DistributionMatcher, case: Case, seed: int) -> Tuple[bool, bool]:
+    scan, target, true = case
+    rng = np.random.default_rng(seed)
+    expected = scan.reference_pose + rng.normal(0.0, _DEVIATIONS[:3])
+    prior = Prior(composed(expected, inverse(scan.reference_pose)), np.zeros(3), np.zeros(2), np.diag(_DEVIATIONS**2))
+    result = matcher.match(scan, target, prior)
+    if not result.accepted:
+        return False, False
+    difference = result.pose - true
+    squared = difference @ np.linalg.solve(result.covariance[:3, :3], difference)
+    return bool(squared > _SIGMAS**2), True
 
 
 def rows(first_seed: int = 0) -> List[Row]:
-    """Return all of them, drawn with the seeds from `first_seed` on; some minutes."""
-    parts = (matching_moves, matching_starts, matching_moving, matching_false)
-    return [row for part in parts for row in part.rows(first_seed)]
+    """Return all figures, drawn with the seeds from `first_seed` on; some minutes."""
+    return [row for part in (start_rows, false_rows) for kind in KINDS for row in part(kind, first_seed)]

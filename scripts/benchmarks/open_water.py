@@ -5,8 +5,7 @@ from typing import Callable, Dict, Iterator, List
 
 import numpy as np
 
-from benchmarks.command_line import benchmark_parser
-from benchmarks.table import Row, print_table
+from benchmarks.harness import Row, benchmark_parser, print_table
 from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import Recording, scans_of
@@ -24,6 +23,9 @@ _START = 1000.0
 _SPEED, _TURN_RATE = 0.3, 0.01  # m/s, rad/s: circles of 30 m, so that the vehicle comes back
 _SPECKLE = 6.0  # Echo strength: mean of a receiver's noise at a usual gain
 _BUBBLES, _BUBBLE_STRENGTH = 30, 120.0  # Echoes of a turn that nothing stands behind
+
+Turn = Callable[[np.random.Generator], np.ndarray]
+"""Makes strengths (beams, bins) of a turn of the head."""
 
 
 @dataclass(frozen=True)
@@ -52,14 +54,14 @@ def bubbles(rng: np.random.Generator) -> np.ndarray:
     return strengths
 
 
-WATERS: Dict[str, Callable[[np.random.Generator], np.ndarray]] = {
+WATERS: Dict[str, Turn] = {
     "silence": silence,
     "receiver noise": speckle,
     "noise and bubbles": bubbles,
 }
 
 
-def recording(turn: Callable[[np.random.Generator], np.ndarray], scans: int, seed: int) -> Recording:
+def recording(turn: Turn, scans: int, seed: int) -> Recording:
     """Return a recording of a vehicle that drives circles in open water."""
     times = _START + np.arange(scans * _BEAMS + 1) * _SECONDS_PER_TURN / _BEAMS
     yaws = _TURN_RATE * (times - _START)
@@ -72,9 +74,7 @@ def recording(turn: Callable[[np.random.Generator], np.ndarray], scans: int, see
     return Recording(beams, 0, Track(times, poses), None)
 
 
-def _beams(
-    turn: Callable[[np.random.Generator], np.ndarray], times: np.ndarray, rng: np.random.Generator
-) -> Iterator[Beam]:
+def _beams(turn: Turn, times: np.ndarray, rng: np.random.Generator) -> Iterator[Beam]:
     for number in range(len(times) // _BEAMS):
         strengths = np.clip(np.rint(turn(rng)), 0, 255).astype(np.uint8)
         for step in range(_BEAMS):
@@ -82,9 +82,7 @@ def _beams(
             yield Beam(stamp, "sonar", 2.0 * np.pi * step / _BEAMS, strengths[step], _RESOLUTION)
 
 
-def outcome(
-    turn: Callable[[np.random.Generator], np.ndarray], estimator: EstimatorName, scans: int, seed: int
-) -> Outcome:
+def outcome(turn: Turn, estimator: EstimatorName, scans: int, seed: int) -> Outcome:
     """Map open water as map_bag does."""
     made = recording(turn, scans, seed)
     parameters = ReplayParameters(estimator=estimator)
@@ -113,7 +111,12 @@ def rows(scans: int = SCANS) -> List[Row]:
     return table
 
 
-if __name__ == "__main__":
+def main() -> None:
+    """Print one table."""
     parser = benchmark_parser("open_water", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS)
     print_table(rows(parser.parse_args().scans))
+
+
+if __name__ == "__main__":
+    main()

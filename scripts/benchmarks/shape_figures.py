@@ -7,9 +7,8 @@ from typing import List, Optional, Sequence
 
 import numpy as np
 
-from benchmarks.basin_scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
-from benchmarks.table import Row, median_seconds
-from sonar_processing.cloud import IntensityCloud
+from benchmarks.harness import Row
+from benchmarks.scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters
 from sonar_processing.filters.echo_extractor import EchoExtractor
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
@@ -101,30 +100,6 @@ def buoy_rows(spread: float, min_radius: float, max_radius: float) -> List[Row]:
     ]
 
 
-def cross_of_lines(points: int, rng: np.random.Generator) -> IntensityCloud:
-    """Return three noisy lines and as many stray points again, each point an echo of its own."""
-    along, each = rng.uniform(-30.0, 30.0, points), np.arange(points) % 4
-    noise = rng.normal(0.0, 0.1, points)
-    xy = np.where(
-        (each == 0)[:, np.newaxis], np.column_stack([along, 25.0 + noise]), np.column_stack([40.0 + noise, along])
-    )
-    xy = np.where((each == 2)[:, np.newaxis], np.column_stack([along, noise - 25.0]), xy)
-    xy = np.where((each == 3)[:, np.newaxis], rng.uniform(-40.0, 40.0, (points, 2)), xy)
-    cloud = np.column_stack([xy, np.zeros(points), np.full(points, 100.0)]).astype(np.float32)
-    return IntensityCloud(cloud, np.arange(1.0, points + 1.0), 10**9, "odom")
-
-
-def time_rows() -> List[Row]:
-    """Measure the search for three lines with all 5,000 hypotheses for each, and as it ends by itself."""
-    cloud = cross_of_lines(2000, np.random.default_rng(4))
-    rows = []
-    for probability, name in ((1.0, "5,000 hypotheses each"), (0.999, "default probability")):
-        detector = LineDetector(LineDetectorParameters(n_walls=3, probability=probability, max_iterations=5000))
-        seconds = median_seconds(lambda d=detector: d(cloud), repeats=30)
-        rows.append((f"3 lines in 2,000 points, {name}", f"{1e3 * seconds:.1f} ms", "<= 20 ms"))
-    return rows
-
-
 def rows() -> List[Row]:
     """Return the figures of the shapes."""
     found = []
@@ -133,4 +108,4 @@ def rows() -> List[Row]:
         extractor = EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))
         found += wall_rows(spread, "cleaned", cleaned) + wall_rows(spread, "echoes", [extractor])
         found += [row for radii in BUOY_RADII for row in buoy_rows(spread, *radii)]
-    return found + time_rows()
+    return found

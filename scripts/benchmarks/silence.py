@@ -11,21 +11,15 @@ from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
-from benchmarks.command_line import benchmark_parser
-from benchmarks.heads import recorded as recording_of
-from benchmarks.heads import simulated, tour_setup
-from benchmarks.recorded import recorded
-from benchmarks.twins.odometry import reported
-from benchmarks.twins.parameters import TwinParameters
-from benchmarks.without_dvl import HEAD
+from benchmarks.harness import benchmark_parser, recorded
+from benchmarks.paths import replay_input
+from benchmarks.tours import simulated
+from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.odometry_choice import OdometryKind
 from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.echo_length import echo_sigma
-from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
-from mlsm_manager.offline.odometry_kind import with_odometry
-from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import Replayed, replay
-from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, matrices
 from recordings.reader import Request
@@ -90,9 +84,7 @@ def silenced(recording: Recording, kind: Silence, start: float, seconds: float) 
 
 def replayed(recording: Recording, kind: OdometryKind, shape: EchoShape) -> Replayed:
     """Return what map_bag makes of a recording of an odometry and of a sonar whose echoes have a shape."""
-    sigma = echo_sigma([placed.beam for placed in recording.beams])
-    parameters = suited(with_odometry(ReplayParameters(), kind, ()), shape, (), sigma)
-    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
+    scans, parameters = replay_input(recording, kind, shape)
     return replay(recording, scans, parameters, lambda count: None)
 
 
@@ -116,14 +108,14 @@ def figures(found: Replayed, truth: Track, start: float, seconds: float) -> Figu
 def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[str, Recording, Track]]:
     """Yield simulated tours: name, recording and where the vehicle is in the map that begins where it does."""
     for name in names:
-        tour = simulated(tour_setup(*name.split("_", 1), HEAD))
+        tour = simulated(name)
         for seed in range(seeds):
             made = reported(tour.truth, TwinParameters(direction=0.0, scale=0.01), np.random.RandomState(seed)).poses
             odometry = made * [0.0, 0.0, 1.0] if kind is OdometryKind.HEADING else made
             origin = np.append(tour.truth.poses[0, :2] - odometry[0, :2], 0.0)
             yield (
                 f"{name}, seed {seed}",
-                recording_of(tour, Track(tour.truth.times, odometry)),
+                tour.recording(Track(tour.truth.times, odometry)),
                 Track(tour.truth.times, tour.truth.poses - origin),
             )
 

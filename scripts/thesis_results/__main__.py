@@ -3,19 +3,31 @@
 import argparse
 import resource
 import sys
-from typing import List
+from typing import List, Tuple
 
-from benchmarks.recorded import recorded
+from benchmarks.harness import ROOT, recorded
 
-from thesis_results.made_with import ROOT, made_with
-from thesis_results.markdown import joined
-from thesis_results.page import write_page
+from thesis_results import accuracy, marina, moves, moving, processing, sonar, survey
+from thesis_results.page import Section, joined, made_with, write_page
 from thesis_results.pictures import Pictures
-from thesis_results.section import Section
-from thesis_results.section_table import SECTIONS
 
 PAGE = ROOT / "docs/results.md"
 PICTURES = ROOT / "docs/pictures/results"
+SECTIONS: Tuple[Section, ...] = (
+    Section("simulation", "7.1", "Simulated scans", sonar.make_simulated),
+    Section("recorded", "7.1", "Simulated and recorded scans", sonar.make_recorded, sonar.RECORDINGS),
+    Section("processing", "7.2", "A simulated scan, cleaned", processing.make_simulated),
+    Section("processing-recorded", "7.2", "A recorded scan, cleaned", processing.make_recorded, (sonar.TANK,)),
+    Section("mapping", "7.3", "A 3-D survey of the harbour", survey.make),
+    Section("moves", "7.4", "Three moves with an odometry that is 30 % off", moves.make),
+    Section("moving", "7.4", "A vehicle that never stops", moving.make),
+    Section("marina", "7.4", "A real marina", marina.make, marina.RECORDINGS),
+    Section("compass", "7.4", "The marina with the compass alone", marina.make_compass_alone, marina.RECORDINGS),
+    Section("convergence", "beyond", "From how far off a scan finds its place", accuracy.make_convergence),
+    Section("sensitivity", "beyond", "The error of a fix against rays, pulse and noise", accuracy.make_sensitivity),
+    Section("consistency", "beyond", "Are the stated deviations true?", accuracy.make_consistency),
+)
+"""All sections of the page, in its order; a new one is one line here."""
 
 
 def main() -> None:

@@ -1,22 +1,39 @@
-"""Saves figures as small PNG files."""
+"""Pictures of the page: small PNG files, and what is drawn in several of them: blocks, turns of the head, worlds."""
 
+from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from PIL import Image
 
+from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from node_support.files import write_whole
-from thesis_results.markdown import prose
+from sonar_processing.beams.beam import Beam
+from sonar_processing.scans.image import PolarImage, SonarImageParameters
+from sonar_simulator.world.world import World
+from sonar_simulator.world.world_mesh import world_triangles
+from thesis_results.page import prose
 
 MOST_BYTES = 200_000
 """Of one picture: all of them are in the repository, in every version."""
 _RESOLUTIONS = (110, 95, 80, 65, 50)  # dots per inch, the best that fits is taken
 _COLOURS = 256  # of the palette: a third of the bytes, and no difference is seen
+STRONGEST = 127
+"""All pictures have one scale of strengths: that of the thesis's sonar. What is stronger looks like this."""
+COLOURS = "inferno"
+_BLOCK_COLOURS = {BlockType.HORIZONTAL: (0.72, 0.15, 0.12), BlockType.VERTICAL: (0.98, 0.87, 0.50)}
+"""The thesis's: red, and light yellow for vertical blocks."""
+_LEAST_HEIGHT = 0.08  # m: a block of one point is drawn this high
+_CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
+# Brightness of the top and of the sides that look to -x and to -y.
+_SHADES = (1.0, 0.82, 0.66)
 
 
 class Pictures:
@@ -64,3 +81,101 @@ def _png(figure: Figure, resolution: int) -> bytes:
     image = Image.open(full).convert("RGB").quantize(_COLOURS, method=Image.FASTOCTREE, dither=0)
     image.save(small, format="png", optimize=True)
     return small.getvalue()
+
+
+@dataclass(frozen=True)
+class Turn:
+    """Head angles (beams,) rad and strengths (beams, bins) uint8 of a sonar at rest; `reach`: m, end of the bins."""
+
+    angles: np.ndarray
+    strengths: np.ndarray
+    reach: float
+
+    @property
+    def range_resolution(self) -> float:
+        """Length of a bin, m."""
+        return self.reach / self.strengths.shape[1]
+
+
+def draw_turn(axes: Axes, turn: Turn) -> AxesImage:
+    """Draw what each beam heard where it pointed; x to the right, y up, the sonar in the middle."""
+    parameters = SonarImageParameters(beam_width=2.0 * np.pi / len(turn.angles))
+    image = PolarImage(parameters)
+    for angle, strengths in zip(turn.angles, turn.strengths):
+        picture = image.draw(Beam(10**9, "sonar", float(angle), strengths, turn.range_resolution))
+    edge = picture.shape[0] * image.metres_per_pixel / 2.0
+    # PolarImage draws x up and y to the left.
+    return axes.imshow(
+        picture[::-1, ::-1].T, origin="lower", extent=(-edge, edge, -edge, edge), cmap=COLOURS, vmin=0, vmax=STRONGEST
+    )
+
+
+def draw_world(axes: Axes, world: World, place: Sequence[float]) -> None:
+    """Draw a world's triangles, the highest last, around `place` x y z [m]."""
+    triangles = world_triangles(world)
+    corners = triangles.points.reshape(-1, 3, 3) - np.array(place)
+    order = np.argsort(corners[..., 2].mean(axis=1))
+    axes.add_collection(
+        PolyCollection(
+            corners[order, :, :2], facecolors=triangles.colours[::3][order], linewidths=0, antialiaseds=False
+        )
+    )
+
+
+def draw_outlines(axes: Axes, world: World, label: str) -> None:
+    """Draw the outlines of what stands upright."""
+    lines = [np.asarray(outline)[:, :2] for outline in world.outlines()]
+    axes.add_collection(LineCollection(lines, colors="#1f5fa8", linewidths=1.0, zorder=1, label=label))
+
+
+def draw_in_space(axes: Axes, blocks: Blocks, direction: float, elevation: float) -> None:
+    """Draw blocks as boxes in parallel projection, as seen from `direction` and `elevation` [rad].
+
+    Boxes on a grid do not cut each other: drawn from far to near, each hides what is behind it.
+    """
+    towards = np.array(
+        [np.cos(direction) * np.cos(elevation), np.sin(direction) * np.cos(elevation), np.sin(elevation)]
+    )
+    right = np.array([-np.sin(direction), np.cos(direction), 0.0])
+    up = np.cross(towards, right)
+    faces, colours = _faces(blocks, towards)
+    order = np.argsort(np.einsum("nki,i->n", faces, towards), kind="stable")
+    flat = np.stack([faces @ right, faces @ up], axis=-1)[order]
+    axes.add_collection(
+        PolyCollection(flat, facecolors=colours[order], edgecolors=colours[order] * 0.7, linewidths=0.2)
+    )
+    axes.set_aspect("equal")
+    axes.autoscale_view()
+    axes.set_axis_off()
+
+
+def _faces(blocks: Blocks, towards: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the visible faces (n, 4, 3) and their colours (n, 3)."""
+    size = blocks.resolution
+    low = blocks.centers - size / 2.0
+    bottom, top = blocks.bottom, np.maximum(blocks.height, blocks.bottom + _LEAST_HEIGHT)
+    base = np.array([_BLOCK_COLOURS[BlockType(int(kind))] for kind in blocks.type])
+    plan = low[:, np.newaxis] + _CORNERS * size
+    faces: List[np.ndarray] = [_at_height(plan, top)]
+    for axis in (0, 1):
+        side = low.copy()
+        side[:, axis] += size if towards[axis] > 0 else 0.0
+        other = np.zeros(2)
+        other[1 - axis] = size
+        edge = np.stack([side, side + other], axis=1)
+        faces.append(np.concatenate([_at_height(edge, bottom), _at_height(edge, top)[:, ::-1]], axis=1))
+    return np.concatenate(faces), np.concatenate([base * shade for shade in _SHADES])
+
+
+def _at_height(plan: np.ndarray, heights: np.ndarray) -> np.ndarray:
+    """Return places (n, k, 3) of places (n, k, 2) seen from above."""
+    return np.concatenate([plan, np.broadcast_to(heights[:, np.newaxis, np.newaxis], (*plan.shape[:2], 1))], axis=2)
+
+
+def draw_from_above(axes: Axes, blocks: Blocks, alpha: float = 1.0) -> None:
+    """Draw the cells of blocks, vertical ones on top."""
+    order = np.argsort(blocks.type, kind="stable")
+    plan = (blocks.centers - blocks.resolution / 2.0)[order, np.newaxis] + _CORNERS * blocks.resolution
+    colours = np.array([_BLOCK_COLOURS[BlockType(int(kind))] for kind in blocks.type[order]]).reshape(-1, 3)
+    axes.add_collection(PolyCollection(plan, facecolors=colours, linewidths=0, alpha=alpha))
+    axes.autoscale_view()

@@ -8,9 +8,9 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 
-from benchmarks.recorded import recorded
+from benchmarks.harness import recorded
+from thesis_results.__main__ import SECTIONS
 from thesis_results.pictures import MOST_BYTES, Pictures
-from thesis_results.section_table import SECTIONS
 
 QUICK = ("recorded", "processing", "processing-recorded")
 

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import rospy
 import rostest
-from benchmarks.foreign_messages import message_classes, sane_message
-from benchmarks.fuzz_beams import Fuzzer
+from foreign_messages import message_classes, sane_message
+from fuzzed_beams import Fuzzer
 from graph import Diagnostics, Inbox, end_publishing, rows, wait_for_publisher_links
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan, PointCloud2

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
-from benchmarks.basin_scans import BUOYS, BasinScans, anywhere, near_buoy
+from benchmarks.scans import BUOYS, BasinScans, anywhere, near_buoy
 from benchmarks.shape_figures import wall_errors
 
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters

@@ -4,12 +4,11 @@ import sys
 
 import numpy as np
 import pytest
-from benchmarks import recorded
+from benchmarks.harness import ROOT
 from thesis_results import __main__ as program
-from thesis_results.page import sections_of, write_page
+from thesis_results.__main__ import SECTIONS
+from thesis_results.page import Section, sections_of, write_page
 from thesis_results.pictures import MOST_BYTES, Pictures, new_figure
-from thesis_results.section import Section
-from thesis_results.section_table import SECTIONS
 
 
 def _section(word, chapter="7.1", recordings=()):
@@ -83,11 +82,11 @@ def test_words_and_headings_of_sections_differ():
 
 
 def test_the_committed_page_has_all_sections_computed():
-    text = (recorded.ROOT / "docs" / "results.md").read_text()
+    text = (ROOT / "docs" / "results.md").read_text()
     assert list(sections_of(text)) == [section.heading for section in SECTIONS]
     assert "Not computed yet" not in text
 
 
 def test_the_pictures_stay_small_together():
-    files = (recorded.ROOT / "docs" / "pictures").rglob("*.png")
+    files = (ROOT / "docs" / "pictures").rglob("*.png")
     assert sum(path.stat().st_size for path in files) <= 4_000_000

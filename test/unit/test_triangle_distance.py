@@ -1,9 +1,9 @@
 """Distances from triangles, against the nearest of many points on them."""
 
 import numpy as np
-from benchmarks.triangle_distance import triangle_distances
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from thesis_results.survey import triangle_distances
 
 STEPS = 30
 

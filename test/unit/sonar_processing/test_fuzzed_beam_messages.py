@@ -1,7 +1,7 @@
-"""Damaged messages of other packages' sonars crash nothing, and each is counted; a part of `scripts/fuzz_beams`."""
+"""Damaged messages of other packages' sonars crash nothing, and each is counted."""
 
 import pytest
-from benchmarks.fuzz_beams import fuzz
+from fuzzed_beams import fuzz
 
 MESSAGES = 5000
 

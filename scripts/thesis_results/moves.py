@@ -4,30 +4,31 @@ from dataclasses import dataclass
 from typing import Dict, List, Sequence, Tuple
 
 import numpy as np
-from benchmarks.matchers import MatcherName
-from benchmarks.matching_moves import (
-    SEEDS,
-    odometry_path,
-    session_errors,
-    session_estimator,
-    session_scans,
-    session_track,
-    true_path,
-)
-from benchmarks.matching_scans import KINDS, ScanMaker, SonarKind
-from benchmarks.recorded import ROOT
+import yaml
+from benchmarks.harness import ROOT
+from benchmarks.matchers import MATCHERS, MatcherName
+from benchmarks.scans import KINDS, ScanMaker, SonarKind
 from matplotlib.axes import Axes
 
+from mlsm_manager.localisation.estimator import MapSettings
+from mlsm_manager.localisation.scan_by_scan import ScanByScan
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import MatchResult, corrected_points
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
+from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
-from thesis_results.block_views import draw_from_above
-from thesis_results.markdown import joined, prose, table
-from thesis_results.pictures import Pictures, new_figure, to_scale
-from thesis_results.world_views import draw_outlines
+from thesis_results.page import joined, prose, table
+from thesis_results.pictures import Pictures, draw_from_above, draw_outlines, new_figure, to_scale
 
+SEEDS = 30
+TURNS = 7
+_SETTINGS = MapSettings(0.5, 0.5, 1e4, 1000, 15)
+ODOMETRY = OdometryErrors(scale_deviation=0.3)
+_SCALE = 1.3
+_SCRIPT = yaml.safe_load((ROOT / "yaml/thesis_moves.yaml").read_text())
+_VEHICLE = VehicleScript.from_yaml_data(_SCRIPT["moves"], _SCRIPT["start"])
 MOVES = ("4 m on x", "4 m on x and 3 m on y", "then -8 m on x")
 """As the odometry sees them."""
 PUBLISHED = ((1.348, 0.001), (0.851, 0.781), (-1.197, 0.618))
@@ -64,7 +65,7 @@ def wanted(scan: Scan) -> np.ndarray:
 
 def fixes(scans: Sequence[Scan], name: MatcherName) -> List[Fix]:
     """Return the matches after each of the moves."""
-    estimator, found = session_estimator(name), []
+    estimator, found = matching_estimator(name, ODOMETRY), []
     for turn, scan in enumerate(scans):
         target = estimator.matched.blocks
         update = estimator.add_scan(scan)
@@ -110,13 +111,7 @@ def _cell(correction: np.ndarray, right: np.ndarray, accepted: bool) -> str:
 
 
 def _many_runs(sessions: Dict[SonarKind, List[List[Scan]]]) -> List[List[str]]:
-    return [
-        [
-            str(kind),
-            *(_summary(runs, name) for name in MatcherName),
-        ]
-        for kind, runs in sessions.items()
-    ]
+    return [[str(kind), *(_summary(runs, name) for name in MatcherName)] for kind, runs in sessions.items()]
 
 
 def _summary(runs: List[List[Scan]], name: MatcherName) -> str:
@@ -178,3 +173,51 @@ def _draw_axes(axes: Axes, pose: np.ndarray, name: str, colour: str) -> None:
     for number, end in enumerate(ends):
         axes.plot(*np.array([pose[:2], pose[:2] + end]).T, color=colour, label=name if number == 0 else None)
     axes.plot(*pose[:2], "o", color=colour)
+
+
+def true_path(times: np.ndarray) -> np.ndarray:
+    """Return the true planar poses (n, 3) of the thesis's moves."""
+    return np.array([[pose[0, 3], pose[1, 3], 0.0] for pose in map(_VEHICLE.pose, times)])
+
+
+def odometry_path(times: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) as odometry of 30 % error has them."""
+    return true_path(times) / [_SCALE, _SCALE, 1.0]
+
+
+def session_track() -> Track:
+    """Return the odometry of the moves."""
+    times = np.linspace(-1.0, _VEHICLE.duration, 2400)
+    return Track(times, odometry_path(times))
+
+
+def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
+    """Return one scan per turn of the head; every second one sees a whole move."""
+    return [
+        maker.scan(true_path, odometry_path, 100 * seed + turn, turn, moving=bool(turn % 2), track=track)
+        for turn in range(TURNS)
+    ]
+
+
+def matching_estimator(name: MatcherName, errors: OdometryErrors) -> ScanByScan:
+    """Return an estimator that matches with default parameters and knows how wrong the odometry may be."""
+    estimator = ScanByScan(_SETTINGS, errors, MATCHERS[name]())
+    estimator.matching = True
+    return estimator
+
+
+def session_errors(scans: List[Scan], name: MatcherName) -> np.ndarray:
+    """Return (scans - 1, 4): accepted, distance [m] and angle [rad] from the truth, squared Mahalanobis distance.
+
+    Where a match was not accepted, the pose is the one that the matcher offered.
+    """
+    estimator = matching_estimator(name, ODOMETRY)
+    rows = []
+    for scan in scans:
+        update = estimator.add_scan(scan)
+        if update.result is None:
+            continue
+        difference = update.result.pose - true_path(np.array([scan.reference_time]))[0]
+        squared = difference @ np.linalg.solve(update.belief.covariance[:3, :3], difference)
+        rows.append([update.accepted, np.hypot(*difference[:2]), abs(difference[2]), squared])
+    return np.array(rows)

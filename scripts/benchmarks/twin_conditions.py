@@ -1,7 +1,13 @@
-"""What makes one twin differ from another."""
+"""Conditions of twins of a recorded run: true paths made from the recorded one, and what odometry reports of a path."""
 
 from dataclasses import dataclass
 from enum import Enum
+
+import numpy as np
+from scipy.signal import lfilter
+
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import rotated
 
 
 class PathForm(Enum):
@@ -70,3 +76,72 @@ TWINS = {
     "open": TwinParameters(25, rotation=1.3, basin_radius=70.0, canal_radius=70.0, objects=8, direction=0.06),
     "graded": TwinParameters(18, PathForm.MIRRORED, 3.0, binary=False, direction=0.08, range_scale=0.015, scale=-0.01),
 }
+
+
+_STRAIGHT_ON = 0.45  # share of the run after which END_FIRST begins
+
+
+def true_path(recorded: Track, parameters: TwinParameters) -> Track:
+    """Return the twin's path at the recording's times; it begins at the origin."""
+    poses = _FORMS[parameters.path](recorded.poses)
+    poses = poses - np.array([*poses[0, :2], 0.0])
+    positions = rotated(poses[:, :2], np.full(len(poses), parameters.rotation))
+    return Track(recorded.times, np.column_stack([positions, poses[:, 2] + parameters.rotation]))
+
+
+def _mirrored(poses: np.ndarray) -> np.ndarray:
+    return poses * np.array([1.0, -1.0, -1.0])
+
+
+def _reversed(poses: np.ndarray) -> np.ndarray:
+    return poses[::-1]
+
+
+def _end_first(poses: np.ndarray) -> np.ndarray:
+    """Return the later part, then the earlier one moved to where the later one ended."""
+    start = int(_STRAIGHT_ON * len(poses))
+    later, earlier = poses[start:], poses[:start]
+    return np.concatenate([later, earlier + (later[-1] - earlier[0])])
+
+
+def _there_and_back(poses: np.ndarray) -> np.ndarray:
+    """Return the first half of the path, and the same way home."""
+    half = len(poses) // 2
+    home = poses[:half][::-1]
+    return np.concatenate([poses[:half], home, np.repeat(home[-1:], len(poses) - 2 * half, axis=0)])
+
+
+_FORMS = {
+    PathForm.AS_RECORDED: np.array,
+    PathForm.MIRRORED: _mirrored,
+    PathForm.REVERSED: _reversed,
+    PathForm.END_FIRST: _end_first,
+    PathForm.THERE_AND_BACK: _there_and_back,
+}
+
+
+_HEADING_TIME = 300.0  # s, of the slow compass error
+_SPEED_TIME = 12.0  # s, of the speed error
+_QUICK_HEADING = (0.0052, 20.0)  # rad, s: what a compass errs by in turns
+
+
+def reported(path: Track, parameters: TwinParameters, rng: np.random.RandomState) -> Track:
+    """Return the odometry of a true path."""
+    steps = np.gradient(path.times)
+    heading = path.poses[:, 2] + parameters.heading_deviation * lasting(rng, steps, _HEADING_TIME)
+    heading = heading + _QUICK_HEADING[0] * lasting(rng, steps, _QUICK_HEADING[1])
+    heading = heading + parameters.soft_iron * np.sin(2.0 * path.poses[:, 2])
+    heading = heading + parameters.heading_walk * np.cumsum(rng.normal(size=len(steps)) * np.sqrt(np.abs(steps)))
+    velocity = rotated(np.gradient(path.poses[:, :2], path.times, axis=0), -path.poses[:, 2] - parameters.direction)
+    noise = np.column_stack([lasting(rng, steps, _SPEED_TIME) for _ in range(2)])
+    velocity = velocity / (1.0 + parameters.scale) + parameters.speed_deviation * noise
+    positions = np.cumsum(rotated(velocity, heading) * steps[:, np.newaxis], axis=0)
+    return Track(path.times, np.column_stack([positions - positions[0], heading]))
+
+
+def lasting(rng: np.random.RandomState, steps: np.ndarray, time: float) -> np.ndarray:
+    """Return an Ornstein-Uhlenbeck process (m,) of deviation 1 that forgets within `time` seconds."""
+    kept = np.exp(-np.mean(steps) / time)
+    noise = rng.normal(size=len(steps)) * np.sqrt(1.0 - kept**2)
+    noise[0] = rng.normal()
+    return lfilter([1.0], [1.0, -kept], noise)

@@ -1,33 +1,27 @@
-"""7.4: scans of a vehicle that never stops."""
+"""7.4: scans of a vehicle that never stops: 0.3 m/s, 2 deg/s, and an odometry whose velocity is 30 % wrong."""
 
 from typing import List
 
 import numpy as np
+from benchmarks.harness import ROOT
 from benchmarks.matchers import MatcherName
-from benchmarks.matching_moving import (
-    SEEDS,
-    SPEED,
-    TURN_RATE,
-    TURNS,
-    WRONG,
-    matches,
-    moving_scans,
-    odometry_path,
-    root_mean_square,
-    true_path,
-)
-from benchmarks.matching_scans import HEAD, KINDS, ScanMaker
-from benchmarks.recorded import ROOT
+from benchmarks.scans import HEAD, KINDS, ScanMaker, still
 from matplotlib.axes import Axes
 
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import MatchResult, corrected_points
-from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry import inverse, transformed
+from mlsm_manager.scan_matching.scan import Scan, Track
+from node_support.geometry import inverse, transformed, wrapped
 from sonar_simulator.world.world_file import load_world
-from thesis_results.markdown import joined, prose, table
-from thesis_results.pictures import Pictures, new_figure, to_scale
-from thesis_results.world_views import draw_outlines
+from thesis_results.moves import matching_estimator
+from thesis_results.page import joined, prose, table
+from thesis_results.pictures import Pictures, draw_outlines, new_figure, to_scale
 
+SEEDS = 30
+TURNS = 5
+SPEED, TURN_RATE, WRONG = 0.3, np.radians(2.0), 0.7
+_START = 16.0
+_ERRORS = OdometryErrors(scale_deviation=0.3, turn_rate_deviation=0.01, rate_time=600.0)
 _SHOWN_KIND = KINDS[0]
 _BEFORE, _AFTER = "#d32f2f", "#2e7d32"
 
@@ -99,3 +93,51 @@ def _draw_paths(axes: Axes, scan: Scan, result: MatchResult) -> None:
     axes.plot(*true_path(times)[:, :2].T, color="k", linewidth=3.0, alpha=0.3, label="true path")
     axes.plot(*odometry_path(times)[:, :2].T, color=_BEFORE, linewidth=1.0, label="odometry")
     axes.plot(*result.beam_poses[:, :2].T, color=_AFTER, linewidth=1.5, label="path of this scan, matched")
+
+
+def circle(speed: float, turn_rate: float, times: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) of a vehicle that waits for one turn of the head and then runs on a circle."""
+    seconds = np.maximum(times - _START, 0.0)
+    yaw = turn_rate * seconds
+    radius = speed / turn_rate
+    return np.column_stack([radius * np.sin(yaw), radius * (1.0 - np.cos(yaw)), yaw])
+
+
+def true_path(times: np.ndarray) -> np.ndarray:
+    """Return the true poses (n, 3)."""
+    return circle(SPEED, TURN_RATE, times)
+
+
+def odometry_path(times: np.ndarray) -> np.ndarray:
+    """Return the poses (n, 3) as the odometry has them."""
+    return circle(SPEED * WRONG, TURN_RATE * WRONG, times)
+
+
+def moving_scans(maker: ScanMaker, seed: int) -> List[Scan]:
+    """Return a scan at rest and those of the circle."""
+    times = np.linspace(-1.0, 16.0 * (TURNS + 1), 2400)
+    track = Track(times, odometry_path(times))
+    first = maker.scan(still(np.zeros(3)), still(np.zeros(3)), 100 * seed, 0, track=track)
+    return [first] + [
+        maker.scan(true_path, odometry_path, 100 * seed + turn, turn, moving=True, track=track)
+        for turn in range(1, TURNS)
+    ]
+
+
+def matches(scans: List[Scan], name: MatcherName) -> List[MatchResult]:
+    """Return what came of matching all scans but the first one, which makes the map."""
+    estimator = matching_estimator(name, _ERRORS)
+    estimator.add_scan(scans[0])
+    return [estimator.add_scan(scan).result for scan in scans[1:]]
+
+
+def squared_errors(result: MatchResult) -> np.ndarray:
+    """Return (n, 3) squared errors of distance, yaw and speed at every beam of a matched scan."""
+    difference = result.beam_poses - true_path(result.beam_times)
+    speed = np.full(len(difference), np.hypot(*(result.velocity[:2] - [SPEED, 0.0])))
+    return np.column_stack([(difference[:, :2] ** 2).sum(axis=1), wrapped(difference[:, 2]) ** 2, speed**2])
+
+
+def root_mean_square(results: List[MatchResult]) -> np.ndarray:
+    """Return (3,) root mean squares of the errors over all beams."""
+    return np.sqrt(np.concatenate([squared_errors(result) for result in results]).mean(axis=0))

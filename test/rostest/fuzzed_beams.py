@@ -1,6 +1,5 @@
 """Sends damaged messages of other packages' sonars through adapters, scans and the laser scan: none may crash."""
 
-import argparse
 import math
 import random
 import struct
@@ -10,9 +9,8 @@ from typing import Any, List
 
 import genpy
 import numpy as np
+from foreign_messages import DEFINITIONS, message_classes, sane_message, serialised
 
-from benchmarks.foreign_messages import DEFINITIONS, message_classes, sane_message, serialised
-from benchmarks.table import print_table
 from node_support.errors import RefusedInput
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.head_watch import HeadWatch
@@ -26,7 +24,6 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 from sonar_processing.scans.revolution_collector import RevolutionCollector
 
-MESSAGES = 100_000
 _FLOATS = (0.0, -0.0, -1.0, 1e-40, 7.0, 400.0, 1e9, 3e38, math.nan, math.inf, -math.inf)
 _SECONDS = (0, 1, 2**31 - 1, 2**31, 2**32 - 1)
 _FRAMES = ("", "/", "/sonar", "so\0nar", "a" * 3000, "\u00fc \n")
@@ -131,19 +128,3 @@ def fuzz(messages: int, seed: int) -> Fuzzer:
     for number in range(messages):
         fuzzer.send(number)
     return fuzzer
-
-
-def main() -> None:
-    """Print what became of the messages; end with status 1 after a crash."""
-    parser = argparse.ArgumentParser(prog="scripts/fuzz_beams", description=__doc__)
-    parser.add_argument("messages", type=int, nargs="?", default=MESSAGES)
-    parser.add_argument("seed", type=int, nargs="?", default=1)
-    arguments = parser.parse_args()
-    fuzzer = fuzz(arguments.messages, arguments.seed)
-    print_table([(name, str(number), "") for name, number in sorted(fuzzer.outcomes.items())])
-    print("\n".join(fuzzer.crashes[:10]) or f"no crash; {sum(fuzzer.outcomes.values())} messages counted")
-    raise SystemExit(bool(fuzzer.crashes))
-
-
-if __name__ == "__main__":
-    main()

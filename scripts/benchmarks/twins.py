@@ -1,18 +1,24 @@
-"""A twin as a recording: beams, odometry and truth."""
+"""Prints how far live and batch paths are from the truth on twins of a recorded run."""
 
 from dataclasses import replace
+from functools import partial
+from pathlib import Path
 from typing import Iterator, Tuple
 
 import numpy as np
 
-from benchmarks.twins.odometry import reported
-from benchmarks.twins.parameters import TwinParameters
-from benchmarks.twins.paths import true_path
-from benchmarks.twins.sonar import heard
-from benchmarks.twins.water import Water, ebbed, made_water, with_ship
+from benchmarks.harness import benchmark_parser
+from benchmarks.paths import batch_figures, live_figures, solved_live
+from benchmarks.twin_conditions import TWINS, TwinParameters, reported, true_path
+from benchmarks.twin_water import Water, ebbed, heard, made_water, with_ship
+from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.echo_shape import echo_shape_of
+from mlsm_manager.offline.evaluation import positions_at
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
+from recordings.reader import Request
 from sonar_processing.beams.placed_beam import PlacedBeam
 
 _MOMENT = 7.0  # s for which a ship is taken to stand still
@@ -75,3 +81,22 @@ def _passing(number: float, duration: float, vehicle: np.ndarray) -> Tuple[np.nd
     heading = 2.4 * int(number)
     along, beside = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
     return vehicle + _SHIP_SPEED * duration * (number % 1.0 - 0.5) * along + _SHIP_BESIDE * beside, heading
+
+
+def main() -> None:
+    """Print two lines per twin."""
+    parser = benchmark_parser("twins", __doc__)
+    parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
+    parser.add_argument("twins", nargs="*", default=list(TWINS), help="which ones; default: " + ", ".join(TWINS))
+    arguments = parser.parse_args()
+    source = read_recording(arguments.bag, Request())
+    for name in arguments.twins:
+        twin = twin_of(source, TWINS[name])
+        solver = solved_live(twin, OdometryKind.DVL, echo_shape_of([placed.beam for placed in twin.beams]))
+        truth = partial(positions_at, twin.truth.times, twin.truth.positions)
+        print(f"{name}, live: {live_figures(solver, truth).line()}", flush=True)
+        print(f"{name}, batch: {batch_figures(solver, truth)[0].line()}", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,31 +1,41 @@
-"""Simulated scans for the figures of matching: worlds, vehicles on scripts, echoes, scans with a wrong odometry."""
+"""Simulated scans: of a vehicle that stays or moves under a wrong odometry, and as the cloud of a still sonar."""
 
 import math
 from dataclasses import dataclass
 from functools import lru_cache
-from pathlib import Path
 from typing import Callable, Optional, Tuple
 
 import numpy as np
 
+from benchmarks.harness import ROOT
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import pose_matrix, rotated
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.cloud import IntensityCloud
 from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.echoes.laser_cone import LaserCone, LaserConeParameters
 from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.ray_caster import RayCaster
-from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.world.sdf import load_sdf
 from sonar_simulator.world.world import Shape, World
 
-ROOT = Path(__file__).resolve().parents[2]
 RAYS = {15: (5, 3), 45: (15, 3), 150: (30, 5), 500: (50, 10)}
 HEAD = SonarHead(beams_per_turn=120, seconds_per_turn=16.0)
 DEPTH = -2.0
+HALF_LENGTH, HALF_WIDTH = 60.0, 25.0
+WALLS = ((1.0, 0.0, HALF_LENGTH), (-1.0, 0.0, HALF_LENGTH), (0.0, 1.0, HALF_WIDTH), (0.0, -1.0, HALF_WIDTH))
+"""Inner faces of the basin's walls: normal x, normal y, distance from the basin's centre [m]."""
+BUOYS = ((42.0, 17.0), (-50.0, -16.0))
+SONAR_DEPTH = 1.8
 _FLOOR = Shape("floor", "box", pose_matrix((0.0, 0.0, -6.0)), (400.0, 400.0, 1.0))
 _WALL = Shape("wall", "box", pose_matrix((0.0, 15.5, -2.5)), (400.0, 1.0, 6.0))
 WORLDS: dict = {
-    "basin": lambda: load_sdf(str(ROOT / "worlds/basin.sdf")).world,
+    "basin": lambda: load_sdf(ROOT / "worlds/basin.sdf").world,
     "empty sea": lambda: World.from_shapes("empty sea", [_FLOOR]),
     "straight wall": lambda: World.from_shapes("straight wall", [_FLOOR, _WALL]),
 }
@@ -100,6 +110,49 @@ def noise_scan(points: int, seed: int) -> Scan:
     cloud = np.column_stack([places, np.full(points, DEPTH), np.full(points, 50.0)])
     track = Track(np.linspace(0.0, 16.0, 33), np.zeros((33, 3)))
     return Scan(cloud, times, np.zeros(points, dtype=bool), track, 16.0)
+
+
+class BasinScans:
+    """Scans of 120 beams and 50 m with one spread of the echoes [m]."""
+
+    def __init__(self, spread: float) -> None:
+        self._caster = _caster("basin")
+        self._parameters = SonarParameters()
+        self._model = make_echo_model("laser_cone", {"spread": spread})
+
+    def scan(self, T_world_sonar: np.ndarray, seed: int) -> IntensityCloud:
+        """Return the full turn heard from a (4, 4) pose, organised, in the world frame."""
+        head = SonarHead(self._parameters.beams_per_turn, self._parameters.seconds_per_turn)
+        angles = np.array([head.angle(beam) for beam in range(head.beams_per_turn)])
+        sonar = Sonar(self._caster, self._parameters.pattern(), self._model, np.random.default_rng(seed))
+        strengths = sonar.pings(np.repeat(T_world_sonar[np.newaxis], len(angles), axis=0), angles)
+        assembler = ScanAssembler(SonarToCloudParameters(keep_organized=True))
+        for number, angle in enumerate(angles):
+            stamp_ns = 10**12 + round(1e9 * head.time(number))
+            beam = Beam(stamp_ns, "sonar", float(angle), strengths[number], sonar.range_resolution)
+            scan = assembler.add(PlacedBeam(beam, T_world_sonar, is_moving=False))
+        return scan
+
+
+def anywhere(seed: int) -> np.ndarray:
+    """Return the (4, 4) pose of a sonar somewhere in the basin, 7 m or more from its walls."""
+    rng = np.random.default_rng([1, seed])
+    return _pose(rng.uniform(-50.0, 50.0), rng.uniform(-18.0, 18.0), rng)
+
+
+def near_buoy(seed: int, distance: float = 10.0) -> np.ndarray:
+    """Return the (4, 4) pose of a sonar `distance` m from the axis of buoy number seed mod 2, any way round."""
+    rng = np.random.default_rng([2, seed])
+    buoy = BUOYS[seed % len(BUOYS)]
+    while True:
+        bearing = rng.uniform(-math.pi, math.pi)
+        x, y = buoy[0] + distance * math.cos(bearing), buoy[1] + distance * math.sin(bearing)
+        if abs(x) < HALF_LENGTH - 3.0 and abs(y) < HALF_WIDTH - 3.0:
+            return _pose(x, y, rng)
+
+
+def _pose(x: float, y: float, rng: np.random.Generator) -> np.ndarray:
+    return pose_matrix((x, y, -SONAR_DEPTH), (0.0, 0.0, rng.uniform(-math.pi, math.pi)))
 
 
 @lru_cache(maxsize=None)

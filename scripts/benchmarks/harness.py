@@ -1,0 +1,94 @@
+"""What every benchmark shares: where recordings are, timing a call, a run of map_bag, and printing a table."""
+
+import argparse
+import json
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Tuple
+
+import numpy as np
+
+from recordings.motion.vehicle_motion import MotionNames, MotionSource
+from recordings.reader import Request, read
+from sonar_processing.beams.beam import Beam
+
+ROOT = Path(__file__).resolve().parents[2]
+Row = Tuple[str, str, str]
+"""What was measured, the figure with its unit, and what is wanted of it."""
+
+
+def recorded(name: str) -> Path:
+    """Return the path of a recording, which may be missing: in the folder UMC_DATA, or beside the repository."""
+    return Path(os.environ.get("UMC_DATA", str(ROOT.parent / "shared/data"))) / name
+
+
+def recorded_beams(name: str) -> List[Beam]:
+    """Return the beams of a recording of a vehicle at rest. Raises RecordingError."""
+    return read(recorded(name), Request(motion=MotionNames(declared=MotionSource.STANDING))).recorded.beams
+
+
+def missing_row(name: str) -> Row:
+    """Return the row that stands for figures of a recording that is not there."""
+    return name, "skipped", f"not in {recorded('')}; set UMC_DATA"
+
+
+def run_node(program: str, *arguments: object) -> None:
+    """Run nodes/`program` without its output; raises CalledProcessError."""
+    command = [sys.executable, str(ROOT / "nodes" / program), *map(str, arguments)]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
+
+
+def mapped(bag: Path, *options: str) -> Tuple[Dict[str, Any], float]:
+    """Return summary.json of a run of map_bag, and the CPU seconds of the run with its imports."""
+    with tempfile.TemporaryDirectory() as out:
+        before = os.times()
+        run_node("map_bag", bag, "--out", out, *options)
+        after = os.times()
+        summary = json.loads((Path(out) / "summary.json").read_text())
+    return summary, after.children_user + after.children_system - before.children_user - before.children_system
+
+
+def cpu_seconds(call: Callable[[], object]) -> float:
+    """Return the seconds of a core that a call takes."""
+    start = time.process_time()
+    call()
+    return time.process_time() - start
+
+
+def median_seconds(
+    call: Callable[[], object], repeats: int = 20, clock: Callable[[], float] = time.perf_counter
+) -> float:
+    """Return the median time of a call; time.process_time counts only what this process gets of its core."""
+    times = []
+    for _ in range(repeats):
+        start = clock()
+        call()
+        times.append(clock() - start)
+    return float(np.median(times))
+
+
+def ratio_text(ratios: np.ndarray) -> str:
+    """Return the median of ratios that were each measured in one round, with its quartiles."""
+    low, middle, high = np.percentile(ratios, [25, 50, 75])
+    return f"{middle:.2f} ({low:.2f} to {high:.2f})"
+
+
+def print_table(rows: List[Row]) -> None:
+    """Print rows in columns under a heading."""
+    lines = [("figure", "measured", "wanted"), *rows]
+    widths = [max(len(line[column]) for line in lines) for column in range(3)]
+    for index, line in enumerate(lines):
+        print("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip())
+        if index == 0:
+            print("  ".join("-" * width for width in widths))
+
+
+def benchmark_parser(name: str, description: str) -> argparse.ArgumentParser:
+    """Return a parser for `scripts/bench NAME`; description: the program's docstring."""
+    return argparse.ArgumentParser(
+        prog=f"scripts/bench {name}", description=description, formatter_class=argparse.RawDescriptionHelpFormatter
+    )

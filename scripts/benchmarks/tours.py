@@ -1,0 +1,67 @@
+"""Simulated tours: what the sonar hears on them, and recordings of them with an odometry of one's choice."""
+
+from typing import List, NamedTuple
+
+import numpy as np
+import yaml
+
+from benchmarks.harness import ROOT
+from benchmarks.scans import RAYS, SonarKind
+from benchmarks.twin_conditions import TwinParameters, reported
+from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.offline.recording import Recording
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import matrices
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_simulator.simulation.simulation_setup import Settings, make_setup
+from sonar_simulator.vehicle.robot_description import RobotDescription
+
+HEAD = SonarKind(500, 0.15, 0.3)  # the demo's
+_START = 1000.0  # s
+_STEP = 0.1  # s between poses of the odometry
+
+
+class Tour(NamedTuple):
+    """A tour without any odometry. truth: the vehicle's path. T_base_sonar: (4, 4)."""
+
+    truth: Track
+    beams: List[Beam]
+    T_base_sonar: np.ndarray
+
+    def recording(self, odometry: Track) -> Recording:
+        """Return the recording with an odometry."""
+        places = matrices(odometry.at(np.array([beam.stamp_ns for beam in self.beams]) * 1e-9)) @ self.T_base_sonar
+        return Recording([PlacedBeam(beam, place, True) for beam, place in zip(self.beams, places)], 0, odometry, None)
+
+    def with_dvl(self, seed: int) -> Recording:
+        """Return the recording with errors drawn from what the solver expects of a DVL and a compass."""
+        rng, expected = np.random.RandomState(seed), DvlOdometry()
+        errors = TwinParameters(
+            direction=rng.normal(0.0, expected.direction_deviation), scale=rng.normal(0.0, expected.scale_deviation)
+        )
+        made = reported(self.truth, errors, rng)
+        return self.recording(Track(made.times, made.poses + np.append(self.truth.poses[0, :2], 0.0)))
+
+
+def simulated(name: str, kind: SonarKind = HEAD) -> Tour:
+    """Return what a sonar hears on the tour yaml/`name`.yaml in the world that the name begins with."""
+    values = yaml.safe_load((ROOT / "yaml/sonar_simulator_demo.yaml").read_text())
+    rows, columns = RAYS[kind.rays]
+    values.update(
+        laser_cone={"spread": kind.spread}, sonar={"ray_rows": rows, "ray_columns": columns},
+        world=f"worlds/{name.split('_')[0]}.sdf", script=f"yaml/{name}.yaml", odometry={"scale_error": 0.0},
+    )  # fmt: skip
+    robot = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
+    setup = make_setup(Settings.from_mapping(values), ROOT, robot, lambda warning: None)
+    times, poses, beams = [], [], []
+    for moment in setup.simulation.moments(20.0, 120):
+        time, pose = _START + moment.time, moment.truth.T_world_base
+        if not times or time > times[-1]:
+            times.append(time)
+            poses.append([pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])])
+        if moment.ping is not None:
+            ping = moment.ping
+            beams.append(Beam(round(1e9 * time), "sonar", ping.angle, ping.strengths, setup.sonar.range_resolution))
+    path, steps = Track(np.array(times), np.array(poses)), np.arange(times[0], times[-1], _STEP)
+    return Tour(Track(steps, path.at(steps)), beams, setup.T_base_sonar)

@@ -1,0 +1,147 @@
+"""7.1: what the echo models hear in the worlds, and beside it what real heads heard."""
+
+import math
+from typing import Dict, List, NamedTuple
+
+import numpy as np
+import yaml
+from benchmarks.harness import ROOT, recorded_beams
+from matplotlib.axes import Axes
+
+from node_support.geometry import pose_matrix
+from sonar_processing.beams.beam import Beam
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
+from sonar_simulator.world.world_file import load_world
+from thesis_results.page import joined, prose, table
+from thesis_results.pictures import STRONGEST, Pictures, Turn, draw_turn, draw_world, new_figure, to_scale
+
+TANK, BANK = "micron_static.bag", "micron_scanline.bag"
+RECORDINGS = (TANK, BANK)
+TURN_BEAMS = 200  # of the recorded heads
+HEAD_PLACE = pose_matrix((0.0, 0.0, -0.38), (0.0, 0.0, -0.126))
+"""Where the head stands in worlds/tank.sdf: its walls are built around the recording, its depth is fitted."""
+_REACH = 10.0  # m, of both recordings
+_BANDS = np.arange(0.5, 10.01, 0.5)
+"""Range bands [m] whose histograms are compared. Nearer than half a metre stands a part of the vehicle."""
+
+
+class View(NamedTuple):
+    """A world, where the sonar is in it [m], and the sonar's range [m]."""
+
+    world: str
+    place: tuple
+    reach: float
+
+
+_VIEWS = (
+    View("basin", (-20.0, -3.0, -2.0), 50.0),
+    View("harbour", (-5.0, -5.0, -2.0), 50.0),
+    View("tank", (0.0, 0.0, -1.0), 10.0),
+)
+_BEAMS = 120
+
+
+def make_simulated(pictures: Pictures) -> str:
+    """Return the section of what the models hear."""
+    figure, axes = new_figure(15.0, 11.0, len(_VIEWS), 1 + len(ECHO_MODELS))
+    angles = np.arange(_BEAMS) * 2.0 * math.pi / _BEAMS
+    for row, (name, place, reach) in zip(axes, _VIEWS):
+        world = load_world(ROOT / f"worlds/{name}.sdf").world
+        draw_world(row[0], world, place)
+        row[0].plot(0.0, 0.0, "r.")
+        to_scale(row[0], f"{name}, from above", reach)
+        for cell, model_name in zip(row[1:], ECHO_MODELS):
+            model = make_echo_model(model_name, {"max_range": reach})
+            sonar = Sonar(RayCaster(world), SonarParameters().pattern(), model, np.random.default_rng(1))
+            poses = np.repeat(pose_matrix(place)[np.newaxis], _BEAMS, axis=0)
+            image = draw_turn(cell, Turn(angles, sonar.pings(poses, angles), reach))
+            to_scale(cell, model_name, reach)
+            cell.set(ylabel="")
+    figure.colorbar(image, ax=axes[:, -1], shrink=0.4, label="echo strength, one scale for all")
+    return joined(
+        prose("""[The simulated sonar](simulation.md) describes the echo models. `laser_cone` and `collision` are
+        the thesis's (6.4); `physical` is what the thesis leaves to future work (8.2): materials, angles of
+        incidence, mirror echoes, the receiver."""),
+        pictures.save(
+            "simulated_scans",
+            figure,
+            f"""What the echo models hear in the worlds: one turn of {_BEAMS} beams each, from where the red point is.
+            Left: the world from above. Figure 7.1(d) of the thesis shows a scan of `laser_cone`.""",
+        ),
+    )
+
+
+def make_recorded(pictures: Pictures) -> str:
+    """Return the section of two recordings beside what the models hear in a copy of the tank."""
+    tank = recorded_beams(TANK)
+    first, second = _turn(tank[:TURN_BEAMS]), _turn(tank[TURN_BEAMS : 2 * TURN_BEAMS])
+    models = {name: _in_tank(first.angles, name) for name in ECHO_MODELS}
+    shown = {"tank, recorded": first, "bank, recorded": _turn(recorded_beams(BANK)[:TURN_BEAMS])}
+    shown.update({f"tank, {name}": turn for name, turn in models.items()})
+    figure, axes = new_figure(13.0, 8.5, 2, 3)
+    for cell, (title, turn) in zip(axes.ravel(), shown.items()):
+        image = draw_turn(cell, turn)
+        to_scale(cell, title, _REACH)
+    figure.colorbar(image, ax=axes[:, -1], shrink=0.5, label="echo strength, one scale for all")
+    _draw_medians(axes[-1, -1], {"recorded": first, **models})
+    compared = {"its second turn": second, **{f"`{name}`": turn for name, turn in models.items()}}
+    return joined(
+        prose("""A Tritech Micron at rest in a rectangular tank, another one before a bank (both with a range of 10
+        m), and what the echo models hear in `worlds/tank.sdf`, a copy of that tank. Compare with figure 7.1 of the
+        thesis, which shows its sonar and its simulator."""),
+        pictures.save(
+            "recorded_scans",
+            figure,
+            f"""One turn each, drawn to one scale of metres and one of strengths (0 to {STRONGEST}; the Micron's go
+            up to 255). Last: the strength that half of all samples at a range stay below (thin) and the one that 95
+            % stay below (thick).""",
+        ),
+        prose("""How different the strengths are: for every half metre of range the largest difference between the
+        cumulative histograms (Kolmogorov and Smirnov, 0: alike, 1: nothing in common), and the mean of these. The
+        parameters of `physical` were fitted to the recording's second turn."""),
+        table(
+            ["the recording's first turn compared with", "difference"],
+            [[name, f"{_difference(first, turn):.2f}"] for name, turn in compared.items()],
+        ),
+    )
+
+
+def _turn(beams: List[Beam]) -> Turn:
+    return Turn(np.array([beam.angle for beam in beams]), np.array([beam.intensities for beam in beams]), _REACH)
+
+
+def _in_tank(angles: np.ndarray, model_name: str) -> Turn:
+    """Return what a model hears in worlds/tank.sdf with the parameters of yaml/sonar_simulator_tank.yaml."""
+    parameters = yaml.safe_load((ROOT / "yaml/sonar_simulator_tank.yaml").read_text())
+    caster = RayCaster(load_world(ROOT / "worlds/tank.sdf").world)
+    model = make_echo_model(model_name, parameters[model_name])
+    sonar = Sonar(caster, SonarParameters(**parameters["sonar"]).pattern(), model, np.random.default_rng(1))
+    return Turn(angles, sonar.pings(np.repeat(HEAD_PLACE[np.newaxis], len(angles), axis=0), angles), _REACH)
+
+
+def _difference(one: Turn, other: Turn) -> float:
+    """Return the mean Kolmogorov-Smirnov distance of the strengths in the bands of range, 0 (alike) to 1."""
+    edges = np.rint(_BANDS * one.strengths.shape[1] / _REACH).astype(int)
+    found = []
+    for low, high in zip(edges[:-1], edges[1:]):
+        shares, others = (_shares(turn.strengths[:, low:high]) for turn in (one, other))
+        found.append(np.abs(shares - others).max())
+    return float(np.mean(found))
+
+
+def _shares(strengths: np.ndarray) -> np.ndarray:
+    """Return the share of samples at or below each strength."""
+    return np.cumsum(np.bincount(strengths.ravel(), minlength=256)) / strengths.size
+
+
+def _draw_medians(axes: Axes, turns: Dict[str, Turn]) -> None:
+    for name, turn in turns.items():
+        bands = np.array_split(np.arange(turn.strengths.shape[1]), 40)
+        middles = [(band.mean() + 0.5) * turn.range_resolution for band in bands]
+        half, most = ([np.percentile(turn.strengths[:, band], share) for band in bands] for share in (50, 95))
+        (line,) = axes.plot(middles, most, linewidth=2.0, label=name)
+        axes.plot(middles, half, linewidth=0.8, color=line.get_color())
+    axes.set(title="strengths over range", xlabel="range, m", ylabel="echo strength")
+    axes.legend()

@@ -1,0 +1,172 @@
+"""7.3: the harbour surveyed by stepping the tilt servo, as blocks, and how far these are from its surfaces."""
+
+import itertools
+import math
+from typing import List, Mapping
+
+import numpy as np
+import yaml
+from benchmarks.harness import ROOT
+
+from mlsm_manager.surface_map.blocks import Blocks, BlockType
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry import pose_matrix
+from node_support.health import Health
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
+from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
+from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
+from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
+from sonar_simulator.world.world import Shape, World
+from sonar_simulator.world.world_file import load_world
+from thesis_results.page import joined, prose, table
+from thesis_results.pictures import Pictures, draw_in_space, new_figure
+
+RESOLUTION = 0.5
+_PLACE = (-20.0, 10.0, -2.5)
+"""Of the sonar, m: in the corner of the quays."""
+_SURVEYS = {
+    "short range, 12 m": (2.5, 12.0),
+    "long range, 50 m": (2.5, 50.0),
+    "long range, fan beam of 22 deg": (22.0, 50.0),
+}
+"""Height of the beam [deg] and range [m]."""
+_SEEN_FROM = math.radians(-50.0), math.radians(38.0)  # direction and elevation: over the open side of the harbour
+_PAIRS = 200_000  # of point and triangle at once: bounds the memory
+
+
+def make(pictures: Pictures) -> str:
+    """Return the section."""
+    world = load_world(ROOT / "worlds/harbour.sdf").world
+    found = {name: surveyed(world, *head) for name, head in _SURVEYS.items()}
+    return joined(
+        prose(f"""`sonar_control` steps the tilt servo from -60 to 60 degrees and takes a full scan at each step;
+        the default chain (Otsu, statistical removal) and a map of {RESOLUTION:g} m cells do the rest. The sonar is
+        at ({_PLACE[0]:g}, {_PLACE[1]:g}, {_PLACE[2]:g}) m, in the corner of the quays of `worlds/harbour.sdf`. Compare
+        with figures 7.5 and 7.6 of the thesis: near walls fuse into blocks of their whole height, and far ones are
+        seen as stripes, one for each step of the servo."""),
+        *(_shown(pictures, f"survey_{number}", name, found[name]) for number, name in enumerate(found, start=1)),
+        table(["", *found], _rows(list(found.values()), world)),
+        prose("""Distances are those of the worst of each block's mean, top and bottom from the nearest surface of
+        the world. A fan beam tells nothing about the height of its echoes: see [which head for
+        heights](sonar_control.md#which-head-for-heights)."""),
+    )
+
+
+def surveyed(world: World, opening_deg: float, reach: float) -> Blocks:
+    """Return the blocks of one sweep of the servo in the default steps, through the default chain into a map.
+
+    opening_deg: height of the beam. The rest of the head is that of yaml/sonar_simulator_survey.yaml.
+    """
+    settings: Mapping = yaml.safe_load((ROOT / "yaml/sonar_simulator_survey.yaml").read_text())
+    parameters = SonarParameters.from_mapping({**settings["sonar"], "vertical_opening_deg": opening_deg})
+    model = make_echo_model("laser_cone", {**settings["laser_cone"], "max_range": reach})
+    sonar = Sonar(RayCaster(world), parameters.pattern(), model, np.random.default_rng(1))
+    head, servo = SonarHead(parameters.beams_per_turn, parameters.seconds_per_turn), Servo(ServoParameters())
+    control = TiltScan(SonarControlParameters(), 0.0, servo.command, Health("sonar_control", lambda _: None))
+    assembler, surface_map = ScanAssembler(SonarToCloudParameters()), MultiLevelSurfaceMap(RESOLUTION)
+    threshold, remove = Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())
+    for number in itertools.takewhile(lambda _: not control.sweeps, itertools.count()):
+        time, angle = head.time(number), head.angle(number)
+        tilt = servo.angle(time)
+        control.take_joint(time, tilt)
+        control.take_beam(time, angle)
+        pose = tilted(pose_matrix(_PLACE), tilt)
+        stamp = round(1e9 * (1000.0 + time))
+        beam = Beam(stamp, "sonar", angle, sonar.ping(pose, angle), sonar.range_resolution, tilt)
+        cloud = assembler.add(PlacedBeam(beam, pose, is_moving=False))
+        if cloud is not None:
+            cloud = remove(threshold(cloud))
+            surface_map.insert(cloud.points[cloud.valid])
+    return surface_map.blocks
+
+
+def _shown(pictures: Pictures, file: str, name: str, blocks: Blocks) -> str:
+    figure, ((axes,),) = new_figure(10.0, 6.0)
+    draw_in_space(axes, blocks, *_SEEN_FROM)
+    return pictures.save(
+        file, figure, f"{name.capitalize()}: {len(blocks)} blocks. Light yellow: vertical, red: horizontal."
+    )
+
+
+def _rows(found: List[Blocks], world: World) -> List[List[str]]:
+    errors = [_block_errors(blocks, world) for blocks in found]
+    rows = [
+        [f"{kind.name.lower()} blocks", *(str(np.count_nonzero(blocks.type == kind)) for blocks in found)]
+        for kind in (BlockType.HORIZONTAL, BlockType.VERTICAL)
+    ]
+    rows.append(["highest block", *(f"{blocks.depth.max():.1f} m" for blocks in found)])
+    for name, quantile in (("median", 0.5), ("95 % are below", 0.95)):
+        rows.append([f"distance from the surfaces, {name}", *(f"{np.quantile(one, quantile):.2f} m" for one in errors)])
+    rows.append(["blocks within one cell", *(f"{100.0 * np.mean(one <= RESOLUTION):.1f} %" for one in errors)])
+    return rows
+
+
+def _block_errors(blocks: Blocks, world: World) -> np.ndarray:
+    """Return (n,) the distance [m] from the world's surfaces of the worst of each block's mean, top and bottom."""
+    middle = blocks.mean[:, :3]
+    top, bottom = middle.copy(), middle.copy()
+    top[:, 2], bottom[:, 2] = blocks.height, blocks.bottom
+    return np.max([distances(world, points) for points in (middle, top, bottom)], axis=0)
+
+
+def distances(world: World, points: np.ndarray) -> np.ndarray:
+    """Return (n,) distances [m] of points (n, 3) from the nearest surface, which may be seen from inside or outside."""
+    return np.min([_distance(shape, points) for shape in world.shapes], axis=0)
+
+
+def _distance(shape: Shape, points: np.ndarray) -> np.ndarray:
+    if shape.kind == "mesh":
+        vertices, faces = shape.triangles()
+        return triangle_distances(vertices[faces], points)
+    local = (points - shape.pose[:3, 3]) @ shape.pose[:3, :3]
+    if shape.kind == "sphere":
+        return np.abs(np.linalg.norm(local, axis=1) - shape.size[0])
+    if shape.kind == "cylinder":
+        radius, length = shape.size
+        beyond = np.column_stack([np.hypot(local[:, 0], local[:, 1]) - radius, np.abs(local[:, 2]) - length / 2.0])
+    else:
+        beyond = np.abs(local) - np.array(shape.size) / 2.0
+    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
+    return np.where(beyond.max(axis=1) > 0.0, outside, -beyond.max(axis=1))
+
+
+def triangle_distances(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return (n,) distances [m] of points (n, 3) from the nearest of the triangles with `corners` (m, 3, 3)."""
+    step = max(1, _PAIRS // max(len(corners), 1))
+    parts = [points[start : start + step] for start in range(0, len(points), step)]
+    return np.concatenate([np.empty(0), *(_nearest(corners, part) for part in parts)])
+
+
+def _nearest(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    from_edges = [_from_segments(corners[:, a], corners[:, b], points) for a, b in ((0, 1), (1, 2), (2, 0))]
+    return np.minimum(np.min(from_edges, axis=(0, 2)), _from_faces(corners, points).min(axis=1))
+
+
+def _from_segments(start: np.ndarray, end: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return (n, m) distances of points from segments."""
+    along = end - start
+    lengths = np.maximum((along**2).sum(axis=1), np.finfo(np.float64).tiny)
+    offset = points[:, np.newaxis] - start
+    share = np.clip(np.einsum("nmi,mi->nm", offset, along) / lengths, 0.0, 1.0)
+    return np.linalg.norm(offset - share[..., np.newaxis] * along, axis=2)
+
+
+def _from_faces(corners: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return (n, m) distances from the triangles' planes, infinite where the foot lies beside the triangle."""
+    first, second = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    normal = np.cross(first, second)
+    squared = (normal**2).sum(axis=1)
+    has_area = squared > 0.0
+    squared = np.where(has_area, squared, 1.0)
+    offset = points[:, np.newaxis] - corners[:, 0]
+    v = np.einsum("nmi,mi->nm", np.cross(offset, second), normal) / squared
+    w = np.einsum("nmi,mi->nm", np.cross(first, offset), normal) / squared
+    height = np.abs(np.einsum("nmi,mi->nm", offset, normal)) / np.sqrt(squared)
+    return np.where(has_area & (v >= 0.0) & (w >= 0.0) & (v + w <= 1.0), height, np.inf)
