@@ -10,8 +10,7 @@ from typing import Dict, Type
 from dead_reckoning.parameters import DeadReckoningParameters
 from imagenex_852_driver.emulator.parameters import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import profile_yaml
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table

@@ -11,7 +11,7 @@ from benchmarks.harness import benchmark_parser
 from benchmarks.paths import live_figures, solved_live
 from benchmarks.twin_conditions import TwinParameters, lasting, reported
 from benchmarks.twin_water import RESOLUTION, Water, heard, water_of
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track

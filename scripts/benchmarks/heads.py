@@ -11,7 +11,7 @@ from benchmarks.harness import benchmark_parser
 from benchmarks.paths import PathFigures, batch_figures, live_figures, solved_live
 from benchmarks.scans import KINDS
 from benchmarks.tours import Tour, simulated
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.echo_shape import EchoShape
 
 

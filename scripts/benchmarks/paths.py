@@ -7,8 +7,7 @@ import numpy as np
 from mlsm_manager.joint_solver.motion.odometry_motion import as_complex
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.solve.way_batch import solved_best
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.odometry_kind import with_odometry
@@ -76,7 +75,7 @@ def live_figures(solver: LiveSolver, truth: Truth, is_judged: Truth = lambda tim
 
 def batch_figures(solver: LiveSolver, truth: Truth) -> Tuple[PathFigures, BatchResult]:
     """Return those of the whole run fitted afterwards, and the fit."""
-    batch = solved_best(solver)
+    batch = fitted(solver)
     path = solver.log.node_poses(np.arange(len(batch.state.nodes)))[1:, :2] + batch.state.nodes[1:, :2]
     return _judged(path, _aligned(solver, truth), batch.pose_covariances[1:, :2, :2]), batch
 

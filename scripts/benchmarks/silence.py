@@ -15,7 +15,7 @@ from benchmarks.harness import benchmark_parser, recorded
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TwinParameters, reported
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
 from mlsm_manager.offline.recording import Recording

@@ -10,7 +10,7 @@ from benchmarks.harness import benchmark_parser
 from benchmarks.paths import batch_figures, live_figures, solved_live
 from benchmarks.tours import Tour, simulated
 from benchmarks.twin_conditions import TwinParameters, reported
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track

@@ -176,3 +176,14 @@ def test_folders_do_not_import_each_other_in_a_circle():
             targets = {_folder(_path_of(target)) for target in _imported_modules(path)}
             imports.setdefault(folder, set()).update(targets - {folder})
     assert _circles(imports) == []
+
+
+def test_only_the_table_of_odometry_profiles_imports_the_optional_folder_hovering():
+    importing = {
+        name
+        for package in ALLOWED
+        for name, path in _modules(package).items()
+        if any(target.startswith("mlsm_manager.hovering") for target in _imported_modules(path))
+    }
+    outside = {name for name in importing if not name.startswith("mlsm_manager.hovering")}
+    assert outside == {"mlsm_manager.localisation.odometry_profiles"}

@@ -1,7 +1,11 @@
 """Parameters of the joint solver. Every default describes a sensor or a method and gives its reason, none a place."""
 
 from dataclasses import dataclass, field
+from typing import Dict, Mapping, Optional, Protocol
 
+import numpy as np
+
+from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
@@ -104,11 +108,32 @@ class SolverWindow(ParameterSet):
     )  # fmt: skip
 
 
+class NodeSearch(Protocol):
+    """Finds the newest nodes where only echoes tell the motion within a turn. Each scan makes another one."""
+
+    @property
+    def variance(self) -> float:
+        """How far the places differ that it takes for possible [m^2], in the direction in which they differ most."""
+
+    def followed(self, log: RunLog, parameters: "MultiViewParameters") -> "NodeSearch":
+        """Return the search after all scans of `log`, the first of which are those followed before."""
+
+    def placed(self, log: RunLog, nodes: np.ndarray, parameters: "MultiViewParameters", is_told: bool) -> np.ndarray:
+        """Return the newest of `nodes` (n, width) at their likeliest places. is_told: the first one's place was."""
+
+    def stored(self) -> Dict[str, np.ndarray]:
+        """Return what `resumed` needs besides the log, as arrays by name."""
+
+    def resumed(self, log: RunLog, parameters: "MultiViewParameters", stored: Mapping[str, np.ndarray]) -> "NodeSearch":
+        """Return the search after all scans of `log`, which `stored` it then. Raises ValueError, KeyError."""
+
+
 @dataclass(frozen=True)
 class MultiViewParameters:
     """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters.
 
-    kernel: what compares ways of the vehicle.
+    kernel: what compares points with surfaces. node_search: what finds the nodes of parts of a turn; None where the
+    odometry reports distances.
     """
 
     odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
@@ -116,3 +141,4 @@ class MultiViewParameters:
     matching: SurfaceMatching = SurfaceMatching()
     window: SolverWindow = SolverWindow()
     kernel: SolverKernel = SolverKernel.NUMPY
+    node_search: Optional[NodeSearch] = None

@@ -27,10 +27,8 @@ class SolverKernel(Enum):
             prepare_cache()
             import mlsm_manager.joint_solver.compiled.compiled_cells
             import mlsm_manager.joint_solver.compiled.compiled_places
-            import mlsm_manager.joint_solver.compiled.compiled_pulls
             import mlsm_manager.joint_solver.compiled.compiled_search
             import mlsm_manager.joint_solver.compiled.compiled_sums
-            import mlsm_manager.joint_solver.compiled.compiled_ways
             import mlsm_manager.joint_solver.compiled.compiled_weights  # noqa: F401
         except ImportError:
             if self is SolverKernel.NUMBA:

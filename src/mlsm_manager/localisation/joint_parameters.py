@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
 from mlsm_manager.joint_solver.solver_kernel import SolverKernel
-from mlsm_manager.localisation.odometry_choice import OdometryChoice, OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterError, parameter
@@ -78,7 +78,7 @@ class JointParameters(OdometryChoice):
         if self.odometry is OdometryKind.NONE and self.scan_parts > 1:
             raise ParameterError(
                 f"scan_parts = {self.scan_parts}: must be 1 with odometry = NONE, because parts of turns are placed "
-                "by ways that need a heading"
+                "by particles that need a heading"
             )
 
     def longest_turn(self, errors: OdometryErrors) -> float:
@@ -107,6 +107,7 @@ class JointParameters(OdometryChoice):
             matching=self._matching(),
             window=self._window(odometry.distance_deviation),
             kernel=self.solver_kernel.resolved,
+            node_search=self.node_search(self.scan_parts),
         )
 
     def _matching(self) -> SurfaceMatching:

@@ -10,12 +10,12 @@ from typing import Dict, List, Optional
 import numpy as np
 from tqdm import tqdm
 
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
 from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.findings import Found
-from mlsm_manager.offline.odometry_kind import OdometryFound, odometry_of, with_odometry
+from mlsm_manager.offline.odometry_kind import OdometryFound, may_strafe, odometry_of, with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine
 from mlsm_manager.offline.refitting import refitted_verdicts
@@ -23,7 +23,6 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED, FURTHER_COLORS, ODOMETRY, REFINED, Run
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
-from mlsm_manager.offline.strafing import may_strafe, strafes
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict

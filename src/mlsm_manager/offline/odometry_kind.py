@@ -1,18 +1,21 @@
 """Which odometry a recording holds, told from what it reports."""
 
-from typing import Collection, NamedTuple
+from typing import Collection, NamedTuple, Optional
 
 import numpy as np
 
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.continuity import scans_go_on
 
-_STANDS = (
-    0.05  # m: a reported position that stays within this never changed; rounding, and lever arms of a tilting base
-)
+_STANDS = 0.05  # m: a position that moves by less never changed, but for rounding and lever arms of a tilting base
 _TURNS = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more
+_WORTH_TRYING = 0.75
+"""Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
+strafing ones 0.57 and 0.66."""
 
 
 class OdometryFound(NamedTuple):
@@ -39,3 +42,11 @@ def odometry_of(track: Track) -> OdometryFound:
 def with_odometry(parameters: ReplayParameters, kind: OdometryKind, fixed: Collection[str]) -> ReplayParameters:
     """Return `parameters` with the profile of an odometry, but for those that are `fixed`."""
     return parameters.changed({key: value for key, value in profile_values(kind).items() if key not in fixed})
+
+
+def may_strafe(ahead: Optional[LiveSolver]) -> bool:
+    """Return whether scans do not go on in the run of a solver that expects the vehicle to go ahead."""
+    if ahead is None:
+        return False
+    shares = shares_heard_before(ahead.log, ahead.odometry, ahead.state, ahead.parameters.matching, 0)
+    return scans_go_on(ahead.log.node_times[1:], shares, _WORTH_TRYING).fires

@@ -8,10 +8,10 @@ import numpy as np
 from mlsm_manager.joint_solver.placing.path import solved_path
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.solve.way_batch import solved_best
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
@@ -37,7 +37,7 @@ class Refined:
 
 def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
     """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
-    closing = closed(solver, solved_best(solver))
+    closing = closed(solver, fitted(solver))
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(Cloud.of_scan(scan))

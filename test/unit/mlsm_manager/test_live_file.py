@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import MapInput
 from mlsm_manager.offline.live_file import NODES, live_text, live_values, replay_values, write_live
 from mlsm_manager.offline.replay_parameters import ReplayParameters

@@ -2,7 +2,7 @@
 
 import pytest
 
-from mlsm_manager.localisation.odometry_choice import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
 from recordings.motion.vehicle_motion import MotionSource
 

@@ -5,8 +5,7 @@ import pytest
 import yaml
 
 from dead_reckoning.parameters import DeadReckoningParameters
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import PROFILES, profile_values, profile_yaml
+from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, profile_values, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.live_file import replay_values

@@ -14,8 +14,7 @@ from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import Layout
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Track

@@ -6,8 +6,7 @@ from made_compass import with_heading_only
 from made_harbour import SONAR_IN_BASE, TURN, ahead, tour
 
 from mlsm_manager.localisation.clouds import Cloud
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 
 pytestmark = pytest.mark.long

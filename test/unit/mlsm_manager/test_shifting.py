@@ -8,20 +8,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_harbour import CANAL, SONAR_IN_BASE, along_canal, tour
 
-from mlsm_manager.joint_solver.judge.missed_echoes import MissedEchoes
-from mlsm_manager.joint_solver.shifting.echo_agreement import agreement, shift_gains
-from mlsm_manager.joint_solver.shifting.shift_search import ShiftSearch
-from mlsm_manager.joint_solver.shifting.stretched_mean import stretched_mean
+from mlsm_manager.hovering.echoes import Echoes
+from mlsm_manager.hovering.particle_filter import on_path
+from mlsm_manager.hovering.particle_weights import likelihoods_of, nearby_of
+from mlsm_manager.hovering.particles import Particles
+from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
+from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
 from mlsm_manager.joint_solver.solve.batch_solver import settled
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
-from mlsm_manager.joint_solver.ways.way_comparisons import nats_of
-from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
-from mlsm_manager.joint_solver.ways.way_nodes import on_path
-from mlsm_manager.joint_solver.ways.ways import Ways
 from mlsm_manager.localisation.joint_parameters import EstimatorName
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 
@@ -37,16 +33,16 @@ def heard(path, far=25.0):
     """Return what a vehicle hears of wall and posts, each scan all at once in the middle between its nodes."""
     parts = []
     for scan, place in enumerate((path[:-1] + path[1:]) / 2.0):
-        for places, is_lone in ((WALL, False), (POSTS, True)):
+        for places, is_post in ((WALL, False), (POSTS, True)):
             arms = places[np.hypot(*(places - place).T) < far] - place
             count = len(arms)
             parts.append(
-                WayEchoes(
+                Echoes(
                     np.full(count, scan), arms, np.full(count, 0.5), np.tile([0.0, 1.0], (count, 1)),
-                    np.full(count, 3.0 if is_lone else 0.4), np.full(count, is_lone),
+                    np.full(count, 3.0 if is_post else 0.4), np.full(count, is_post),
                 )
             )  # fmt: skip
-    return WayEchoes.joined(parts)
+    return Echoes.joined(parts)
 
 
 HEARD = heard(TRUE)
@@ -63,10 +59,10 @@ def test_a_path_is_worth_what_its_scans_are_worth_one_after_the_other(seed):
     path = TRUE + np.random.RandomState(seed).normal(0.0, 1.0, TRUE.shape)
     total = 0.0
     for scan in range(1, SCANS):
-        way = Ways(path[np.newaxis, : scan + 2], np.zeros((1, 2)), np.zeros(1))
+        particle = Particles(path[np.newaxis, : scan + 2], np.zeros((1, 2)), np.zeros(1))
         own, earlier = (HEARD.selected(np.flatnonzero(some)) for some in (HEARD.nodes == scan, HEARD.nodes < scan))
-        total += float(nats_of(way, own, earlier, SolverKernel.NUMPY)[0])
-    assert agreement(HEARD, path) == pytest.approx(total)
+        total += float(likelihoods_of(particle, own, nearby_of(particle, own, earlier))[0])
+    assert log_likelihood(HEARD, path) == pytest.approx(total)
 
 
 @given(st.integers(1, SCANS - 1), st.integers(-20, 20))
@@ -75,7 +71,7 @@ def test_a_gain_is_what_the_shifted_path_is_worth_more(scan, length):
     # What is heard just at a node moves as that node does.
     at_nodes = replace(HEARD, shares=np.zeros(len(HEARD)))
     gains = shift_gains(at_nodes, TRUE, ALONG, np.array([-20.0, length, 20.0]))
-    expected = agreement(at_nodes, stray(scan, length)) - agreement(at_nodes, TRUE)
+    expected = log_likelihood(at_nodes, stray(scan, length)) - log_likelihood(at_nodes, TRUE)
     assert gains[scan, 1] == pytest.approx(expected)
 
 
@@ -87,21 +83,21 @@ def test_the_greatest_gain_takes_back_what_went_wrong():
 
 
 def test_on_the_true_path_nothing_is_missed():
-    assert MissedEchoes(HEARD, 1).nats(TRUE) == 0.0
+    assert MissedPosts(HEARD, 1).cost(TRUE) == 0.0
 
 
 def test_a_post_that_was_passed_unheard_is_missed():
     post = heard(TRUE[:2]).selected(np.array([-1]))
-    assert post.lone.all()
-    wall = HEARD.selected(np.flatnonzero(~HEARD.lone))
-    missed = MissedEchoes(WayEchoes.joined([wall, post]), 1).nats(TRUE)
-    assert 1.0 < missed < post.nats.sum()
+    assert post.post.all()
+    wall = HEARD.selected(np.flatnonzero(~HEARD.post))
+    missed = MissedPosts(Echoes.joined([wall, post]), 1).cost(TRUE)
+    assert 1.0 < missed < post.weights.sum()
 
 
 def test_a_post_behind_a_wall_is_not_missed():
     behind = replace(heard(TRUE[:2]).selected(np.array([-1])), arms=np.array([[0.0, 20.0]]))
-    near = HEARD.selected(np.flatnonzero(~HEARD.lone & (HEARD.nodes > 0)))
-    assert MissedEchoes(WayEchoes.joined([near, behind]), 1).nats(TRUE) == 0.0
+    near = HEARD.selected(np.flatnonzero(~HEARD.post & (HEARD.nodes > 0)))
+    assert MissedPosts(Echoes.joined([near, behind]), 1).cost(TRUE) == 0.0
 
 
 def test_paths_that_went_wrong_twice_are_led_back():
@@ -109,7 +105,7 @@ def test_paths_that_went_wrong_twice_are_led_back():
     search = ShiftSearch(HEARD, TURN * np.arange(SCANS + 1.0), 1, refit=lambda path: path)
     best = search.climbed([wrong])[0]
     assert np.hypot(*(best.path - TRUE).T).mean() < 1.5
-    assert best.nats > search.judged(wrong).nats + 10.0
+    assert best.log_likelihood > search.judged(wrong).log_likelihood + 10.0
 
 
 def test_a_path_that_is_too_short_becomes_longer():
@@ -117,7 +113,7 @@ def test_a_path_that_is_too_short_becomes_longer():
     search = ShiftSearch(HEARD, TURN * np.arange(SCANS + 1.0), 1, refit=lambda path: path)
     found = stretched_mean(search, short)
     assert np.hypot(*(found.path - TRUE).T).mean() < 0.5 * np.hypot(*(short - TRUE).T).mean()
-    assert found.nats > search.judged(short).nats
+    assert found.log_likelihood > search.judged(short).log_likelihood
 
 
 def test_a_path_stays_where_fits_of_it_go_wrong():
@@ -134,7 +130,7 @@ def test_shifts_that_no_vehicle_goes_are_not_tried():
 def test_a_run_that_heard_nothing_stays_as_it_is():
     search = ShiftSearch(HEARD.selected(np.empty(0, dtype=int)), TURN * np.arange(SCANS + 1.0), 1, lambda path: path)
     best = search.climbed([TRUE])[0]
-    assert (best.nats, best.path is TRUE) == (0.0, True)
+    assert (best.log_likelihood, best.path is TRUE) == (0.0, True)
 
 
 def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():

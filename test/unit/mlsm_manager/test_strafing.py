@@ -5,12 +5,10 @@ import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
 
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.solve.way_batch import solved_best
 from mlsm_manager.localisation.joint_parameters import EstimatorName
-from mlsm_manager.localisation.odometry_choice import OdometryKind
-from mlsm_manager.localisation.odometry_profiles import profile_values
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted, profile_values, strafes
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.offline.strafing import may_strafe, strafes
+from mlsm_manager.offline.odometry_kind import may_strafe
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.errors import RefusedInput
 
@@ -81,7 +79,7 @@ def test_a_short_run_does_not_tell(ahead):
 
 def test_refined_it_is_as_near_as_echoes_tell():
     solver = followed(OdometryKind.HOVERING, MADE.scans[:5])
-    fit = solved_best(solver)
+    fit = fitted(solver)
     places = solver.log.node_poses(np.arange(len(fit.node_times)))[:, :2] + fit.state.nodes[:, :2]
     true = MADE.truth.at(fit.node_times)[:, :2]
     assert np.hypot(*(places - places[0] - true + true[0]).T).mean() < 0.7

@@ -20,8 +20,6 @@ from mlsm_manager.joint_solver.solve.live_window import LiveWindow
 from mlsm_manager.joint_solver.solve.solved_nodes import SolvedNodes
 from mlsm_manager.joint_solver.solve.stacking import stacked, unstacked
 from mlsm_manager.joint_solver.unknowns.state import RUN_COLUMNS, State
-from mlsm_manager.joint_solver.ways.way_nodes import nodes_on_ways
-from mlsm_manager.joint_solver.ways.way_search import WaySearch, needs_ways
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
@@ -57,7 +55,7 @@ class LiveSolver:
         self._start, self._known = start, known
         self.islands = Islands(np.empty(0))
         self.search: Optional[Whereabouts] = None
-        self._ways = WaySearch(parameters) if needs_ways(self.odometry, parameters.matching) else None
+        self._by_parts = parameters.node_search
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
@@ -67,7 +65,7 @@ class LiveSolver:
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             "islands": self.islands.numbers,
-            **({} if self._ways is None else self._ways.stored()),
+            **({} if self._by_parts is None else self._by_parts.stored()),
             **stacked(self.estimates, _ESTIMATE),
         }
 
@@ -96,7 +94,8 @@ class LiveSolver:
             solver._append(scan)
         solver._nodes.restore(stored, solver.log.scan_count)
         solver.islands = Islands(stored["islands"])
-        solver._ways = None if solver._ways is None else solver._ways.resumed(solver.log, stored)
+        if solver._by_parts is not None:
+            solver._by_parts = solver._by_parts.resumed(solver.log, parameters, stored)
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
         for name, found in (("estimates", solver.estimates), ("islands", stored["islands"])):
             if len(found) != solver.log.scan_count:
@@ -116,7 +115,7 @@ class LiveSolver:
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
-        scans, before, ways = self.log.scan_count, self.state.copy(), self._ways
+        scans, before, by_parts = self.log.scan_count, self.state.copy(), self._by_parts
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self._append(scan)
@@ -126,7 +125,7 @@ class LiveSolver:
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
             self._nodes.take_back(before)
-            self._ways = ways
+            self._by_parts = by_parts
             self._shorten(scans)
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
@@ -173,7 +172,7 @@ class LiveSolver:
         first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
         newest = misfit_variances(self.log, self.odometry, self.state, self.parameters.matching, first)
         self._nodes.misfits.replace_from(first, newest)
-        return float(self._nodes.misfits.values.sum()) + (0.0 if self._ways is None else self._ways.variance)
+        return float(self._nodes.misfits.values.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
 
     def _fitted(self) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution."""
@@ -214,11 +213,11 @@ class LiveSolver:
             self._search_beside_scan_before(covariance)
 
     def _search_by_parts(self) -> None:
-        """Put the newest nodes onto the ways that are believed most."""
-        if self._ways is not None:
-            self._ways = self._ways.followed(self.log)
+        """Put the newest nodes where the search for nodes finds them likeliest."""
+        if self._by_parts is not None:
+            self._by_parts = self._by_parts.followed(self.log, self.parameters)
             is_told = self._known is not None or self._start is not None
-            self._nodes.replace_newest(nodes_on_ways(self._ways, self.log, self.state.nodes, self.parameters, is_told))
+            self._nodes.replace_newest(self._by_parts.placed(self.log, self.state.nodes, self.parameters, is_told))
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""

@@ -9,11 +9,10 @@ from typing import Callable, Iterator, List, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.judge.missed_echoes import MissedEchoes
-from mlsm_manager.joint_solver.shifting.echo_agreement import agreement, shift_gains
-from mlsm_manager.joint_solver.ways.way_echoes import WayEchoes
+from mlsm_manager.hovering.echoes import Echoes
+from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 
-_REACH, _STEP = 40.0, 1.0  # m: shifts that are weighed; a lone echo tells to about a metre
+_REACH, _STEP = 40.0, 1.0  # m: shifts that are weighed; a post tells to about a metre
 _ANY, _SMALL = (1.0, _REACH), (2.0, 7.0)  # m: far ones reach another place, small ones climb where far ones fit nothing
 _WEIGHED_ANY, _WEIGHED_SMALL = 15, 25  # of which what is missed is weighed too
 _FITTED = 6  # the best of these are fitted
@@ -24,7 +23,9 @@ _OTHER = 0.7  # m in the mean from which on paths differ
 _FASTEST = 1.2  # m/s: no vehicle of this kind goes faster
 _ROUNDS = 12  # at most
 _PATIENCE = 2  # rounds in which the best path hardly becomes better
-_GAIN = 0.5  # nats that count as better
+_GAIN = 0.5  # of log likelihood that counts as better
+_STRETCHES = np.linspace(-0.1, 0.1, 11)  # of the path; fits of basins agree about as well over a twentieth
+_REFITS = 2  # the first undoes much of what a stretch does wrong
 
 Refit = Callable[[np.ndarray], np.ndarray]
 """Takes a path (k, 2) through all nodes, returns the one near it on which the scans fit."""
@@ -32,28 +33,28 @@ Refit = Callable[[np.ndarray], np.ndarray]
 
 @dataclass(frozen=True)
 class JudgedPath:
-    """path: (k, 2) m in map, through all nodes. nats: how much the run's echoes speak for it."""
+    """path: (k, 2) m in map, through all nodes. log_likelihood: of the run's echoes on it."""
 
     path: np.ndarray
-    nats: float
+    log_likelihood: float
 
 
 @dataclass(frozen=True)
 class ShiftSearch:
     """echoes: of all scans, the nodes of which count from 0. times: (k,) s of the nodes. parts: scans per turn."""
 
-    echoes: WayEchoes
+    echoes: Echoes
     times: np.ndarray
     parts: int
     refit: Refit
-    _missed: MissedEchoes = field(init=False)
+    _missed: MissedPosts = field(init=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "_missed", MissedEchoes(self.echoes, self.parts))
+        object.__setattr__(self, "_missed", MissedPosts(self.echoes, self.parts))
 
     def judged(self, path: np.ndarray) -> JudgedPath:
-        """Return a path (k, 2) with how much the echoes speak for it: those that agree less those that are missed."""
-        return JudgedPath(path, agreement(self.echoes, path) - self._missed.nats(path))
+        """Return a path (k, 2) with its log likelihood: of the echoes that agree, less what is missed."""
+        return JudgedPath(path, log_likelihood(self.echoes, path) - self._missed.cost(path))
 
     def climbed(self, starts: Sequence[np.ndarray]) -> List[JudgedPath]:
         """Return the best paths that were found from `starts`, each (k, 2), the best first."""
@@ -64,7 +65,7 @@ class ShiftSearch:
             new = [one for one in found if not any(_as_good(other, one) for other in tried)]
             tried += new
             better = _distinct(found + [other for one in new for other in self._neighbours(one)])
-            idle = 0 if better[0].nats > found[0].nats + _GAIN else idle + 1
+            idle = 0 if better[0].log_likelihood > found[0].log_likelihood + _GAIN else idle + 1
             found = better
             if idle >= _PATIENCE:
                 break
@@ -72,8 +73,8 @@ class ShiftSearch:
 
     def least_known_axis(self) -> np.ndarray:
         """Return the direction (2,) that the surfaces of the run tell least of."""
-        worth = self.echoes.nats * ~self.echoes.lone
-        known = np.einsum("n,na,nb->ab", worth, self.echoes.normals, self.echoes.normals)
+        weights = self.echoes.weights * ~self.echoes.post
+        known = np.einsum("n,na,nb->ab", weights, self.echoes.normals, self.echoes.normals)
         return np.linalg.eigh(known)[1][:, 0]
 
     def _neighbours(self, start: JudgedPath) -> Iterator[JudgedPath]:
@@ -91,7 +92,7 @@ class ShiftSearch:
         gains = shift_gains(self.echoes, path, axis, lengths)
         options = _chosen(gains, lengths, _ANY, _WEIGHED_ANY, [])
         options = _chosen(gains, lengths, _SMALL, _WEIGHED_SMALL, options)
-        missed = [self._missed.nats(self._shifted(path, scan, lengths[n] * axis, 2)) for scan, n in options]
+        missed = [self._missed.cost(self._shifted(path, scan, lengths[n] * axis, 2)) for scan, n in options]
         promise = np.array([gains[option] for option in options]) - missed
         for number in np.argsort(-promise, kind="stable")[:_FITTED]:
             scan, length = options[number]
@@ -134,7 +135,7 @@ def _forget(gains: np.ndarray, lengths: np.ndarray, scan: int, number: int) -> N
 def _distinct(paths: List[JudgedPath]) -> List[JudgedPath]:
     """Return the best of `paths`, a few, that differ from each other; the best first."""
     kept: List[JudgedPath] = []
-    for one in sorted(paths, key=lambda path: -path.nats):
+    for one in sorted(paths, key=lambda path: -path.log_likelihood):
         if not any(_alike(one, other) for other in kept):
             kept.append(one)
         if len(kept) == _KEPT:
@@ -148,4 +149,25 @@ def _alike(one: JudgedPath, other: JudgedPath) -> bool:
 
 def _as_good(known: JudgedPath, one: JudgedPath) -> bool:
     """Return whether `one` is about the same path as a `known` one, and hardly better."""
-    return _alike(known, one) and one.nats < known.nats + _GAIN
+    return _alike(known, one) and one.log_likelihood < known.log_likelihood + _GAIN
+
+
+def stretched_mean(search: ShiftSearch, path: np.ndarray) -> JudgedPath:
+    """Return the mean of the fits that begin at `path` (k, 2) [m] made longer and shorter, or `path` if it is better.
+
+    Each fit counts as its echoes speak for it. A fit makes paths shorter, since echoes that lie closer together agree
+    more often. The best fit is then at one end of those that agree about as well; the mean has the smaller error.
+    """
+    axis = search.least_known_axis()
+    along = np.outer((path - path[0]) @ axis, axis)
+    fits = [_refitted(search, path + stretch * along) for stretch in _STRETCHES]
+    likelihoods = np.array([fit.log_likelihood for fit in fits])
+    shares = np.exp(likelihoods - likelihoods.max())
+    mean = np.einsum("n,nka->ka", shares / shares.sum(), np.array([fit.path for fit in fits]))
+    return max(search.judged(path), search.judged(mean), key=lambda one: one.log_likelihood)
+
+
+def _refitted(search: ShiftSearch, path: np.ndarray) -> JudgedPath:
+    for _ in range(_REFITS):
+        path = search.refit(path)
+    return search.judged(path)

@@ -1,0 +1,1 @@
+"""For vehicles that stop and strafe with a compass alone: a particle filter, and afterwards a search over paths."""

@@ -1,0 +1,101 @@
+"""Fits a whole run from several paths that the vehicle may have gone, and keeps the likeliest fit."""
+
+from dataclasses import replace
+from typing import List
+
+import numpy as np
+
+from mlsm_manager.hovering.echoes import Echoes
+from mlsm_manager.hovering.particle_filter import ParticleFilter, on_path
+from mlsm_manager.hovering.path_agreement import log_likelihood
+from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
+from mlsm_manager.joint_solver.placing.estimate import misfit_covariance
+from mlsm_manager.joint_solver.placing.path import NodePath
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, settled, solved
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import State
+
+_FILTERS = 3  # besides the live one: one of three or four loses a simulated tour now and then
+_ALL_TURNS = 200  # that particles reach back: all of a run of 50 minutes
+_LIKELY = 20.0  # of log likelihood, by which a fit must be worse to count e times less, since neighbours share errors
+_LONGEST_SHIFTED = 60  # turns, about 15 minutes: the time that shifts take grows with their square
+_CLEARLY = 3.0  # of log likelihood, by which shifted paths must be better than the best fit before, or it is kept
+_STRAFES = (
+    1.05  # times the likelihood: 1.01 on tours ahead, where the wider profile fits noise; 1.25 and more on others
+)
+
+
+def solved_best(live: LiveSolver) -> BatchResult:
+    """Return the fit of all scans that `live` has taken: from where it found them, and from paths found anew.
+
+    Places that differ between fits that are about as likely are uncertain by as much.
+    """
+    fits = [solved(live), *(solved(live, start=_found(live, seed)) for seed in range(1, _FILTERS + 1))]
+    search = _shift_search(live)
+    likelihoods = [search.judged(_path(live, fit.state)).log_likelihood for fit in fits]
+    for better in _shifted(live, search, fits, max(likelihoods) + _CLEARLY):
+        fits.append(better)
+        likelihoods.append(search.judged(_path(live, better.state)).log_likelihood)
+    return _best(live, fits, np.array(likelihoods))
+
+
+def strafes(ahead: LiveSolver, strafing: LiveSolver) -> bool:
+    """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans."""
+    times = strafing.log.node_times
+    echoes = Echoes.of_run(strafing.log, strafing.odometry, strafing.parameters)
+    one, other = (log_likelihood(echoes, _path_at(solver, times)) for solver in (ahead, strafing))
+    return other > _STRAFES * one
+
+
+def _found(live: LiveSolver, seed: int) -> State:
+    """Return the unknowns on the likeliest path that a particle filter of the whole run finds."""
+    found = ParticleFilter(seed=seed, remembered_turns=_ALL_TURNS).followed(live.log, live.parameters)
+    return _on_path(live, found.particles.most_likely())
+
+
+def _shift_search(live: LiveSolver) -> ShiftSearch:
+    log, parameters = live.log, live.parameters
+    echoes = Echoes.of_run(log, parameters.odometry, parameters)
+
+    def refit(path: np.ndarray) -> np.ndarray:
+        return _path(live, settled(live, _on_path(live, path)))
+
+    return ShiftSearch(echoes, log.node_times.copy(), parameters.matching.scan_parts, refit)
+
+
+def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], least: float) -> List[BatchResult]:
+    """Return fits from paths that shifts of those of `fits` lead to, none if none has a log likelihood of `least`."""
+    if live.log.scan_count > _LONGEST_SHIFTED * live.parameters.matching.scan_parts:
+        return []
+    climbed = search.climbed([_path(live, fit.state) for fit in fits])
+    if climbed[0].log_likelihood < least:
+        return []
+    best = [stretched_mean(search, climbed[0].path), *climbed[1:]]
+    starts = [_on_path(live, one.path) for one in best]
+    return [solved(live, start=start, told=start) for start in starts]
+
+
+def _on_path(live: LiveSolver, path: np.ndarray) -> State:
+    """Return the unknowns of `live` with its newest nodes on `path` (k, 2) [m] in map."""
+    start = live.state.copy()
+    newest = np.arange(len(start.nodes) - len(path), len(start.nodes))
+    start.nodes[newest] = on_path(start.nodes[newest], path, live.log.node_motion(newest))
+    return start
+
+
+def _path(live: LiveSolver, state: State) -> np.ndarray:
+    """Return where the nodes are (n, 2) [m] in map."""
+    return live.log.node_poses(np.arange(len(state.nodes)))[:, :2] + state.nodes[:, :2]
+
+
+def _path_at(live: LiveSolver, times: np.ndarray) -> np.ndarray:
+    """Return where the vehicle was (n, 2) [m] in map at `times` (n,) [s]."""
+    return NodePath(live.odometry, live.log.odometry, live.log.node_times, live.state.nodes).at(times)[:, :2]
+
+
+def _best(live: LiveSolver, fits: List[BatchResult], likelihoods: np.ndarray) -> BatchResult:
+    paths, best = np.array([_path(live, fit.state) for fit in fits]), int(np.argmax(likelihoods))
+    shares = np.exp((likelihoods - likelihoods.max()) / _LIKELY)
+    apart = ((paths - paths[best]) ** 2).sum(axis=2) / 2.0
+    spread = (shares[:, np.newaxis] * apart).sum(axis=0) / shares.sum()
+    return replace(fits[best], pose_covariances=fits[best].pose_covariances + misfit_covariance(spread))
