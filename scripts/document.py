@@ -17,12 +17,12 @@ from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
 from ping360_driver.emulator.parameters import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemoverParameters
 from sonar_processing.filters.threshold import ThresholderParameters
 from sonar_processing.scans.image import SonarImageParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
-from sonar_processing.servo.tilt_scan import SonarControlParameters
+from sonar_processing.scans.tilt_scan import SonarControlParameters
 from sonar_processing.shapes.circles import CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetectorParameters
 from sonar_simulator.default_yaml import gazebo_sonar_yaml, simulator_yaml

@@ -16,8 +16,7 @@ from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 
 LENGTH, WIDTH = 200.0, 20.0  # m of the canal, which goes along +x from x = 0
 _BASIN = np.array([70.0, 60.0])  # m, length and width of each basin

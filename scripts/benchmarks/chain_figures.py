@@ -18,12 +18,11 @@ from benchmarks.map_figures import RESOLUTION
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.ros.transforms import matrix_from_message
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
-from sonar_processing.messages.parameters import BeamMessageParameters
-from sonar_processing.messages.reader import BeamReader
-from sonar_processing.messages.type_table import OWN
+from sonar_processing.messages.beam_types import OWN
+from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 

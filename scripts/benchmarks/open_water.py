@@ -13,8 +13,7 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import pose_matrix
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 
 SCANS = 1000
 _BEAMS, _BINS, _RESOLUTION = 120, 250, 0.2

@@ -10,10 +10,9 @@ import numpy as np
 from benchmarks.harness import ROOT
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import pose_matrix, rotated
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters, extract_echoes
+from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.cloud import Cloud
+from sonar_processing.filters.echo_extractor import EchoExtractorParameters, extract_echoes
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_simulator.echoes.echo_model import make_echo_model
@@ -120,7 +119,7 @@ class BasinScans:
         self._parameters = SonarParameters()
         self._model = make_echo_model("laser_cone", {"spread": spread})
 
-    def scan(self, T_world_sonar: np.ndarray, seed: int) -> IntensityCloud:
+    def scan(self, T_world_sonar: np.ndarray, seed: int) -> Cloud:
         """Return the full turn heard from a (4, 4) pose, organised, in the world frame."""
         head = SonarHead(self._parameters.beams_per_turn, self._parameters.seconds_per_turn)
         angles = np.array([head.angle(beam) for beam in range(head.beams_per_turn)])

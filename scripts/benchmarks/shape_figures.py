@@ -9,8 +9,7 @@ import numpy as np
 
 from benchmarks.harness import Row
 from benchmarks.scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
-from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.stage_table import Stage
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters

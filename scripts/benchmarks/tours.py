@@ -12,8 +12,7 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot_description import RobotDescription
 

@@ -19,7 +19,7 @@ from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from recordings.reader import Request
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam
 
 _MOMENT = 7.0  # s for which a ship is taken to stand still
 _TIDES = 20  # levels of an ebb

@@ -11,8 +11,8 @@ from benchmarks.shape_figures import WallErrors, wall_errors
 from matplotlib.axes import Axes
 
 from node_support.geometry import pose_matrix
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.cloud import Cloud
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
 from sonar_processing.scans.assembler import ScanAssembler
@@ -80,7 +80,7 @@ def make_recorded(pictures: Pictures) -> str:
     )  # fmt: skip
 
 
-def _turn() -> IntensityCloud:
+def _turn() -> Cloud:
     """Return the first turn as an organised cloud in the frame of the tank."""
     assembler = ScanAssembler(SonarToCloudParameters(keep_organized=True, scan_size=TURN_BEAMS))
     clouds = (assembler.add(PlacedBeam(beam, HEAD_PLACE, is_moving=False)) for beam in recorded_beams(TANK))
@@ -95,9 +95,9 @@ class Processed:
     """
 
     place: np.ndarray
-    raw: IntensityCloud
-    thresholded: IntensityCloud
-    cleaned: IntensityCloud
+    raw: Cloud
+    thresholded: Cloud
+    cleaned: Cloud
     lines: List[Line]
     otsu: float
     threshold: float
@@ -108,7 +108,7 @@ class Processed:
         return {"raw": self.raw, "thresholded": self.thresholded, "cleaned": self.cleaned}
 
 
-def processed(raw: IntensityCloud, place: np.ndarray, lines: LineDetectorParameters) -> Processed:
+def processed(raw: Cloud, place: np.ndarray, lines: LineDetectorParameters) -> Processed:
     """Return what the stages with their default parameters, and the line detector, make of an organised scan."""
     parameters = ThresholderParameters()
     otsu, thresholder = Thresholder(replace(parameters, mode=ThresholdMode.OTSU)), Thresholder(parameters)
@@ -142,7 +142,7 @@ def draw_stages(pictures: Pictures, name: str, scan: Processed, reach: float, wh
     return pictures.save(name, figure, what)
 
 
-def _draw_cloud(axes: Axes, cloud: IntensityCloud) -> None:
+def _draw_cloud(axes: Axes, cloud: Cloud) -> None:
     points = cloud.points[cloud.valid]
     points = points[points[:, 3] > 0]
     points = points[:: max(1, len(points) // _MOST_POINTS)]
@@ -171,7 +171,7 @@ def _rows(found: List[Processed], world: World) -> List[List[str]]:
     ]
 
 
-def _share_on_surfaces(cloud: IntensityCloud, world: World) -> float:
+def _share_on_surfaces(cloud: Cloud, world: World) -> float:
     """Return the share of points with any strength that lie on a surface; they are drawn at the depth of the sonar."""
     points = cloud.points[cloud.valid]
     return float(np.mean(distances(world, points[points[:, 3] > 0, :3]) <= _ON))

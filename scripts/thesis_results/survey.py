@@ -12,13 +12,12 @@ from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import pose_matrix
 from node_support.health import Health
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
-from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
+from sonar_processing.scans.tilt_scan import SonarControlParameters, TiltScan
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters

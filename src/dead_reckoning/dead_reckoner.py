@@ -6,7 +6,7 @@ from typing import Optional
 
 import numpy as np
 
-from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
+from dead_reckoning.parameters import DeadReckoningParameters, HeadingType, VelocitySource
 from node_support.errors import RefusedInput
 from node_support.geometry import rotated, wrapped, yaw_of
 from node_support.timing import UsualInterval
@@ -16,6 +16,8 @@ JUMP_BACK = 1.0
 
 GAPS = "gaps in the heading"
 _REFUSED_VELOCITIES = "velocities refused"
+STANDARD_GRAVITY = 9.80665  # m/s^2
+_MOST_TURNS = 2.0  # a compass counts to one turn; a driver that unwraps it counts on
 _DEEPEST = 11_000.0  # m: of the oceans
 _FASTEST = 20.0  # m/s: beyond any underwater vehicle
 
@@ -103,3 +105,28 @@ class DeadReckoner:
         pose[:3, :3] = rotation[:3, :3]
         pose[:3, 3] = self._position
         return pose
+
+
+def depth_of_pressure(pressure: float, surface_pressure: float, density: float) -> float:
+    """Return the depth [m] below the surface where the water's absolute pressure is `pressure` [Pa].
+
+    density: of the water, kg/m^3, taken to be the same at all depths.
+    """
+    return (pressure - surface_pressure) / (density * STANDARD_GRAVITY)
+
+
+def rotation_of_heading(heading: float, kind: HeadingType) -> np.ndarray:
+    """Return R_odom_base (3, 3), x east and z up, of a level vehicle.
+
+    heading: clockwise from north, in degrees or radians as `kind` says.
+    Raises RefusedInput for a heading that is not finite, or of more than two turns.
+    """
+    radians = math.radians(heading) if kind is HeadingType.COMPASS_DEGREES else heading
+    if not abs(radians) <= _MOST_TURNS * 2.0 * math.pi:
+        unit = "deg" if kind is HeadingType.COMPASS_DEGREES else "rad"
+        raise RefusedInput(
+            "headings refused", f"{heading} {unit}, must be finite and at most two turns; see heading_type"
+        )
+    yaw = math.pi / 2.0 - radians
+    cosine, sine = math.cos(yaw), math.sin(yaw)
+    return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])

@@ -19,7 +19,7 @@ from ping360_driver.protocol.sampling import bin_length
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.fields import USUAL_SPEED_OF_SOUND
+from sonar_processing.messages.beam_types import USUAL_SPEED_OF_SOUND
 
 _FRAME = "sonar"
 _BEAMS = (MessageId.DEVICE_DATA, MessageId.AUTO_DEVICE_DATA)

@@ -14,8 +14,8 @@ from recordings.motion.frame_tree import FrameTree, pose_track
 from recordings.motion.motion_table import is_table, motion_of_csv
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, declared_motion, motion_of_bag
-from sonar_processing.beams.mounting import MountingParameters
-from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.beams.parameters import MountingParameters
+from sonar_processing.messages.reader import BeamMessageParameters
 
 _Result = TypeVar("_Result")
 

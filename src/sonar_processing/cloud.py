@@ -1,16 +1,18 @@
-"""The cloud that travels from stage to stage."""
+"""The cloud that travels from stage to stage, and where a stage hands it to within the process."""
 
 from dataclasses import dataclass, replace
+from typing import Callable
 
 import numpy as np
 
 from node_support.errors import RefusedInput
 
+HIGHEST_STRENGTH = 255  # Of an echo; sonars send bytes
 _FOUR_TRUE = np.ones(4, dtype=bool).view(np.uint32)[0]
 
 
 @dataclass(frozen=True)
-class IntensityCloud:
+class Cloud:
     """Points with echo strength and time. Raises RefusedInput when points and stamps do not belong together.
 
     points: (n, 4) float32, x y z [m] in `frame_id`, echo strength; removed points of an organised cloud are NaN.
@@ -58,7 +60,7 @@ class IntensityCloud:
         with np.errstate(invalid="ignore"):
             return (np.abs(self.points[:, :3]) > limit).any(axis=1)
 
-    def select(self, keep: np.ndarray) -> "IntensityCloud":
+    def select(self, keep: np.ndarray) -> "Cloud":
         """Return the cloud with the points where `keep` (n,) bool holds, stamps staying with their points.
 
         An organised cloud keeps its shape: the other points become NaN.
@@ -68,7 +70,7 @@ class IntensityCloud:
             return replace(self, points=points)
         return self._taken(np.flatnonzero(keep))
 
-    def take(self, places: np.ndarray) -> "IntensityCloud":
+    def take(self, places: np.ndarray) -> "Cloud":
         """Return the cloud with the points of these numbers (m,), ascending, as `select` does."""
         if not self.is_organized:
             return self._taken(places)
@@ -76,7 +78,7 @@ class IntensityCloud:
         keep[places] = True
         return self.select(keep)
 
-    def _taken(self, places: np.ndarray) -> "IntensityCloud":
+    def _taken(self, places: np.ndarray) -> "Cloud":
         return replace(self, points=self.points.take(places, axis=0), time_stamps=self.time_stamps.take(places))
 
 
@@ -85,3 +87,11 @@ def are_finite(points: np.ndarray, stamps: np.ndarray) -> np.ndarray:
     finite = np.ascontiguousarray(np.isfinite(points))
     # Four booleans compared as one number take a tenth of the time of all(axis=1).
     return (finite.view(np.uint32)[:, 0] == _FOUR_TRUE) & np.isfinite(stamps)
+
+
+@dataclass(frozen=True)
+class CloudSink:
+    """take: what happens to a cloud. is_wanted: whether anybody takes what is made of it; otherwise it is not made."""
+
+    take: Callable[[Cloud], None]
+    is_wanted: Callable[[], bool] = lambda: True

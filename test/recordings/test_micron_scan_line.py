@@ -10,7 +10,7 @@ from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.recording import scans_of
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import Request
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 
 ROOT = Path(__file__).resolve().parents[2]
 BEAMS, TURNS = 2028, 10

@@ -21,7 +21,7 @@ from geometry_msgs.msg import Point
 from graph import PACKAGE_ROOT, PATIENCE, forget_links, wait_for_publisher_links, wait_until
 
 from mlsm_manager.surface_map.files.map_file import read_map
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion
@@ -119,7 +119,7 @@ class KilledNode:
         while time.monotonic() < end:
             now = rospy.Time.now()
             points = np.array([[self._sent + 0.1, 0.1, -1.0, 50.0]], dtype=np.float32)
-            cloud = IntensityCloud(points, np.array([-now.to_sec()]), now.to_nsec(), "odom")
+            cloud = Cloud(points, np.array([-now.to_sec()]), now.to_nsec(), "odom")
             self._publisher.publish(cloud_to_message(cloud))
             self._sent += 1
             rate.sleep()

@@ -10,7 +10,7 @@ import rostest
 from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 
@@ -28,7 +28,7 @@ def wall(points: int = 400) -> np.ndarray:
 def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
     """Return the points as a message with good stamps."""
     now = rospy.get_time()
-    return cloud_to_message(IntensityCloud(points, np.full(len(points), -now), int(now * 1e9), frame))
+    return cloud_to_message(Cloud(points, np.full(len(points), -now), int(now * 1e9), frame))
 
 
 def dense(cloud: StampedIntensityCloud) -> StampedIntensityCloud:

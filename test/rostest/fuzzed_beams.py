@@ -12,17 +12,13 @@ import numpy as np
 from foreign_messages import DEFINITIONS, message_classes, sane_message, serialised
 
 from node_support.errors import RefusedInput
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.head_watch import HeadWatch
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.messages.parameters import BeamMessageParameters
-from sonar_processing.messages.reader import BeamReader
-from sonar_processing.ros.message_classes import MessageClasses
-from sonar_processing.scans.assembler import ScanAssembler
-from sonar_processing.scans.laser_scan import planar_laser_scan
+from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.beams.head import HeadWatch
+from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
+from sonar_processing.ros.beam_subscriber import MessageClasses
+from sonar_processing.scans.assembler import RevolutionCollector, ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
-from sonar_processing.scans.polar_scan import PolarScan
-from sonar_processing.scans.revolution_collector import RevolutionCollector
+from sonar_processing.scans.polar_scan import PolarScan, planar_laser_scan
 
 _FLOATS = (0.0, -0.0, -1.0, 1e-40, 7.0, 400.0, 1e9, 3e38, math.nan, math.inf, -math.inf)
 _SECONDS = (0, 1, 2**31 - 1, 2**31, 2**32 - 1)

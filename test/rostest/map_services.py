@@ -18,7 +18,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.surface_map.storage import read_ply
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion, LoadMap, SaveMap
@@ -33,7 +33,7 @@ class MapServices(unittest.TestCase):
         cls.folder = Path(rospy.get_param("~folder"))
         points = np.array([[0.1, 0.1, z, 100] for z in np.arange(0, 3, 0.2)] + [[5.1, 5.1, 0, 90]], np.float32)
         now = rospy.Time.now()
-        cloud = IntensityCloud(points, np.full(len(points), -now.to_sec()), now.to_nsec(), "odom")
+        cloud = Cloud(points, np.full(len(points), -now.to_sec()), now.to_nsec(), "odom")
         cls.publisher = rospy.Publisher("/sonar/scan/cleaned", StampedIntensityCloud, queue_size=1)
         wait_for_publisher_links(cls.publisher, 1)
         cls.publisher.publish(cloud_to_message(cloud))

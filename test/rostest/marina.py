@@ -25,7 +25,7 @@ from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from node_support.geometry import composed, wrapped
 from recordings.reader import Request
-from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.parameters import BeamCorrection
 
 TOPICS = ("/sonar/raw", "/tf", "/tf_static", "/cmd_vel")
 SECONDS = 300.0

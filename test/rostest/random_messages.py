@@ -13,7 +13,7 @@ from roslib.message import get_message_class
 from sensor_msgs.msg import Imu, JointState, LaserScan
 from tf2_msgs.msg import TFMessage
 
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
@@ -131,7 +131,7 @@ class RandomMessages:
             points[self._random.randrange(count), self._random.randrange(4)] = self._float()
         stamps = np.full(count, self._random.choice((-now, now)))
         height = self._random.choice((1, 2)) if count else 1
-        cloud = IntensityCloud(points.astype(np.float32), stamps, int(now * 1e9), "odom", height)
+        cloud = Cloud(points.astype(np.float32), stamps, int(now * 1e9), "odom", height)
         return cloud_to_message(cloud)
 
     def _laser_scan(self) -> LaserScan:

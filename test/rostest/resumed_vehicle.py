@@ -21,7 +21,7 @@ from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import cells_of
 from mlsm_manager.surface_map.files.map_file import read_map
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion
@@ -185,11 +185,9 @@ class ResumedVehicle:
     def _is_fixed(self, scan: Scan) -> bool:
         return scan.reference_time in self._fixed()
 
-    def _cloud(self, scan: Scan) -> IntensityCloud:
+    def _cloud(self, scan: Scan) -> Cloud:
         stamps = np.where(scan.moving, 1.0, -1.0) * (scan.times + self._shift)
-        return IntensityCloud(
-            scan.points.astype(np.float32), stamps, self._stamp(scan.reference_time).to_nsec(), "odom"
-        )
+        return Cloud(scan.points.astype(np.float32), stamps, self._stamp(scan.reference_time).to_nsec(), "odom")
 
     def _send_odometry(self, until: float) -> None:
         track = self._mission.odometry

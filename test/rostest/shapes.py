@@ -12,7 +12,7 @@ from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import Circles, StampedIntensityCloud, Walls
 
@@ -34,7 +34,7 @@ def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
     """Return the points as a message, each of a beam of its own."""
     start = round(rospy.get_time())
     stamps = -start - np.arange(len(points)) * 0.1
-    return cloud_to_message(IntensityCloud(points, stamps, (start + 10) * 10**9, frame))
+    return cloud_to_message(Cloud(points, stamps, (start + 10) * 10**9, frame))
 
 
 class Shapes(unittest.TestCase):

@@ -12,7 +12,7 @@ from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 
@@ -60,13 +60,13 @@ class Standing(unittest.TestCase):
         self.assertNotIn("jumps back in time", self.diagnostics.values("mlsm_core"))
 
 
-def scan(start: float, moved: float) -> IntensityCloud:
+def scan(start: float, moved: float) -> Cloud:
     """Return the echoes of all walls as heard from x = `moved` [m], in odom, from `start` [s] on."""
     points = np.vstack([np.linspace(*ends, 40) for ends in np.array(WALLS, dtype=float)])
     points = points[np.argsort(np.arctan2(points[:, 1], points[:, 0]))] - [moved, 0.0]
     times = start + np.linspace(0.0, SECONDS, len(points))
     rows = np.column_stack([points, np.full(len(points), -2.0), np.full(len(points), 50.0)])
-    return IntensityCloud(rows.astype(np.float32), -times, round(times[-1] * 1e9), "odom")
+    return Cloud(rows.astype(np.float32), -times, round(times[-1] * 1e9), "odom")
 
 
 if __name__ == "__main__":

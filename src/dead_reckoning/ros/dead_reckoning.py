@@ -11,9 +11,7 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, Imu
 from std_msgs.msg import Float64
 
-from dead_reckoning.dead_reckoner import GAPS, DeadReckoner, Reckoning
-from dead_reckoning.depth import depth_of_pressure
-from dead_reckoning.heading import rotation_of_heading
+from dead_reckoning.dead_reckoner import GAPS, DeadReckoner, Reckoning, depth_of_pressure, rotation_of_heading
 from dead_reckoning.parameters import DeadReckoningParameters, DepthType, HeadingType, VelocitySource
 from node_support import topics
 from node_support.errors import RefusedInput

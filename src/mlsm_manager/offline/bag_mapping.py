@@ -28,7 +28,7 @@ from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from recordings.bags.bag import RecordingError
-from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.parameters import BeamCorrection
 
 # The frame that live.yaml's nodes call their map by default.
 _MAP_FRAME = "map"

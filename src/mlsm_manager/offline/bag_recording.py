@@ -12,7 +12,7 @@ from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
 from recordings.motion.pose_track import PoseTrack
 from recordings.reader import Request, read
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam
 
 
 def read_recording(path: Path, request: Request) -> Recording:

@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, RUN_COLUMNS
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.parameters import describe
-from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.parameters import BeamCorrection
 
 _OF_RUN = {"range_scale": RANGE_SCALE, "sonar_delay": DELAY}
 

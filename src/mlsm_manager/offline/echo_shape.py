@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from sonar_processing.beams.beam import Beam
-from sonar_processing.filters.echo_extraction import ExtractionMode
+from sonar_processing.filters.echo_extractor import ExtractionMode
 
 # Share of non-zero strengths that equal the strongest.
 _BINARY = 0.9

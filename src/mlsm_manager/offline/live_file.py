@@ -11,8 +11,8 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.files import write_whole
 from node_support.parameters import ParameterSet
 from recordings.reader import ReadingParameters
-from sonar_processing.beams.beam_correction import BeamCorrection
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 NODES: Dict[str, Type[ParameterSet]] = {

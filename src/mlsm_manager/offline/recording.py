@@ -8,13 +8,12 @@ import numpy as np
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, inverse, matrices, transformed
-from sonar_processing.beams.beam_correction import BeamCorrection
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
-from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
+from sonar_processing.scans.assembler import RevolutionCollector
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
-from sonar_processing.scans.revolution_collector import RevolutionCollector
 
 # s of odometry around the end of a scan: the slowest turn of a head, and the largest sonar_delay.
 _BEFORE = 60.0

@@ -7,8 +7,8 @@ from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from node_support.parameters import with_defaults
 from recordings.reader import ReadingParameters
-from sonar_processing.beams.beam_correction import BeamCorrection
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
+from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from mlsm_manager.report.mission import Path as Way
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.files.map_file import StoredMap
 from recordings.bags.bag import RecordingError
-from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.parameters import BeamCorrection
 
 # A cluster in the same network answers within a second, a busy one within a few.
 CLUSTER_TIMEOUT = 10.0

@@ -6,7 +6,7 @@ import numpy as np
 import rospy
 from std_msgs.msg import Bool
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import Cloud as MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.updates import (
@@ -31,9 +31,9 @@ from node_support.errors import RefusedInput
 from node_support.geometry import matrices
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
+from sonar_processing.ros.cloud_topics import subscribe_to_clouds
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
-from sonar_processing.ros.subscribers import subscribe_to_clouds
 
 _Z_DOWN_ADVICE = (
     "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true); "
@@ -87,11 +87,11 @@ class MlsmCore:
         subscribe_to_clouds(topics.CLEANED, guarded(self.health, take))
         subscribe_to_clouds(topics.ECHOES, guarded(self.health, take_echoes))
 
-    def insert(self, cloud: IntensityCloud) -> None:
+    def insert(self, cloud: Cloud) -> None:
         """Insert a cloud; one that cannot be placed in the map is counted and left out."""
         guarded(self.health, self._insert)(cloud)
 
-    def match(self, cloud: IntensityCloud) -> None:
+    def match(self, cloud: Cloud) -> None:
         """Match a scan of echoes; one that cannot be matched is counted."""
         if self._live.current.match_input is MatchInput.ECHOES:
             guarded(self.health, self._match)(cloud)
@@ -103,7 +103,7 @@ class MlsmCore:
         if self._localiser.match(message.data):
             rospy.loginfo("%s: matching is %s", self.health.name, "on" if message.data else "off")
 
-    def _insert(self, cloud: IntensityCloud) -> None:
+    def _insert(self, cloud: Cloud) -> None:
         parameters = self._live.current
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
@@ -117,13 +117,13 @@ class MlsmCore:
             with self.health.timed():
                 self._report_cloud(self._inserted(cloud), cloud.stamp_ns)
 
-    def _inserted(self, cloud: IntensityCloud) -> CloudUpdate:
+    def _inserted(self, cloud: Cloud) -> CloudUpdate:
         if cloud.frame_id == self._live.current.map_frame:
             return self._localiser.take_points(cloud.points[cloud.valid])
         self._notice_time_of_scan(cloud.stamp_ns * 1e-9)
-        return self._localiser.take_cloud(Cloud.from_stamps(cloud.points, cloud.time_stamps, cloud.stamp_ns * 1e-9))
+        return self._localiser.take_cloud(MapCloud.from_stamps(cloud.points, cloud.time_stamps, cloud.stamp_ns * 1e-9))
 
-    def _match(self, cloud: IntensityCloud) -> None:
+    def _match(self, cloud: Cloud) -> None:
         self.health.count("scans in")
         self._check_header(cloud)
         self._notice_time_of_scan(cloud.stamp_ns * 1e-9)
@@ -159,14 +159,14 @@ class MlsmCore:
             self._localiser.mount(place)
             self._mounted = True
 
-    def _check_header(self, cloud: IntensityCloud) -> None:
+    def _check_header(self, cloud: Cloud) -> None:
         self._odometry.check_stamp(cloud.stamp_ns)
         allowed = self._live.current.odom_frame, self._live.current.map_frame
         if cloud.frame_id not in allowed:
             must = f"frame {cloud.frame_id!r}, must be {allowed[0]!r} or {allowed[1]!r}"
             raise RefusedInput("clouds refused", f"{must}; set sonar_to_cloud's target_frame")
 
-    def _without_far_points(self, cloud: IntensityCloud) -> IntensityCloud:
+    def _without_far_points(self, cloud: Cloud) -> Cloud:
         limit = self._live.current.map_limit
         far = cloud.beyond(limit)
         count = int(np.count_nonzero(far))
@@ -176,7 +176,7 @@ class MlsmCore:
         self.health.problem("echoes outside the map", detail, count)
         return cloud.select(~far)
 
-    def _scan(self, cloud: IntensityCloud) -> Optional[Scan]:
+    def _scan(self, cloud: Cloud) -> Optional[Scan]:
         time, times = cloud.stamp_ns * 1e-9, np.unique(np.abs(cloud.time_stamps[cloud.valid]))
         known = self._localiser.believed_until
         start = min([time, *times[:1], *([] if known is None else [known])])

@@ -7,7 +7,7 @@ import rospy
 from mlsm_manager.ros.mlsm_core import MlsmCore
 from node_support.health import Health
 from node_support.ros.node import run
-from sonar_processing.cloud_sink import CloudSink
+from sonar_processing.cloud import CloudSink
 from sonar_processing.ros.pipeline import Pipeline
 
 

@@ -16,7 +16,7 @@ from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, R
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from node_support.geometry import wrapped
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.beams.beam_width import beam_width_parameter
+from sonar_processing.beams.parameters import beam_width_parameter
 
 # Standard deviations of the prior that the search covers.
 _WINDOW_DEVIATIONS = 3.0

@@ -4,7 +4,7 @@ from enum import Enum
 from typing import Dict, List, Optional
 
 from recordings.bags.bag import Topic
-from sonar_processing.messages.type_table import BEAM_TYPES, LASER_SCAN
+from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN
 
 
 class Role(Enum):

@@ -8,7 +8,7 @@ import numpy as np
 from node_support import topics
 from recordings.bags.bag import Bag
 from recordings.motion.pose_track import PoseTrack
-from sonar_processing.messages.fields import stamp_ns
+from sonar_processing.messages.beam_types import stamp_ns
 
 Link = Tuple[str, str]
 """Parent and child."""

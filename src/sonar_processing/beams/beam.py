@@ -1,4 +1,4 @@
-"""One beam of a mechanically scanned sonar."""
+"""One beam of a mechanically scanned sonar, and where it was sent."""
 
 import math
 from dataclasses import dataclass
@@ -11,6 +11,9 @@ MAX_BINS = 4096  # Four times what scanning sonars send (Micron 800, Imagenex 85
 
 # m: ten times what scanning sonars hear; farther points would only cost precision.
 FARTHEST_RANGE = 10_000.0
+SERVO_DEAD_BAND = 1e-3  # rad: a servo that holds its place trembles by less, and none steps by as little
+_LONGEST_NS = 10 * 10**9
+"""Longer than any head takes for some beams, shorter than a slow turn: the vehicle is elsewhere by then."""
 
 
 @dataclass(frozen=True)
@@ -51,3 +54,28 @@ class Beam:
     def ranges(self) -> np.ndarray:
         """(bins,) distance of each bin's centre, m."""
         return (np.arange(self.intensities.size) + 0.5) * self.range_resolution
+
+
+@dataclass(frozen=True)
+class PlacedBeam:
+    """A beam, its pose when the ping left (T_target_sonar, (4, 4)) and whether the vehicle moved."""
+
+    beam: Beam
+    T_target_sonar: np.ndarray
+    is_moving: bool
+
+    @property
+    def signed_stamp(self) -> float:
+        """Seconds at which the ping left, negative while the vehicle was still (thesis 4.5.1)."""
+        seconds = self.beam.stamp_ns * 1e-9
+        return seconds if self.is_moving else -seconds
+
+
+def servo_moved(beam: Beam, earlier: Beam) -> bool:
+    """Whether the servo stands elsewhere than at an earlier beam; it may tremble."""
+    return abs(beam.sensor_angle - earlier.sensor_angle) > SERVO_DEAD_BAND
+
+
+def long_after(beam: Beam, earlier: Beam) -> bool:
+    """Return whether the head was silent so long between two beams that they make no scan together."""
+    return beam.stamp_ns - earlier.stamp_ns > _LONGEST_NS

@@ -4,15 +4,15 @@ import numpy as np
 from numba import float32, float64, int64, types
 
 from node_support.numba_cache import compiled
-from sonar_processing.filters.otsu import HIGHEST_LEVEL
+from sonar_processing.cloud import HIGHEST_STRENGTH
 
 # Read-only is what arrays of messages are; others are taken too.
 _POINTS = types.Array(float32, 2, "C", readonly=True)
 _STAMPS = types.Array(float64, 1, "C", readonly=True)
-_SILENT = HIGHEST_LEVEL + 1
+_SILENT = HIGHEST_STRENGTH + 1
 _COUNTERS = 4
 """Neighbouring bins often have the same level, and a single counter would wait for its own last result."""
-_ZERO, _HIGHEST, _INFINITE = np.float32(0.0), np.float32(HIGHEST_LEVEL), np.float32(np.inf)
+_ZERO, _HIGHEST, _INFINITE = np.float32(0.0), np.float32(HIGHEST_STRENGTH), np.float32(np.inf)
 _EXPONENT, _LONG_EXPONENT = np.int32(0x7F800000), np.int64(0x7FF0000000000000)
 _GREATEST, _GREATEST_STAMP = np.finfo(np.float32).max, np.finfo(np.float64).max
 

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 
 
 class OutlierMode(Enum):
@@ -41,7 +41,7 @@ class OutlierRemover:
     def __init__(self, parameters: OutlierRemoverParameters) -> None:
         self.parameters = parameters
 
-    def __call__(self, cloud: IntensityCloud) -> IntensityCloud:
+    def __call__(self, cloud: Cloud) -> Cloud:
         """Return the cloud without its outliers."""
         parameters = self.parameters
         if parameters.mode is OutlierMode.NONE:

@@ -5,13 +5,14 @@ from typing import Any, Callable, Dict, Mapping, Optional, Type
 
 from node_support import topics
 from node_support.parameters import ParameterSet
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.echo_extraction import EchoExtractorParameters
-from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.cloud import Cloud
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
 
-Stage = Callable[[IntensityCloud], IntensityCloud]
+Stage = Callable[[Cloud], Cloud]
+# Silence of a few scans is usual: a vehicle leaves the reach of all walls, or turns its head away.
+SCANS_IN_A_ROW = 10
 
 
 @dataclass(frozen=True)
@@ -65,3 +66,20 @@ STAGES: Dict[str, StageType] = {
         {"threshold": lambda stage: stage.newest_threshold},
     ),
 }
+
+
+class EmptiedScans:
+    """Counts the scans in a row that came with points and left without any."""
+
+    def __init__(self) -> None:
+        self._in_a_row = 0
+
+    def take(self, points_in: int, points_out: int) -> Optional[int]:
+        """Note a scan; return how many in a row lost all their points at every tenth of them, None otherwise.
+
+        A scan that comes without points says nothing about the stage and is not counted.
+        """
+        if points_in == 0:
+            return None
+        self._in_a_row = 0 if points_out else self._in_a_row + 1
+        return self._in_a_row if self._in_a_row and self._in_a_row % SCANS_IN_A_ROW == 0 else None

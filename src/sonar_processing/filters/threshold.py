@@ -6,9 +6,12 @@ from typing import Optional
 
 import numpy as np
 
+from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.otsu import threshold_of_levels
+from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
+
+_EQUAL = 1e-12  # Share by which between-class variances differ because of rounding
+_LEVELS = np.arange(HIGHEST_STRENGTH + 1)
 
 
 class ThresholdMode(Enum):
@@ -110,7 +113,7 @@ class Thresholder:
         self.newest_threshold: Optional[float] = None
         """The threshold of the newest cloud; None before the first and for a cloud without a finite point."""
 
-    def __call__(self, cloud: IntensityCloud) -> IntensityCloud:
+    def __call__(self, cloud: Cloud) -> Cloud:
         """Return the cloud's strong points; a cloud without a finite point comes back without points.
 
         Echoes are what lies above the threshold, as in Otsu's upper class.
@@ -144,4 +147,33 @@ class Thresholder:
     def _otsu(self, counts: StrengthCounts) -> float:
         if not counts.echoes_differ:
             return 0.0
-        return threshold_of_levels(counts.levels if self.parameters.otsu_nonzero else counts.all_levels)
+        return _threshold_of_levels(counts.levels if self.parameters.otsu_nonzero else counts.all_levels)
+
+
+def otsu_threshold(strengths: np.ndarray) -> float:
+    """Return the strength that separates echoes from background best; echoes are the points above it.
+
+    strengths: (n,) any numeric type; they are counted in integer levels 0 to 255, what lies outside in the nearest.
+    The result is the mean of the first and the last level that maximise the between-class variance (6.1 to 6.4); with
+    one level only there is nothing to separate and that level is returned. Raises RefusedInput when `strengths` is
+    empty.
+    """
+    if strengths.size == 0:
+        raise RefusedInput("clouds without points", "no strength to take a threshold of")
+    levels = np.clip(strengths, 0, HIGHEST_STRENGTH).astype(np.intp)
+    return _threshold_of_levels(np.bincount(levels, minlength=HIGHEST_STRENGTH + 1))
+
+
+def _threshold_of_levels(histogram: np.ndarray) -> float:
+    """Return Otsu's threshold as otsu_threshold does, for the number of points in each level (256,), not all 0."""
+    count_below = histogram.cumsum()
+    lowest, highest = count_below.searchsorted([1, count_below[-1]])
+    if lowest == highest:
+        return float(lowest)
+    separating = slice(lowest, highest)
+    sum_below = (histogram * _LEVELS).cumsum()
+    w1, sum1 = count_below[separating], sum_below[separating]
+    w2, sum2 = count_below[-1] - w1, sum_below[-1] - sum1
+    between = w1 * w2 * (sum1 / w1 - sum2 / w2) ** 2
+    best = np.flatnonzero(between >= between.max() * (1.0 - _EQUAL)) + lowest
+    return float(best[0] + best[-1]) / 2.0

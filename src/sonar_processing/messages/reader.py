@@ -1,17 +1,57 @@
 """Turns messages of any known type into beams."""
 
 from dataclasses import dataclass, field, replace
+from enum import Enum
 from typing import Any, Dict, List, Optional, Set
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_stamp
+from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.angles import AngleUnit, RadiansOrGradians
-from sonar_processing.messages.fields import BeamFields
-from sonar_processing.messages.parameters import AngleUnitChoice, BeamMessageParameters, HeadTurns
-from sonar_processing.messages.type_table import BEAM_TYPES, OWN, BeamType, ros1_name
+from sonar_processing.messages.beam_types import (
+    BEAM_TYPES,
+    OWN,
+    AngleUnit,
+    BeamFields,
+    BeamType,
+    RadiansOrGradians,
+    ros1_name,
+)
 
 _REFUSED = "beams refused"
+
+
+class AngleUnitChoice(Enum):
+    """Unit of the head's angle in the messages."""
+
+    TYPE = "TYPE"
+    RADIANS = "RADIANS"
+    DEGREES = "DEGREES"
+    GRADIANS = "GRADIANS"
+
+
+class HeadTurns(Enum):
+    """Which way the angles in the messages grow, seen from the tip of +z of their frame."""
+
+    TYPE = "TYPE"
+    COUNTER_CLOCKWISE = "COUNTER_CLOCKWISE"
+    CLOCKWISE = "CLOCKWISE"
+
+
+@dataclass(frozen=True)
+class BeamMessageParameters(ParameterSet):
+    """How the angles in messages of beams are understood."""
+
+    angle_unit: AngleUnitChoice = parameter(
+        AngleUnitChoice.TYPE,
+        "unit of the head's angle; TYPE: as documented for the type of the messages, gradians told by their values",
+        tunable=False,
+    )
+    head_turns: HeadTurns = parameter(
+        HeadTurns.TYPE,
+        "which way the head's angle grows, seen from the tip of +z; TYPE: as documented for the type of the messages",
+        tunable=False,
+    )
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_point_stamps, check_stamp
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.scans.laser_scan import PlanarLaserScan
+from sonar_processing.cloud import Cloud
+from sonar_processing.scans.polar_scan import PlanarLaserScan
 from underwater_map_construction.msg import StampedIntensityCloud
 
 StampedIntensityCloudArrays = numpy_msg(StampedIntensityCloud)
@@ -37,7 +37,7 @@ def check_header(head: Header, kind: str) -> None:
     check_stamp(head.stamp.to_nsec())
 
 
-def cloud_from_message(message: StampedIntensityCloud) -> IntensityCloud:
+def cloud_from_message(message: StampedIntensityCloud) -> Cloud:
     """Return the cloud of a StampedIntensityCloud; raises RefusedInput for one that cannot be used.
 
     A cloud of one row that says it may hold points that are not finite is organised: a single beam.
@@ -45,7 +45,7 @@ def cloud_from_message(message: StampedIntensityCloud) -> IntensityCloud:
     check_header(message.header, "clouds refused")
     time_stamps = np.asarray(message.timeStamps, dtype=np.float64)
     check_point_stamps(time_stamps, message.header.stamp.to_nsec())
-    return IntensityCloud(
+    return Cloud(
         points=points_from_message(message.cloud),
         time_stamps=time_stamps,
         stamp_ns=message.header.stamp.to_nsec(),
@@ -103,7 +103,7 @@ def point_cloud(
     )
 
 
-def cloud_to_message(cloud: IntensityCloud, points: Optional[PointCloud2] = None) -> StampedIntensityCloud:
+def cloud_to_message(cloud: Cloud, points: Optional[PointCloud2] = None) -> StampedIntensityCloud:
     """Return the StampedIntensityCloud of a cloud; `points` is its PointCloud2 where that exists already."""
     return StampedIntensityCloudArrays(
         header=header(cloud.stamp_ns, cloud.frame_id),
@@ -112,7 +112,7 @@ def cloud_to_message(cloud: IntensityCloud, points: Optional[PointCloud2] = None
     )
 
 
-def points_to_message(cloud: IntensityCloud) -> PointCloud2:
+def points_to_message(cloud: Cloud) -> PointCloud2:
     """Return the PointCloud2 of a cloud; an organised one says that it may hold points that are not finite."""
     message = point_cloud(cloud.points, cloud.stamp_ns, cloud.frame_id, cloud.height)
     message.is_dense = message.is_dense and not cloud.is_organized

@@ -7,15 +7,14 @@ import rospy
 
 from node_support.health import Health
 from node_support.parameters import ParameterError
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.cloud_sink import CloudSink
+from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.filters.stage_table import STAGES
 from sonar_processing.ros.sonar_image import SonarImage
 from sonar_processing.ros.sonar_to_cloud import SonarToCloud
 from sonar_processing.ros.stage_runner import StageRunner
 
 if TYPE_CHECKING:
-    from sonar_processing.ros.hosted_detectors import HostedDetector
+    from sonar_processing.ros.shape_detectors import HostedDetector
 
 DETECTORS = ("line_detector", "circle_detector")
 DEFAULT_CHAIN = ["thresholder", "outlier_remover", "echo_extractor"]
@@ -32,9 +31,9 @@ class StageChain:
         """Return whether anybody takes anything that the stages make."""
         return any(runner.is_read or any(sink.is_wanted() for sink in sinks) for runner, sinks in self._links)
 
-    def process(self, scan: IntensityCloud) -> None:
+    def process(self, scan: Cloud) -> None:
         """Take a cloud through all stages."""
-        cloud: Optional[IntensityCloud] = scan
+        cloud: Optional[Cloud] = scan
         for runner, sinks in self._links:
             cloud = runner.process(cloud)
             if cloud is None:
@@ -83,7 +82,7 @@ def _detectors(made: Collection[str]) -> List["HostedDetector"]:
     if not names:
         return []
     # Here, because it loads scipy.optimize.
-    from sonar_processing.ros.hosted_detectors import HostedDetector
+    from sonar_processing.ros.shape_detectors import HostedDetector
 
     detectors = [HostedDetector.named(name) for name in names]
     for detector in detectors:

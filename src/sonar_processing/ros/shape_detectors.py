@@ -1,7 +1,9 @@
 """The ROS side of line_detector and circle_detector: clouds in, shapes and markers out (thesis 6.5.5)."""
 
+import threading
 from abc import ABC, abstractmethod
-from typing import Any, Sequence, Tuple
+from collections import deque
+from typing import Any, Callable, Deque, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -9,20 +11,58 @@ from visualization_msgs.msg import MarkerArray
 
 from node_support import topics
 from node_support.errors import RefusedInput
+from node_support.headers import DAY
+from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from sonar_processing.cloud import IntensityCloud
+from node_support.ros.transforms import TfBuffer, stamp_of
+from sonar_processing.cloud import Cloud
+from sonar_processing.ros.cloud_topics import PointsPublisher, subscribe_to_clouds
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
-from sonar_processing.ros.publishers import PointsPublisher
 from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
-from sonar_processing.ros.sonar_places import SonarPlaces
-from sonar_processing.ros.subscribers import subscribe_to_clouds
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import RansacParameters
 from underwater_map_construction.msg import Circles, Walls
 
+_CACHE = 300.0  # s: the slowest head takes minutes for a scan
+_PATIENCE = 0.5  # s: transforms come at 2 Hz at least
 QUEUE_SIZE = 10
+_WAITING = 10  # clouds: as many as wait for a detector that is a node of its own
+_WAIT = 0.5  # s: clouds wake the thread; this is for shutdown alone
+
+
+class SonarPlaces:
+    """Remembers tf long enough for a slow scan."""
+
+    def __init__(self, sonar_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
+        """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
+        self._frame = sonar_frame
+        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance)
+
+    def check_stamp(self, stamp_ns: int) -> None:
+        """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
+        self._transforms.check_stamp(stamp_ns)
+
+    def at(self, frame_id: str, times: np.ndarray) -> np.ndarray:
+        """Return (m, 2) x y [m] of the sonar in `frame_id` at `times` (m,) [s], NaN where tf does not know it.
+
+        Waits up to half a second for the newest. Raises RefusedInput when tf knows none of them.
+        """
+        distinct, index = np.unique(times, return_inverse=True)
+        stamps = [stamp_of(seconds) for seconds in distinct]
+        reason = self._transforms.wait_for(frame_id, self._frame, stamps[-1], _PATIENCE)
+        places = np.array([self._place(frame_id, stamp) for stamp in stamps])
+        if np.isnan(places).all():
+            raise RefusedInput("scans without sonar position", f"{self._frame} in {frame_id}: {reason}")
+        return places[index]
+
+    def _place(self, frame_id: str, stamp_ns: int) -> Tuple[float, float]:
+        try:
+            x, y = self._transforms.matrix(frame_id, self._frame, stamp_ns)[:2, 3]
+        except RefusedInput:
+            return np.nan, np.nan
+        return x, y
 
 
 class ShapeDetectorNode(ABC):
@@ -70,10 +110,10 @@ class ShapeDetectorNode(ABC):
         """Make the detector anew."""
 
     @abstractmethod
-    def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Any, MarkerArray]:
+    def _detect(self, cloud: Cloud) -> Tuple[Sequence[Any], Any, MarkerArray]:
         """Return the shapes of a scan, the message that holds them, and how rviz shows them."""
 
-    def process(self, cloud: IntensityCloud) -> None:
+    def process(self, cloud: Cloud) -> None:
         """Detect the shapes of a scan and publish them. Raises RefusedInput for a scan that cannot be used."""
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
@@ -100,12 +140,12 @@ class LineDetectorNode(ShapeDetectorNode):
     def _use_parameters(self, parameters: LineDetectorParameters) -> None:
         self._detector = LineDetector(parameters)
 
-    def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Walls, MarkerArray]:
+    def _detect(self, cloud: Cloud) -> Tuple[Sequence[Any], Walls, MarkerArray]:
         lines = self._detector(cloud)
         walls = walls_message(cloud, lines, self._sonar(cloud))
         return lines, walls, wall_markers(walls)
 
-    def _sonar(self, cloud: IntensityCloud) -> np.ndarray:
+    def _sonar(self, cloud: Cloud) -> np.ndarray:
         try:
             return self._places.at(cloud.frame_id, np.array([cloud.stamp_ns * 1e-9]))[0]
         except RefusedInput as refused:
@@ -123,14 +163,60 @@ class CircleDetectorNode(ShapeDetectorNode):
     def _use_parameters(self, parameters: CircleDetectorParameters) -> None:
         self._detector = CircleDetector(parameters)
 
-    def _detect(self, cloud: IntensityCloud) -> Tuple[Sequence[Any], Circles, MarkerArray]:
+    def _detect(self, cloud: Cloud) -> Tuple[Sequence[Any], Circles, MarkerArray]:
         circles = self._detector(cloud, lambda times: self._places.at(cloud.frame_id, times))
         message = circles_message(cloud, circles)
         return circles, message, circle_markers(message)
 
 
-def _part(cloud: IntensityCloud, shapes: Sequence[Any]) -> IntensityCloud:
+def _part(cloud: Cloud, shapes: Sequence[Any]) -> Cloud:
     members = np.concatenate([np.zeros(0, dtype=np.int64), *(shape.members for shape in shapes)])
     keep = np.zeros(len(cloud), dtype=bool)
     keep[members] = True
     return cloud.select(keep)
+
+
+_DETECTORS = {kind.name: kind for kind in (LineDetectorNode, CircleDetectorNode)}
+
+
+class HostedDetector:
+    """A detector with a thread of its own: neither beams nor map wait until it is done, or until tf answers it."""
+
+    @classmethod
+    def named(cls, name: str) -> "HostedDetector":
+        """Return a detector with the parameters and topics it has as a node.
+
+        Raises KeyError for an unknown name and ParameterError for a bad parameter.
+        """
+        return cls(_DETECTORS[name](rospy.resolve_name(name)))
+
+    def __init__(self, detector: ShapeDetectorNode) -> None:
+        self.health = detector.health
+        self.input_topic = detector.input_topic
+        self._detector = detector
+        self._process: Callable[[Cloud], None] = guarded(detector.health, detector.process)
+        self._clouds: Deque[Cloud] = deque()
+        self._condition = threading.Condition()
+        threading.Thread(target=self._work, daemon=True).start()
+
+    @property
+    def is_read(self) -> bool:
+        """Whether anybody listens to what the detector finds; otherwise it gets no clouds."""
+        return self._detector.is_read
+
+    def take(self, cloud: Cloud) -> None:
+        """Queue a cloud; returns at once. The oldest one that waits goes when there are too many."""
+        with self._condition:
+            if len(self._clouds) == _WAITING:
+                self._clouds.popleft()
+                self.health.problem("clouds dropped", f"{_WAITING} newer ones wait, the machine is too slow")
+            self._clouds.append(cloud)
+            self._condition.notify()
+
+    def _work(self) -> None:
+        while not rospy.core.is_shutdown_requested():
+            with self._condition:
+                self._condition.wait_for(lambda: self._clouds, _WAIT)
+                cloud = self._clouds.popleft() if self._clouds else None
+            if cloud is not None:
+                self._process(cloud)

@@ -8,7 +8,7 @@ from geometry_msgs.msg import Point, Quaternion, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import header
 from sonar_processing.shapes.circles import Circle
 from sonar_processing.shapes.lines import Line
@@ -23,14 +23,14 @@ _TEXT_WIDTH = 3.5  # of its height: "12.3 m"
 _LEAST_HEIGHT = 0.5  # m: a circle is drawn as a flat disc, since its height is unknown
 
 
-def walls_message(cloud: IntensityCloud, lines: Sequence[Line], sonar: np.ndarray) -> msg.Walls:
+def walls_message(cloud: Cloud, lines: Sequence[Line], sonar: np.ndarray) -> msg.Walls:
     """Return the walls of a scan; `sonar` (2,) x y [m] in the cloud's frame, NaN when unknown."""
     message = msg.Walls(header=header(cloud.stamp_ns, cloud.frame_id))
     message.walls = [_wall(cloud, line, sonar) for line in lines]
     return message
 
 
-def circles_message(cloud: IntensityCloud, circles: Sequence[Circle]) -> msg.Circles:
+def circles_message(cloud: Cloud, circles: Sequence[Circle]) -> msg.Circles:
     """Return the circles of a scan."""
     message = msg.Circles(header=header(cloud.stamp_ns, cloud.frame_id))
     message.circles = [_circle(cloud, circle) for circle in circles]
@@ -68,7 +68,7 @@ def circle_markers(message: msg.Circles) -> MarkerArray:
     return MarkerArray(markers=markers)
 
 
-def _wall(cloud: IntensityCloud, line: Line, sonar: np.ndarray) -> msg.Wall:
+def _wall(cloud: Cloud, line: Line, sonar: np.ndarray) -> msg.Wall:
     z = _middle_height(cloud, line.members)
     return msg.Wall(
         orientation=line.orientation,
@@ -82,7 +82,7 @@ def _wall(cloud: IntensityCloud, line: Line, sonar: np.ndarray) -> msg.Wall:
     )
 
 
-def _circle(cloud: IntensityCloud, circle: Circle) -> msg.Circle:
+def _circle(cloud: Cloud, circle: Circle) -> msg.Circle:
     return msg.Circle(
         center=Point(*circle.center, _middle_height(cloud, circle.members)),
         radius=circle.radius,
@@ -92,7 +92,7 @@ def _circle(cloud: IntensityCloud, circle: Circle) -> msg.Circle:
     )
 
 
-def _middle_height(cloud: IntensityCloud, members: np.ndarray) -> float:
+def _middle_height(cloud: Cloud, members: np.ndarray) -> float:
     return float(np.mean(cloud.points[members, 2], dtype=np.float64))
 
 

@@ -14,7 +14,7 @@ from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import JointAngle
 from sonar_processing.beams.beam import Beam
 from sonar_processing.ros.beam_subscriber import BeamSubscriber
-from sonar_processing.servo.tilt_scan import SonarControlParameters, TiltScan
+from sonar_processing.scans.tilt_scan import SonarControlParameters, TiltScan
 from underwater_map_construction.srv import SetScanMode, SetScanModeRequest, SetScanModeResponse
 
 TICK_PERIOD = 0.1  # s: short against every timeout of sonar_control

@@ -1,25 +1,62 @@
 """The ROS side of sonar_to_cloud: beams, tf and the velocity in, scans out (thesis 4.5.1, 6.5.2)."""
 
-from typing import Optional
+from typing import Any, Callable, Dict, List, Optional, Tuple
+
+import rospy
+from geometry_msgs.msg import Twist, TwistStamped, Vector3
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import PointCloud2
 
 from node_support import topics
+from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.head_watch import HeadWatch
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.cloud_sink import CloudSink
+from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.beams.head import HeadWatch
+from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.beam_subscriber import BeamSubscriber
-from sonar_processing.ros.publishers import CloudPublisher, PointsPublisher
-from sonar_processing.ros.revolution_publisher import RevolutionPublisher
-from sonar_processing.ros.sonar_mount import SonarMount
-from sonar_processing.ros.subscribers import subscribe_to_velocity
-from sonar_processing.ros.transform_filter import TransformFilter
-from sonar_processing.scans.assembler import ScanAssembler
+from sonar_processing.ros.cloud_topics import QUEUE_SIZE, CloudPublisher, PointsPublisher
+from sonar_processing.ros.conversions import LaserScanArrays, laser_scan_message, point_cloud
+from sonar_processing.ros.transform_filter import SonarMount, TransformFilter
+from sonar_processing.scans.assembler import RevolutionCollector, ScanAssembler
 from sonar_processing.scans.moving_state import MovingState
-from sonar_processing.scans.parameters import SonarToCloudParameters
-from sonar_processing.scans.revolution_collector import RevolutionCollector
+from sonar_processing.scans.parameters import SonarToCloudParameters, VelocityType
+from sonar_processing.scans.polar_scan import TURN_FIELDS, PolarScan, planar_laser_scan, turn_cloud
+
+_VELOCITY_KINDS: Dict[VelocityType, Tuple[type, Callable[[Any], Twist]]] = {
+    VelocityType.TWIST: (Twist, lambda message: message),
+    VelocityType.TWIST_STAMPED: (TwistStamped, lambda message: message.twist),
+    VelocityType.ODOMETRY: (Odometry, lambda message: message.twist.twist),
+}
+
+
+class RevolutionPublisher:
+    """The revolution as organised cloud, as LaserScan and as cloud with times; `sink` gets the organised cloud."""
+
+    def __init__(self, health: Health, sink: Optional[CloudSink] = None) -> None:
+        self._health = health
+        self._sink = sink
+        self._clouds = CloudPublisher(topics.POLAR_SCANS)
+        self._turns = rospy.Publisher(topics.TURNS, PointCloud2, queue_size=QUEUE_SIZE)
+        self._lasers = rospy.Publisher(topics.LASER_SCANS, LaserScanArrays, queue_size=QUEUE_SIZE)
+
+    def publish(self, beams: List[PlacedBeam], parameters: SonarToCloudParameters) -> None:
+        """Send a finished revolution to those who want it."""
+        self._health.count("turns")
+        scan = PolarScan.of(beams)
+        if self._lasers.get_num_connections():
+            laser = planar_laser_scan(scan, parameters)
+            self._lasers.publish(laser_scan_message(laser, scan.stamp_ns, scan.sonar_frame))
+        if self._turns.get_num_connections():
+            points = turn_cloud(scan, parameters)
+            self._turns.publish(point_cloud(points, scan.stamp_ns, scan.sonar_frame, fields=TURN_FIELDS))
+        is_taken = self._sink is not None and self._sink.is_wanted()
+        if not (is_taken or self._clouds.is_read):
+            return
+        cloud = scan.cloud(parameters)
+        self._clouds.publish(cloud)
+        if is_taken:
+            self._sink.take(cloud)
 
 
 class SonarToCloud:
@@ -93,7 +130,7 @@ class SonarToCloud:
         if revolution is not None:
             self._revolutions.publish(revolution, parameters)
 
-    def _publish(self, scan: IntensityCloud) -> None:
+    def _publish(self, scan: Cloud) -> None:
         self.health.count("scans")
         self.health.count("points out", len(scan))
         self._scans.publish(scan)
@@ -101,3 +138,19 @@ class SonarToCloud:
             self._laser_scans.publish(scan)
         if self._scan_sink is not None:
             self._scan_sink.take(scan)
+
+
+def subscribe_to_velocity(topic: str, kind: VelocityType, state: MovingState, health: Health) -> rospy.Subscriber:
+    """Keep `state` informed of the velocities on `topic`."""
+    message_type, twist_of = _VELOCITY_KINDS[kind]
+
+    def take(message: Any) -> None:
+        health.count("velocities in")
+        twist = twist_of(message)
+        state.take(_components(twist.linear), _components(twist.angular))
+
+    return rospy.Subscriber(topic, message_type, guarded(health, take), queue_size=QUEUE_SIZE)
+
+
+def _components(vector: Vector3) -> Tuple[float, float, float]:
+    return vector.x, vector.y, vector.z

@@ -5,19 +5,19 @@ from typing import Optional
 import numpy as np
 
 from node_support.errors import RefusedInput
+from node_support.help import answer_help
 from node_support.parameters import ParameterSet
 from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.emptied_scans import EmptiedScans
-from sonar_processing.filters.stage_table import STAGES
+from sonar_processing.cloud import Cloud
+from sonar_processing.filters.stage_table import STAGES, EmptiedScans
+from sonar_processing.ros.cloud_topics import CloudPublisher, FigurePublisher, subscribe_to_clouds
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
-from sonar_processing.ros.publishers import CloudPublisher, FigurePublisher
-from sonar_processing.ros.subscribers import subscribe_to_clouds
 
 
 class StageRunner:
-    """Runs one stage of the table, as a node of its own (`subscribe`) or called by the process that hosts it."""
+    """Runs one stage of the table, as a node of its own or called by the process that hosts it."""
 
     def __init__(self, name: str, namespace: str) -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
@@ -53,18 +53,14 @@ class StageRunner:
     def as_node(cls, name: str) -> "StageRunner":
         """Return the stage `name` as a node of its own, which takes clouds from its input topic."""
         runner = cls(name, "~")
-        runner.subscribe()
-        return runner
-
-    def subscribe(self) -> None:
-        """Take clouds from the stage's input topic."""
 
         def take(message: StampedIntensityCloudArrays) -> None:
-            self.process(cloud_from_message(message))
+            runner.process(cloud_from_message(message))
 
-        subscribe_to_clouds(self._type.input_topic, guarded(self.health, take))
+        subscribe_to_clouds(runner._type.input_topic, guarded(runner.health, take))
+        return runner
 
-    def process(self, cloud: IntensityCloud) -> Optional[IntensityCloud]:
+    def process(self, cloud: Cloud) -> Optional[Cloud]:
         """Run the stage, publish its result and return it; None when it could not be used (counted)."""
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
@@ -85,7 +81,7 @@ class StageRunner:
             figure.publish(self._type.figures[figure.name](stage))
         return result
 
-    def _count_out(self, cloud: IntensityCloud, result: IntensityCloud) -> None:
+    def _count_out(self, cloud: Cloud, result: Cloud) -> None:
         points = int(np.count_nonzero(result.valid))
         self.health.count("clouds out")
         self.health.count("points out", points)
@@ -94,3 +90,9 @@ class StageRunner:
             self.health.problem(
                 "rows of scans left without a point", f"{emptied} scans in a row; {self._type.when_empty}"
             )
+
+
+def run_stage(name: str) -> None:
+    """Run one stage of the table as a node of its own."""
+    answer_help(name, STAGES[name].parameters)
+    run(name, lambda: StageRunner.as_node(name))

@@ -1,4 +1,4 @@
-"""Collects placed beams into scans (thesis 6.5.2)."""
+"""Collects placed beams into scans (thesis 6.5.2), and into whole turns of the head."""
 
 from collections import deque
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ from typing import Deque, List, Optional
 
 import numpy as np
 
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.pause import long_after
-from sonar_processing.beams.placed_beam import PlacedBeam, servo_moved
+from sonar_processing.beams.beam import Beam, PlacedBeam, long_after, servo_moved
+from sonar_processing.beams.head import HeadTurn
 from sonar_processing.beams.projection import kept_bins, project_beams
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.scans.head_turn import HeadTurn
-from sonar_processing.scans.laser_pick import picked_bins
+from sonar_processing.cloud import Cloud
 from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.scans.polar_scan import picked_bins
+
+MOST_BEAMS = 3600  # Beams of 0.1 deg, finer than any head steps; a head that stands still must not fill the memory
 
 
 @dataclass(frozen=True)
@@ -43,11 +43,11 @@ class ScanAssembler:
         self._turn.clear()
         self._last: Optional[Beam] = None
 
-    def project(self, placed: PlacedBeam) -> IntensityCloud:
+    def project(self, placed: PlacedBeam) -> Cloud:
         """Return one beam as a cloud, as it is shown while the scan grows."""
         return self._cloud([self._projected([placed])], placed.beam)
 
-    def add(self, placed: PlacedBeam) -> Optional[IntensityCloud]:
+    def add(self, placed: PlacedBeam) -> Optional[Cloud]:
         """Add a beam; return the scan that it completes, or None.
 
         A scan ends after `scan_size` beams or when the next beam is expected where the scan began. It also ends when
@@ -80,7 +80,7 @@ class ScanAssembler:
     def _is_complete(self) -> bool:
         return len(self._beams) >= self.parameters.scan_size or (self._ends_at_turn and self._turn.is_full)
 
-    def _finish(self) -> Optional[IntensityCloud]:
+    def _finish(self) -> Optional[Cloud]:
         beams, last = list(self._beams), self._last
         self.clear()
         if not beams or last is None or self.parameters.mode.is_continuous:
@@ -101,10 +101,10 @@ class ScanAssembler:
             points, keep = points[np.arange(len(placed)), bins][:, np.newaxis], found[:, np.newaxis]
         return _Projected(points, keep, np.array([one.signed_stamp for one in placed]))
 
-    def _cloud(self, parts: List[_Projected], newest: Beam) -> IntensityCloud:
+    def _cloud(self, parts: List[_Projected], newest: Beam) -> Cloud:
         widths = [part.points.shape[1] for part in parts]
         organized = self.parameters.keep_organized and min(widths) == max(widths)
-        cloud = IntensityCloud(
+        cloud = Cloud(
             points=np.concatenate([part.points.reshape(-1, 4) for part in parts]),
             time_stamps=np.concatenate([np.repeat(part.stamps, width) for part, width in zip(parts, widths)]),
             stamp_ns=newest.stamp_ns,
@@ -114,3 +114,52 @@ class ScanAssembler:
         )
         keep = np.concatenate([part.keep.ravel() for part in parts])
         return cloud if keep.all() else cloud.select(keep)
+
+
+class RevolutionCollector:
+    """Holds the beams of the unfinished turn, whatever a scan is; at most the newest `MOST_BEAMS`."""
+
+    def __init__(self) -> None:
+        self._beams: Deque[PlacedBeam] = deque(maxlen=MOST_BEAMS)
+        self._turn = HeadTurn()
+
+    def __len__(self) -> int:
+        """Return how many beams the unfinished turn holds."""
+        return len(self._beams)
+
+    def clear(self) -> None:
+        """Forget the unfinished turn."""
+        self._beams.clear()
+        self._turn.clear()
+
+    def add(self, placed: PlacedBeam) -> Optional[List[PlacedBeam]]:
+        """Add a beam; return the beams of the turn or sweep that it completes, or None.
+
+        All beams of a turn have the same bins. A turn in which the servo or the range of the sonar changed, or the head
+        was silent for long, is forgotten; a sweep ends where the head goes back.
+        """
+        beam, finished = placed.beam, None
+        if self._beams and _differs(beam, self._beams[-1].beam):
+            self.clear()
+        elif self._turn.would_pass_start(beam.angle) or self._turn.would_reverse(beam.angle):
+            finished = self._finish()
+        self._beams.append(placed)
+        self._turn.add(beam.angle)
+        if finished is None and self._turn.is_full:
+            finished = self._finish()
+        return finished
+
+    def _finish(self) -> List[PlacedBeam]:
+        beams = list(self._beams)
+        self.clear()
+        return beams
+
+
+def _differs(beam: Beam, earlier: Beam) -> bool:
+    return (
+        servo_moved(beam, earlier)
+        or long_after(beam, earlier)
+        or beam.intensities.size != earlier.intensities.size
+        or beam.range_resolution != earlier.range_resolution
+        or beam.frame_id != earlier.frame_id
+    )

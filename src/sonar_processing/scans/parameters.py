@@ -6,10 +6,8 @@ from enum import Enum
 from node_support import topics
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.beams.beam_correction import BeamCorrection
-from sonar_processing.beams.beam_width import beam_width_parameter
-from sonar_processing.beams.mounting import MountingParameters
-from sonar_processing.messages.parameters import BeamMessageParameters
+from sonar_processing.beams.parameters import BeamCorrection, MountingParameters, beam_width_parameter
+from sonar_processing.messages.reader import BeamMessageParameters
 
 
 class ScanMode(Enum):

@@ -1,14 +1,19 @@
-"""A whole turn of the head as a polar image whose beams have their own poses."""
+"""A whole turn of the head as a polar image whose beams have their own poses, and what other mappers take of it."""
 
+import math
 from dataclasses import dataclass
-from typing import List
+from typing import List, Tuple
 
 import numpy as np
 
-from sonar_processing.beams.placed_beam import PlacedBeam
+from node_support.geometry import FULL_TURN, wrapped
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.projection import beam_directions, bin_points, kept_bins
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_processing.cloud import Cloud
+from sonar_processing.scans.parameters import LaserPick, SonarToCloudParameters
+
+MOST_RAYS = 7200  # As many as `laser_scan_rays` allows; smaller steps are rounding of a head that stands still
+TURN_FIELDS = ("x", "y", "z", "intensity", "time")
 
 
 @dataclass(frozen=True)
@@ -62,12 +67,12 @@ class PolarScan:
         heights = self.origins[:, 2:] + self.directions[:, 2:] * self.ranges
         return kept_bins(self.ranges, heights, parameters.min_range, parameters.height_limit)
 
-    def cloud(self, parameters: SonarToCloudParameters) -> IntensityCloud:
+    def cloud(self, parameters: SonarToCloudParameters) -> Cloud:
         """Return the organised cloud of all bins in the target frame: rows are beams, removed bins are NaN."""
         beams, bins = self.strengths.shape
         points = bin_points(self.origins, self.directions, self.ranges, self.strengths)
         points[~self.kept(parameters)] = np.nan
-        return IntensityCloud(
+        return Cloud(
             points=points.reshape(-1, 4),
             time_stamps=np.repeat(self.time_stamps, bins),
             stamp_ns=self.stamp_ns,
@@ -75,3 +80,93 @@ class PolarScan:
             height=beams,
             organized=True,
         )
+
+
+def picked_bins(
+    strengths: np.ndarray, keep: np.ndarray, parameters: SonarToCloudParameters
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the bin (beams,) of each beam, and (beams,) bool whether it holds an echo.
+
+    strengths: (beams, bins); keep: (beams, bins) bool, the bins that may be taken. STRONGEST takes the nearest of
+    equally strong ones.
+    """
+    heard = np.where(keep, strengths, -1.0)
+    if parameters.laser_pick is LaserPick.FIRST:
+        bins = np.argmax(heard > parameters.laser_first_above, axis=1)
+        least = parameters.laser_first_above
+    else:
+        bins = np.argmax(heard, axis=1)
+        least = parameters.laser_strongest_above
+    return bins, heard[np.arange(len(heard)), bins] > least
+
+
+@dataclass(frozen=True)
+class PlanarLaserScan:
+    """Ranges all around the sonar as they are at one moment, that of the newest beam.
+
+    ranges: (rays,) float32 m, inf where nothing was measured; ray i points to -pi + i * angle_increment about +z of
+    the sonar. intensities: (rays,) float32 echo strengths, 0 where there is no range. duration: of the turn, s.
+    """
+
+    ranges: np.ndarray
+    intensities: np.ndarray
+    range_min: float
+    range_max: float
+    duration: float
+
+    @property
+    def angle_increment(self) -> float:
+        """Angle between rays, rad."""
+        return FULL_TURN / self.ranges.size
+
+
+def planar_laser_scan(scan: PolarScan, parameters: SonarToCloudParameters) -> PlanarLaserScan:
+    """Return the scan as rays around the sonar's pose at its newest beam.
+
+    A turn takes seconds and the vehicle moves meanwhile. Each beam's echo is therefore placed by the beam's own pose,
+    and seen from the newest one; of several echoes in one ray the nearest stays. Beams may come in any direction.
+    """
+    echoes, strengths = _echoes_from_newest_pose(scan, parameters)
+    rays = parameters.laser_scan_rays or usual_rays(scan.angles)
+    ranges = np.hypot(echoes[:, 0], echoes[:, 1])
+    range_max = scan.strengths.shape[1] * scan.range_resolution
+    inside = (ranges >= parameters.min_range) & (ranges <= range_max)
+    farthest_first = np.flatnonzero(inside)[np.argsort(-ranges[inside], kind="stable")]
+    bearings = np.arctan2(echoes[farthest_first, 1], echoes[farthest_first, 0])
+    ray = np.rint((bearings + math.pi) * rays / FULL_TURN).astype(np.int64) % rays
+    result = np.full(rays, np.inf, dtype=np.float32), np.zeros(rays, dtype=np.float32)
+    result[0][ray], result[1][ray] = ranges[farthest_first], strengths[farthest_first]
+    seconds = np.abs(scan.time_stamps)
+    return PlanarLaserScan(*result, parameters.min_range, range_max, float(seconds[-1] - seconds[0]))
+
+
+def usual_rays(angles: np.ndarray) -> int:
+    """Return how many steps of the usual size between `angles` (n,) [rad] make a turn; 1 when the head stands still."""
+    steps = np.abs(wrapped(np.diff(angles)))
+    steps = steps[steps > FULL_TURN / MOST_RAYS]
+    return round(FULL_TURN / float(np.median(steps))) if steps.size else 1
+
+
+def _echoes_from_newest_pose(scan: PolarScan, parameters: SonarToCloudParameters) -> Tuple[np.ndarray, np.ndarray]:
+    bins, found = picked_bins(scan.strengths, scan.kept(parameters), parameters)
+    beams = np.flatnonzero(found)
+    bins = bins[beams]
+    points = np.ones((beams.size, 4))
+    points[:, :3] = scan.origins[beams] + scan.directions[beams] * scan.ranges[bins, np.newaxis]
+    T_newest_target = np.linalg.inv(scan.T_target_sonar[-1])
+    return (points @ T_newest_target.T)[:, :3], scan.strengths[beams, bins].astype(np.float32)
+
+
+def turn_cloud(scan: PolarScan, parameters: SonarToCloudParameters) -> np.ndarray:
+    """Return (n, 5) float32, the columns `TURN_FIELDS`: all kept bins, seen from the newest beam's pose.
+
+    Each bin is placed by the pose of its own beam, so that the vehicle's motion no longer bends the turn. Times are in
+    s after the newest beam, and so never above 0.
+    """
+    beams, bins = np.nonzero(scan.kept(parameters))
+    points = np.ones((beams.size, 4))
+    points[:, :3] = scan.origins[beams] + scan.directions[beams] * scan.ranges[bins, np.newaxis]
+    T_newest_target = np.linalg.inv(scan.T_target_sonar[-1])
+    seconds = np.abs(scan.time_stamps)
+    columns = [(points @ T_newest_target.T)[:, :3], scan.strengths[beams, bins], (seconds - seconds[-1])[beams]]
+    return np.column_stack(columns).astype(np.float32)

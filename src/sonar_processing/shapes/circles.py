@@ -7,15 +7,21 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from node_support.parameters import ParameterError, parameter
-from sonar_processing.beams.beam_width import beam_width_parameter
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.shapes.beam_echoes import beam_echoes
+from sonar_processing.beams.parameters import beam_width_parameter
+from sonar_processing.cloud import Cloud
 from sonar_processing.shapes.circle_fit import CircleFit, CircleSight, fitted_circle
+from sonar_processing.shapes.echoes import (
+    Sightings,
+    beam_echoes,
+    footprint,
+    is_alone,
+    is_oblique,
+    is_scattered,
+    sightings,
+    wall_echoes,
+)
 from sonar_processing.shapes.lines import fitted_line
-from sonar_processing.shapes.lone_groups import footprint, is_alone, is_oblique, is_scattered
 from sonar_processing.shapes.ransac import RansacParameters, best_hypothesis
-from sonar_processing.shapes.sightings import Sightings, sightings
-from sonar_processing.shapes.wall_echoes import wall_echoes
 
 SonarPositions = Callable[[np.ndarray], np.ndarray]
 """Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s], NaN where it is not known."""
@@ -161,7 +167,7 @@ class CircleDetector:
     def __init__(self, parameters: CircleDetectorParameters) -> None:
         self.parameters = parameters
 
-    def __call__(self, cloud: IntensityCloud, sonar_positions: SonarPositions) -> List[Circle]:
+    def __call__(self, cloud: Cloud, sonar_positions: SonarPositions) -> List[Circle]:
         """Return the circles of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
         strong = echoes.strong(self.parameters.min_echo_share)

@@ -6,8 +6,8 @@ from typing import List, Optional
 import numpy as np
 
 from node_support.parameters import parameter
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.shapes.beam_echoes import BeamEchoes, beam_echoes
+from sonar_processing.cloud import Cloud
+from sonar_processing.shapes.echoes import BeamEchoes, beam_echoes
 from sonar_processing.shapes.ransac import RansacParameters, best_hypothesis
 
 _REFITS = 5
@@ -96,7 +96,7 @@ class LineDetector:
     def __init__(self, parameters: LineDetectorParameters) -> None:
         self.parameters = parameters
 
-    def __call__(self, cloud: IntensityCloud) -> List[Line]:
+    def __call__(self, cloud: Cloud) -> List[Line]:
         """Return the walls of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
         rng = np.random.default_rng(self.parameters.seed)

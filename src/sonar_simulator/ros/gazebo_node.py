@@ -8,7 +8,7 @@ import rospy
 from node_support import topics
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.transforms import JointAngle
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.gazebo.beams import GazeboBeams, RayScan

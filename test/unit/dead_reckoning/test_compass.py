@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from dead_reckoning.heading import rotation_of_heading
+from dead_reckoning.dead_reckoner import rotation_of_heading
 from dead_reckoning.parameters import HeadingType
 from node_support.errors import RefusedInput
 

@@ -5,8 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dead_reckoning.dead_reckoner import DeadReckoner
-from dead_reckoning.depth import depth_of_pressure
+from dead_reckoning.dead_reckoner import DeadReckoner, depth_of_pressure
 from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix, yaw_of

@@ -7,7 +7,7 @@ from mlsm_manager.offline.echo_length import echo_sigma
 from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from sonar_processing.beams.beam import Beam
-from sonar_processing.filters.echo_extraction import ExtractionMode
+from sonar_processing.filters.echo_extractor import ExtractionMode
 
 
 def beams(strengths):

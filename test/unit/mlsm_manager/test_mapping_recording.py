@@ -6,9 +6,8 @@ import pytest
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.beam_correction import BeamCorrection
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.beams.parameters import BeamCorrection
 
 TIMES = np.arange(0.0, 11.0)
 TURNING = Track(TIMES, np.column_stack([0.5 * TIMES, 0.1 * TIMES, 0.2 * TIMES]))

@@ -11,8 +11,7 @@ from mlsm_manager.offline.replay import replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, matrices
-from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 
 DAMAGED = 5
 

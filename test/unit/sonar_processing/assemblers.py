@@ -3,7 +3,7 @@
 import numpy as np
 from clouds import beam_of
 
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sonar_processing.beams.beam import Beam
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 
 SECOND = 10**9
 
@@ -14,7 +14,7 @@ def cloud_of(strengths, height=1):
     points = np.zeros((len(strengths), 4), dtype=np.float32)
     points[:, 0] = np.arange(len(strengths))
     points[:, 3] = strengths
-    return IntensityCloud(points, np.arange(1.0, len(strengths) + 1), 5 * SECOND, "odom", height)
+    return Cloud(points, np.arange(1.0, len(strengths) + 1), 5 * SECOND, "odom", height)
 
 
 def beam_of(strengths=(10, 20, 30), angle=0.0, resolution=1.0, seconds=1, sensor_angle=0.0):

@@ -19,9 +19,8 @@ from sonar_messages import (
 )
 
 from node_support.errors import RefusedInput
-from sonar_processing.messages.parameters import BeamMessageParameters
-from sonar_processing.messages.reader import BeamReader
-from sonar_processing.messages.type_table import BEAM_TYPES, LASER_SCAN, OWN
+from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN, OWN
+from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
 
 ECHO, PING_360 = "ping360_sonar/SonarEcho", "bluerobotics_sonar_msgs/SonarPing360"
 MICRON = "micron_driver_ros/ScanLine"

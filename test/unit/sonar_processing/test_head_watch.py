@@ -7,7 +7,7 @@ from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.beams.head_watch import HeadEvent, HeadWatch
+from sonar_processing.beams.head import HeadEvent, HeadWatch
 
 GRADIAN = math.pi / 200.0
 

@@ -8,7 +8,7 @@ from clouds import cloud_of
 
 from node_support.errors import RefusedInput
 from sonar_processing.beams.beam import Beam
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 
 
 def _beam(bins=3, **values):
@@ -60,7 +60,7 @@ def test_ranges_are_those_of_the_bins_centres():
 @pytest.mark.parametrize("stamps", [0, 2, 4])
 def test_a_cloud_has_as_many_stamps_as_points(stamps):
     with pytest.raises(RefusedInput, match=f"3 points but {stamps} time stamps") as refused:
-        IntensityCloud(np.zeros((3, 4), dtype=np.float32), np.zeros(stamps), 0, "odom")
+        Cloud(np.zeros((3, 4), dtype=np.float32), np.zeros(stamps), 0, "odom")
     assert refused.value.kind == "clouds refused"
 
 

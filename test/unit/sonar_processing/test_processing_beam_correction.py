@@ -5,7 +5,7 @@ import pytest
 
 from node_support.errors import RefusedInput
 from sonar_processing.beams.beam import Beam
-from sonar_processing.beams.beam_correction import BeamCorrection
+from sonar_processing.beams.parameters import BeamCorrection
 
 BEAM = Beam(5_000_000_001, "sonar", 0.1, np.arange(4, dtype=np.uint8), 0.5)
 

@@ -18,9 +18,8 @@ from std_msgs.msg import Header
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix, quaternion_of, quaternions_of
 from node_support.ros.transforms import matrix_from_message
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.messages.parameters import BeamMessageParameters
-from sonar_processing.messages.reader import BeamReader
+from sonar_processing.cloud import Cloud
+from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
 from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
     cloud_from_message,
@@ -30,7 +29,7 @@ from sonar_processing.ros.conversions import (
     point_cloud,
     points_from_message,
 )
-from sonar_processing.scans.laser_scan import PlanarLaserScan
+from sonar_processing.scans.polar_scan import PlanarLaserScan
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 # The generated message code of Noetic writes arrays with the old name of tobytes.
@@ -124,7 +123,7 @@ def test_a_cloud_comes_back_from_its_message_bit_by_bit(points, data):
     seconds = STAMP_NS * 1e-9
     times = st.floats(seconds - HOUR, seconds + HOUR) | st.floats(-seconds - HOUR, -seconds + HOUR) | st.just(np.nan)
     stamps = data.draw(numpy_st.arrays(np.float64, len(points), elements=times))
-    cloud = IntensityCloud(points, stamps, STAMP_NS, "odom")
+    cloud = Cloud(points, stamps, STAMP_NS, "odom")
     received = cloud_from_message(_sent(cloud_to_message(cloud), StampedIntensityCloudArrays))
     assert received.points.tobytes() == points.tobytes()
     assert received.time_stamps.tobytes() == stamps.tobytes()

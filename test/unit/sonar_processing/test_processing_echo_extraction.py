@@ -8,15 +8,15 @@ from hypothesis import strategies as st
 from polar_scans import binary_image, wall_image, with_ring, with_speckle
 
 from node_support.errors import RefusedInput
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.echo_extraction import (
+from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.cloud import Cloud
+from sonar_processing.filters.echo_extractor import (
+    EchoExtractor,
     EchoExtractorParameters,
     ExtractionMode,
     extract_echoes,
     height_threshold,
 )
-from sonar_processing.filters.echo_extractor import EchoExtractor
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
@@ -218,7 +218,7 @@ def test_the_stage_tells_its_threshold():
 
 def test_a_cloud_without_rows_is_refused():
     with pytest.raises(RefusedInput, match="not organised"):
-        EchoExtractor(EchoExtractorParameters())(IntensityCloud(np.zeros((3, 4), np.float32), np.ones(3), 1, "odom"))
+        EchoExtractor(EchoExtractorParameters())(Cloud(np.zeros((3, 4), np.float32), np.ones(3), 1, "odom"))
 
 
 def test_a_cloud_of_removed_points_only_is_refused():

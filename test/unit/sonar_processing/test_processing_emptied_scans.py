@@ -1,6 +1,6 @@
 """When a stage that removes everything is noticed."""
 
-from sonar_processing.filters.emptied_scans import EmptiedScans
+from sonar_processing.filters.stage_table import EmptiedScans
 
 
 def _noticed(scans):

@@ -8,10 +8,9 @@ from clouds import SECOND, beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.scans.laser_scan import planar_laser_scan, usual_rays
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.scans.parameters import SonarToCloudParameters
-from sonar_processing.scans.polar_scan import PolarScan
+from sonar_processing.scans.polar_scan import PolarScan, planar_laser_scan, usual_rays
 
 RAYS, BINS, RESOLUTION = 120, 100, 0.1
 STEP = 2 * math.pi / RAYS

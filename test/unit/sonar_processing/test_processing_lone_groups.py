@@ -3,10 +3,16 @@ import math
 import numpy as np
 import pytest
 
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.shapes.beam_echoes import beam_echoes
-from sonar_processing.shapes.lone_groups import footprint, is_alone, is_oblique, is_scattered
-from sonar_processing.shapes.sightings import Sightings, sightings
+from sonar_processing.cloud import Cloud
+from sonar_processing.shapes.echoes import (
+    Sightings,
+    beam_echoes,
+    footprint,
+    is_alone,
+    is_oblique,
+    is_scattered,
+    sightings,
+)
 
 STEP = 0.05
 NOTHING = Sightings(np.empty((0, 2)), np.empty((0, 2)), np.empty(0, int), np.empty(0, int), np.empty(0), STEP)
@@ -78,7 +84,7 @@ def test_beams_that_heard_nothing_are_counted():
     points = np.zeros((6, 4), dtype=np.float32)
     points[:, 0], points[:, 1], points[:, 3] = np.cos(bearings) * 10.0, np.sin(bearings) * 10.0, 100.0
     stamps = 100.0 + 0.133 * np.array([0, 1, 2, 3, 9, 10])
-    echoes = beam_echoes(IntensityCloud(points, stamps, 10**9, "odom"), gap=0.5)
+    echoes = beam_echoes(Cloud(points, stamps, 10**9, "odom"), gap=0.5)
     seen = sightings(echoes, np.arange(6), np.zeros((6, 2)))
     assert seen.beams.tolist() == [0, 1, 2, 3, 9, 10]
     assert seen.step == pytest.approx(math.radians(3.0), abs=1e-6)

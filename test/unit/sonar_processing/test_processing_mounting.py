@@ -7,7 +7,7 @@ import pytest
 from clouds import beam_of
 
 from node_support.parameters import ParameterError
-from sonar_processing.beams.mounting import MountingParameters
+from sonar_processing.beams.parameters import MountingParameters
 from sonar_processing.beams.projection import project_beams
 
 

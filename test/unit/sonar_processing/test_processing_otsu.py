@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
-from sonar_processing.filters.otsu import otsu_threshold
+from sonar_processing.filters.threshold import otsu_threshold
 
 LEVELS = st.lists(st.integers(0, 255), min_size=1, max_size=60)
 FEW_LEVELS = st.lists(st.sampled_from([0, 1, 2, 100, 101, 200, 255]), min_size=1, max_size=60)

@@ -9,7 +9,7 @@ from clouds import cloud_of
 from hypothesis import assume, example, given
 from hypothesis import strategies as st
 
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.filters.outliers import (
     OutlierMode,
     OutlierRemover,
@@ -160,9 +160,9 @@ def test_points_that_are_not_finite_go_and_do_not_count_as_neighbours(mode):
     cloud = _cluster_and_a_stray()
     broken = cloud.points.copy()
     broken[:3, 1] = np.nan
-    finite = IntensityCloud(cloud.points[3:], cloud.time_stamps[3:], 0, "odom")
+    finite = Cloud(cloud.points[3:], cloud.time_stamps[3:], 0, "odom")
     remove = OutlierRemover(OutlierRemoverParameters(mode=mode, min_neighbors=3))
-    kept = remove(IntensityCloud(broken, cloud.time_stamps, 0, "odom"))
+    kept = remove(Cloud(broken, cloud.time_stamps, 0, "odom"))
     assert kept.time_stamps.tolist() == remove(finite).time_stamps.tolist()
     assert len(kept) == 17
 
@@ -180,7 +180,7 @@ def test_a_cloud_without_a_finite_point_comes_back_empty(mode):
 @pytest.mark.parametrize("mode", ["STATISTICAL", "RADIUS"])
 def test_an_organised_cloud_keeps_its_shape(mode):
     flat = _cluster_and_a_stray()
-    cloud = IntensityCloud(flat.points, flat.time_stamps, 0, "odom", height=3)
+    cloud = Cloud(flat.points, flat.time_stamps, 0, "odom", height=3)
     kept = OutlierRemover(OutlierRemoverParameters(mode=mode, min_neighbors=3))(cloud)
     assert (len(kept), kept.height) == (21, 3)
     assert np.flatnonzero(np.isnan(kept.points).all(axis=1)).tolist() == [20]
@@ -191,4 +191,4 @@ def _cluster_and_a_stray():
     points[:20, 0], points[:20, 1] = np.divmod(np.arange(20), 5)
     points[:20, :2] *= 0.1
     points[20] = (30.0, 0.0, 0.0, 99.0)
-    return IntensityCloud(points, np.arange(21.0), 0, "odom")
+    return Cloud(points, np.arange(21.0), 0, "odom")

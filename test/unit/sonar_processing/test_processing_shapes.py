@@ -6,10 +6,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.parameters import ParameterError
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.shapes.beam_echoes import beam_echoes
+from sonar_processing.cloud import Cloud
 from sonar_processing.shapes.circle_fit import CircleSight, range_differences
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.shapes.echoes import beam_echoes
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import iterations_wanted
 
@@ -19,7 +19,7 @@ def _cloud(xy, stamps=None, strengths=100.0):
     points = np.empty((len(xy), 4), dtype=np.float32)
     points[:, :2], points[:, 2], points[:, 3] = np.asarray(xy).reshape(-1, 2), -2.0, strengths
     stamps = np.arange(1.0, len(xy) + 1.0) if stamps is None else np.asarray(stamps, dtype=float)
-    return IntensityCloud(points, stamps, 10**9, "odom")
+    return Cloud(points, stamps, 10**9, "odom")
 
 
 def _wall(x, y, bearing, length, count=40, noise=0.0, seed=0):

@@ -6,9 +6,8 @@ from clouds import cloud_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.cloud import IntensityCloud
-from sonar_processing.filters.otsu import otsu_threshold
-from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
+from sonar_processing.cloud import Cloud
+from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode, otsu_threshold
 
 STRENGTHS = st.lists(st.integers(0, 255), max_size=40)
 ANY_STRENGTHS = st.lists(
@@ -96,7 +95,7 @@ def test_a_point_that_is_not_finite_in_any_value_counts_nowhere(column, broken):
 def test_clouds_of_messages_which_cannot_be_written_are_taken():
     cloud = cloud_of([10.0, 20.0, 90.0])
     points, stamps = (np.frombuffer(values.tobytes(), values.dtype) for values in (cloud.points, cloud.time_stamps))
-    kept = Thresholder(ThresholderParameters())(IntensityCloud(points.reshape(-1, 4), stamps, 0, "odom"))
+    kept = Thresholder(ThresholderParameters())(Cloud(points.reshape(-1, 4), stamps, 0, "odom"))
     assert kept.points[:, 3].tolist() == [90.0]
 
 

@@ -4,8 +4,8 @@ import pytest
 
 from node_support.health import Health
 from node_support.parameters import ParameterError
-from sonar_processing.scans.head_turn import SweepCounter
-from sonar_processing.servo.tilt_scan import SonarControlParameters, State, TiltScan
+from sonar_processing.beams.head import SweepCounter
+from sonar_processing.scans.tilt_scan import SonarControlParameters, State, TiltScan
 
 SWEEP = {"lowest_deg": -10.0, "highest_deg": 10.0, "step_deg": 10.0, "scan_beams": 4}
 

@@ -9,9 +9,9 @@ from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.beams.placed_beam import PlacedBeam
-from sonar_processing.scans.head_turn import HeadTurn
-from sonar_processing.scans.revolution_collector import MOST_BEAMS, RevolutionCollector
+from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.head import HeadTurn
+from sonar_processing.scans.assembler import MOST_BEAMS, RevolutionCollector
 
 STEP = math.radians(3.0)
 

@@ -7,12 +7,10 @@ import pytest
 from clouds import beam_of
 
 from node_support.geometry import pose_matrix
-from sonar_processing.beams.placed_beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.ros.conversions import laser_scan_message, point_cloud
-from sonar_processing.scans.laser_scan import planar_laser_scan
 from sonar_processing.scans.parameters import SonarToCloudParameters
-from sonar_processing.scans.polar_scan import PolarScan
-from sonar_processing.scans.turn_cloud import TURN_FIELDS, turn_cloud
+from sonar_processing.scans.polar_scan import TURN_FIELDS, PolarScan, planar_laser_scan, turn_cloud
 
 HALF_SIDE, RAYS, BINS, BIN = 10.0, 200, 300, 0.1
 SECONDS, SPEED, TURN_RATE = 16, 0.3, 0.03

@@ -5,7 +5,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints, points_per_echo, ramp, reaches, sights
 from mlsm_manager.scan_matching.scan import Scan
-from sonar_processing.filters.echo_extraction import height_threshold
+from sonar_processing.filters.echo_extractor import height_threshold
 
 _COUNTED = 6  # nearest points that are counted, the point included; more are no small thing
 _ALONE = (3.4, 2.4)  # points within reach, the point included: from too many for something small to few enough

@@ -4,18 +4,63 @@ The functions take any object with the fields of the message: one of rospy, of r
 AttributeError for a field that is missing, TypeError or ValueError for one that holds something else.
 """
 
+import math
+from collections import deque
 from dataclasses import dataclass
-from typing import Any, List, Sequence, Union
+from enum import Enum
+from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
 from node_support.errors import RefusedInput
 
+_VOTES = 25  # Beams that are looked back on: more than the seven that gradians spend below 2 pi in a turn
+_ROUNDING = 1e-3  # Of a float32 that holds an angle
 USUAL_SPEED_OF_SOUND = 1500.0  # m/s, what drivers assume where a message does not say
 _SLOWEST, _FASTEST = 1300.0, 1700.0  # m/s, of any water; a message with another value was not filled in
 _LASER_BINS = 500  # Bins in which the one echo of a laser ray is placed, as many as an Imagenex 852 sends
 _LASER_STRENGTH = 255
 _MOST_RAYS = 7200  # Rays of 0.05 deg, finer than any head steps; more is a broken message
+OWN = "underwater_map_construction/SonarScanLine"
+LASER_SCAN = "sensor_msgs/LaserScan"
+
+
+class AngleUnit(Enum):
+    """A unit of angles."""
+
+    RADIANS = "RADIANS"
+    DEGREES = "DEGREES"
+    GRADIANS = "GRADIANS"
+
+    def to_radians(self, angle: float) -> float:
+        """Return an angle of this unit in rad."""
+        return angle * _RADIANS[self]
+
+
+_RADIANS = {AngleUnit.RADIANS: 1.0, AngleUnit.DEGREES: math.pi / 180.0, AngleUnit.GRADIANS: math.pi / 200.0}
+
+
+class RadiansOrGradians:
+    """Tells by the values whether a driver sends gradians where radians are documented.
+
+    A value beyond a turn of radians, or a whole number, speaks for gradians: heads count their steps in them, and no
+    step but 0 is a whole number of radians. Any other value speaks for radians. The majority of the newest 25 decides,
+    so that one broken message does not.
+    """
+
+    def __init__(self) -> None:
+        self._votes: Deque[bool] = deque(maxlen=_VOTES)
+        self.unit: Optional[AngleUnit] = None
+        """None before any angle said something."""
+
+    def take(self, angle: float) -> None:
+        """Take one more angle; one that is 0 or not finite says nothing."""
+        if math.isfinite(angle) and angle != 0.0:
+            self._votes.append(angle == round(angle) or abs(angle) > 2.0 * math.pi + _ROUNDING)
+            for_gradians = sum(self._votes)
+            if 2 * for_gradians != len(self._votes):
+                is_gradians = 2 * for_gradians > len(self._votes)
+                self.unit = AngleUnit.GRADIANS if is_gradians else AngleUnit.RADIANS
 
 
 @dataclass(frozen=True)
@@ -130,3 +175,75 @@ def _echo_at(index: float) -> np.ndarray:
     if 0.0 <= index < _LASER_BINS:
         strengths[int(index)] = _LASER_STRENGTH
     return strengths
+
+
+@dataclass(frozen=True)
+class BeamType:
+    """One type of message.
+
+    names: package/Type, in ROS 1 and ROS 2. read: takes its fields. unit: of the angle as documented. may_be_gradians:
+    some drivers send gradians nevertheless. clockwise: whether angles grow clockwise seen from the tip of +z of the
+    message's frame, as the package's own scan or cloud has it. ahead: the angle that points along +x of the frame, in
+    `unit`. stamped_after_reply: the stamp was taken when the reply had come. zero, strengths, bins and source: words
+    for docs/sonars.md.
+    """
+
+    names: Tuple[str, ...]
+    read: Callable[[Any], List[BeamFields]]
+    unit: AngleUnit
+    zero: str
+    strengths: str
+    bins: str
+    source: str
+    may_be_gradians: bool = False
+    clockwise: bool = False
+    ahead: float = 0.0
+    stamped_after_reply: bool = True
+    advice: str = ""
+
+    @property
+    def name(self) -> str:
+        """The first of its names."""
+        return self.names[0]
+
+
+_TYPES: Tuple[BeamType, ...] = (
+    BeamType(
+        (OWN, "avora_msgs/SonarScanLine"), sonar_scan_line, AngleUnit.RADIANS,
+        zero="+x of the frame", strengths="0 to 255; an Imagenex 852 sends 0 to 127", bins="`range_resolution`",
+        source="`msg/SonarScanLine.msg`", stamped_after_reply=False,
+    ),
+    BeamType(
+        ("ping360_sonar/SonarEcho", "ping360_sonar_msgs/SonarEcho"), sonar_echo, AngleUnit.RADIANS,
+        zero="+x of the frame, as in the driver's LaserScan; where that is on the head is not documented",
+        strengths="0 to 255", bins="`range` / `number_of_samples`", may_be_gradians=True,
+        source="`SonarEcho.msg`, and `publishScan` and `rangeFrom` in CentraleNantesRobotics/ping360_sonar",
+    ),
+    BeamType(
+        ("bluerobotics_sonar_msgs/SonarPing360",), sonar_ping_360, AngleUnit.GRADIANS,
+        zero="astern: the angle is the head's own, of which Ping Viewer draws 200 gradians ahead",
+        strengths="0 to 255", bins="`range` / length of `profile_data`", clockwise=True, ahead=200.0,
+        source="`SonarPing360.msg` and `ping360.py` in itskalvik/bluerobotics_sonar; `polarplot.cpp` of Ping Viewer",
+    ),
+    BeamType(
+        ("micron_driver_ros/ScanLine",), scan_line, AngleUnit.DEGREES,
+        zero="+x of the frame, as in the package's `scan_line_parser`; where that is on the head is not documented",
+        strengths="0 to 255", bins="`bin_distance_step`; bin i ends at i + 1 steps",
+        source="the message has no comments; `scan_line_parser` and the driver of micron_driver_ros",
+    ),
+    BeamType(
+        (LASER_SCAN,), laser_scan, AngleUnit.RADIANS,
+        zero="+x of the frame", strengths="one echo of 255 per ray", bins="`range_max` / 500",
+        source="`LaserScan.msg` of sensor_msgs", stamped_after_reply=False,
+        advice="its rays are placed at the times that time_increment says; drivers of sonars often stamp the end of a "
+        "turn and give no true time_increment, and then the vehicle's motion is undone wrongly",
+    ),
+)  # fmt: skip
+
+BEAM_TYPES: Dict[str, BeamType] = {name: kind for kind in _TYPES for name in kind.names}
+"""By every name that a type has in ROS 1."""
+
+
+def ros1_name(name: str) -> str:
+    """Return package/Type of a type's name, which in ROS 2 is package/msg/Type."""
+    return name.replace("/msg/", "/")

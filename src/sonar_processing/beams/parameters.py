@@ -1,14 +1,23 @@
-"""Where a sonar is mounted, for vehicles whose tf does not say."""
+"""What users say of a sonar: the width of its beam, where it hangs, and the errors of its stamps and ranges."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterSet, parameter
+from sonar_processing.beams.beam import Beam
 
+# Imagenex 852: 2.5 degrees (thesis 4.1).
+_IMAGENEX_852 = 0.0436
 _FARTHEST = 100.0  # m: no sonar hangs farther from its vehicle
+
+
+def beam_width_parameter(text: str = "horizontal width of the beam") -> Any:
+    """Declare the field `beam_width` of a ParameterSet."""
+    return parameter(_IMAGENEX_852, text, unit="rad", low=0.0, high=0.5)
 
 
 @dataclass(frozen=True)
@@ -38,3 +47,25 @@ class MountingParameters(ParameterSet):
         """Return (4, 4) T_vehicle_sonar."""
         roll = math.pi if self.upside_down else 0.0
         return pose_matrix((self.mount_x, self.mount_y, self.mount_z), (roll, 0.0, self.mount_yaw))
+
+
+@dataclass(frozen=True)
+class BeamCorrection(ParameterSet):
+    """Known errors of a sonar's stamps and ranges; map_bag estimates both from a recording."""
+
+    sonar_delay: float = parameter(
+        0.0, "added to the stamps of beams to match those of the odometry", unit="s", low=-10.0, high=10.0,
+        tunable=False,
+    )  # fmt: skip
+    range_scale: float = parameter(
+        1.0, "true range divided by reported range; differs from 1 where the speed of sound does", low=0.5, high=2.0,
+        tunable=False,
+    )  # fmt: skip
+
+    def corrected(self, beam: Beam) -> Beam:
+        """Return the corrected beam; raises RefusedInput when its stamp would be below 0."""
+        return replace(
+            beam,
+            stamp_ns=beam.stamp_ns + round(self.sonar_delay * 1e9),
+            range_resolution=beam.range_resolution * self.range_scale,
+        )

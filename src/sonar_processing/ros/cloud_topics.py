@@ -1,16 +1,17 @@
-"""Publish what a stage makes, and serialise it only while somebody reads it."""
+"""Topics of clouds: published, and serialised, only while somebody reads them; and subscribed to."""
 
-from typing import Optional
+from typing import Callable, Optional
 
 import rospy
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float32
 
 from node_support.health import Health
-from sonar_processing.cloud import IntensityCloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_to_message, points_to_message
 
 QUEUE_SIZE = 10  # a reader that is ten scans late should not get them all
+_CLOUD_BUFFER_BYTES = 2**24  # a cloud of a million points; rospy reads one that is larger in pieces, slowly
 
 
 class CloudPublisher:
@@ -25,7 +26,7 @@ class CloudPublisher:
         """Whether anybody listens."""
         return self._stamped.get_num_connections() > 0 or self._plain.is_read
 
-    def publish(self, cloud: IntensityCloud) -> None:
+    def publish(self, cloud: Cloud) -> None:
         """Send the cloud to those who listen."""
         if self._stamped.get_num_connections():
             self._stamped.publish(cloud_to_message(cloud))
@@ -43,7 +44,7 @@ class PointsPublisher:
         """Whether anybody listens."""
         return self._publisher.get_num_connections() > 0
 
-    def publish(self, cloud: IntensityCloud) -> None:
+    def publish(self, cloud: Cloud) -> None:
         """Send the points to those who listen."""
         if self.is_read:
             self._publisher.publish(points_to_message(cloud))
@@ -71,3 +72,15 @@ class FigurePublisher:
         self._health.show(self.name, f"{value:.2f}")
         if self.is_read:
             self._publisher.publish(Float32(data=value))
+
+
+def subscribe_to_clouds(topic: str, callback: Callable[[StampedIntensityCloudArrays], None]) -> rospy.Subscriber:
+    """Subscribe to StampedIntensityCloud, with a buffer that holds whole clouds."""
+    return rospy.Subscriber(
+        topic,
+        StampedIntensityCloudArrays,
+        callback,
+        queue_size=QUEUE_SIZE,
+        buff_size=_CLOUD_BUFFER_BYTES,
+        tcp_nodelay=True,
+    )

@@ -1,1 +1,0 @@
-"""The servo that tilts the sonar."""
