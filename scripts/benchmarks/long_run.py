@@ -9,7 +9,6 @@ import numpy as np
 from benchmarks.harness import benchmark_parser
 from mlsm_manager.joint_solver.parameters import MultiViewParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
 
@@ -71,7 +70,7 @@ def main() -> None:
     parser = benchmark_parser("long_run", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
     scans = parser.parse_args().scans
-    solver, seconds = LiveSolver(MultiViewParameters(kernel=SolverKernel.AUTO), np.zeros(2)), []
+    solver, seconds = LiveSolver(MultiViewParameters(), np.zeros(2)), []
     for number, scan in enumerate(tour_scans(scans), start=1):
         start = time.process_time()
         estimate = solver.add(scan)

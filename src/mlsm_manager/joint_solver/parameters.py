@@ -9,7 +9,6 @@ from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from node_support.parameters import ParameterSet, parameter
 
 
@@ -132,13 +131,11 @@ class NodeSearch(Protocol):
 class MultiViewParameters:
     """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters.
 
-    kernel: what compares points with surfaces. node_search: what finds the nodes of parts of a turn; None where the
-    odometry reports distances.
+    node_search: what finds the nodes of parts of a turn; None where the odometry reports distances.
     """
 
     odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
     sonar: SonarCalibration = SonarCalibration()
     matching: SurfaceMatching = SurfaceMatching()
     window: SolverWindow = SolverWindow()
-    kernel: SolverKernel = SolverKernel.NUMPY
     node_search: Optional[NodeSearch] = None

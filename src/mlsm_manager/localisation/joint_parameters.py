@@ -6,10 +6,8 @@ from enum import Enum
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from node_support.kernels import Kernel, check_kernel
 from node_support.parameters import ParameterError, parameter
 
 # Deviations by which beams may be later than their stamps, and s of odometry that are worth waiting for.
@@ -65,16 +63,9 @@ class JointParameters(OdometryChoice):
     block_scans: int = parameter(
         5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
     )
-    solver_kernel: SolverKernel = parameter(
-        SolverKernel.NUMPY,
-        "what compares echoes with surfaces: NUMBA is faster and needs python3-numba; AUTO: NUMBA if installed",
-        tunable=False,
-    )
 
     def check(self) -> None:
-        """Refuse what is not installed, and parts of turns whose headings nobody reports."""
-        if self.solver_kernel is SolverKernel.NUMBA:
-            check_kernel("solver_kernel", Kernel.NUMBA)
+        """Refuse parts of turns whose headings nobody reports."""
         if self.odometry is OdometryKind.NONE and self.scan_parts > 1:
             raise ParameterError(
                 f"scan_parts = {self.scan_parts}: must be 1 with odometry = NONE, because parts of turns are placed "
@@ -106,7 +97,6 @@ class JointParameters(OdometryChoice):
             ),
             matching=self._matching(),
             window=self._window(odometry.distance_deviation),
-            kernel=self.solver_kernel.resolved,
             node_search=self.node_search(self.scan_parts),
         )
 

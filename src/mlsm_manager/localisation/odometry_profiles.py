@@ -21,7 +21,6 @@ from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
 from mlsm_manager.joint_solver.parameters import NodeSearch
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.parameters import ParameterSet, parameter
 
@@ -243,11 +242,6 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         _NEIGHBOURS,
         Setting("normal_deviation", 0.1, "rad: half of heading's, so that the little that parts of a turn hear counts"),
         _POSTS,
-        Setting(
-            "solver_kernel",
-            SolverKernel.AUTO.value,
-            "thousands of particles are compared, which compiled loops do faster",
-        ),
         *_COMPASS,
     ),
     OdometryKind.NONE: (

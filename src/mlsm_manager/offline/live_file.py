@@ -30,8 +30,6 @@ class _CloudParameters(ReadingParameters, BeamCorrection):
 _SHARED: Dict[str, Type[ParameterSet]] = {**NODES, "sonar_to_cloud": _CloudParameters}
 _ONLY_LIVE = {"dead_reckoning"}
 """Nodes of which a profile's yaml file says something too, and that a replay has no use for."""
-_OF_THE_MACHINE = {"solver_kernel"}
-"""What depends on what is installed, and changes no result."""
 _COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take it as parameters:=FILE.\n"
 
 
@@ -81,6 +79,6 @@ def live_text(parameters: ReplayParameters, odom_frame: str, base_frame: str) ->
 
 def _common(values: Mapping[str, Any], node: str) -> Dict[str, Any]:
     """Return those of `values` that both the node and a replay know by the same name and meaning."""
-    replayed = {field.name for field in fields(ReplayParameters)} - _OF_THE_MACHINE
+    replayed = {field.name for field in fields(ReplayParameters)}
     names = [field.name for field in fields(_SHARED[node]) if field.name in replayed]
     return {name: values[name] for name in names if name in values}

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from node_support.parameters import with_defaults
@@ -14,7 +13,6 @@ from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 @dataclass(frozen=True)
 @with_defaults(
     estimator=EstimatorName.JOINT,
-    solver_kernel=SolverKernel.AUTO,
     range_scale_deviation=0.02,
     sonar_delay_deviation=1.0,
     scale_deviation=0.01,

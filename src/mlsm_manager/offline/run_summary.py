@@ -19,7 +19,6 @@ def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: 
         "beams_without_transform": mapped.recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(mapped.recording.seconds / seconds, 1),
-        "solver_kernel": parameters.solver_kernel.resolved.value,
         "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
         **({} if mapped.found is None else mapped.found.to_mapping()),
         **({"found_again": mapped.replayed.found_again} if mapped.replayed.found_again else {}),
@@ -34,7 +33,7 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     lines = [
         f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
         f"{alone} with nothing to match; {summary['blocks']} blocks; {summary['seconds']} s, "
-        f"{summary['times_real_time']} times real time with {summary['solver_kernel'].lower()}",
+        f"{summary['times_real_time']} times real time",
         f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
     ]
     for name in (ODOMETRY, CORRECTED, REFINED):

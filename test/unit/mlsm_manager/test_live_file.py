@@ -69,16 +69,13 @@ def values_of(field):
     return st.one_of(st.sampled_from([field.type(told.low), field.type(told.high)]), kind(told.low, told.high))
 
 
-OF_THE_MACHINE = {"solver_kernel"}
-
-
 def allowed_together(values):
     """Return values without parts of turns where no heading is known."""
     return {**values, "scan_parts": 1} if values["odometry"] is OdometryKind.NONE else values
 
 
 ANY_PARAMETERS = st.fixed_dictionaries(
-    {field.name: values_of(field) for field in dataclasses.fields(ReplayParameters) if field.name not in OF_THE_MACHINE}
+    {field.name: values_of(field) for field in dataclasses.fields(ReplayParameters)}
 ).map(allowed_together)
 
 
@@ -96,11 +93,6 @@ def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     for name, own in live.items():
         NODES[name].from_mapping({**default_values(name), **own})
     assert ReplayParameters.from_mapping(replay_values(live)) == parameters
-
-
-def test_what_is_installed_on_a_machine_says_nothing_of_the_vehicle():
-    live = live_values(ReplayParameters(solver_kernel="AUTO"), "odom", "base_link")
-    assert not OF_THE_MACHINE & set(live["mlsm_core"])
 
 
 def test_map_bag_takes_it_back(written):

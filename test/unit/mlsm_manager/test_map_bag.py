@@ -42,7 +42,7 @@ def test_the_same_command_writes_the_same_bytes(basin, tmp_path):
 
 def test_the_summary_has_the_promised_keys(basin):
     summary = summary_of(basin)
-    counts = {"scans", "matched", "rejected", "blocks", "seconds", "times_real_time", "solver_kernel"}
+    counts = {"scans", "matched", "rejected", "blocks", "seconds", "times_real_time"}
     assert counts <= set(summary)
     for name in ("dead_reckoning", "corrected", "refined"):
         assert set(summary[name]) == {"mean", "sd", "max"}

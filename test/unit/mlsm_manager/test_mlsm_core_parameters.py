@@ -1,10 +1,7 @@
 """What mlsm_core's parameters allow together."""
 
-import sys
-
 import pytest
 
-from mlsm_manager.joint_solver.solver_kernel import SolverKernel
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.parameters import ParameterError
 
@@ -27,17 +24,6 @@ def test_map_and_odom_must_be_two_frames():
         MlsmCoreParameters(map_frame="odom")
 
 
-def test_compiled_loops_without_numba_are_refused_in_one_line(monkeypatch):
-    monkeypatch.setattr("node_support.kernels.find_spec", lambda name: None)
-    with pytest.raises(ParameterError, match="solver_kernel = NUMBA: needs numba; install it with"):
-        MlsmCoreParameters(solver_kernel="NUMBA")
-
-
 def test_parts_of_turns_without_any_heading_are_refused():
     with pytest.raises(ParameterError, match=r"scan_parts = 3: must be 1 with odometry = NONE"):
         MlsmCoreParameters(odometry="NONE", scan_parts=3)
-
-
-def test_without_numba_numpy_compares(monkeypatch):
-    monkeypatch.setitem(sys.modules, "mlsm_manager.joint_solver.compiled.compiled_search", None)
-    assert SolverKernel.AUTO.resolved is SolverKernel.NUMPY
