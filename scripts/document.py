@@ -8,14 +8,14 @@ from pathlib import Path
 from typing import Dict, Type
 
 from dead_reckoning.parameters import DeadReckoningParameters
-from imagenex_852_driver.emulator.parameters import EmulatorParameters
+from imagenex_852_driver.emulated_852 import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterSet, describe
-from ping360_driver.emulator.parameters import EmulatorParameters as Ping360EmulatorParameters
+from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemoverParameters

@@ -6,16 +6,14 @@ from typing import Callable, Iterator, Optional, Tuple
 
 import numpy as np
 
-from imagenex_852_driver.logs.log_file import LogReader
-from imagenex_852_driver.logs.playback import timed
-from imagenex_852_driver.protocol.angles import head_angle as imagenex_angle
-from ping360_driver.logs.ping_viewer_log import NoLogError, PingViewerLog
-from ping360_driver.protocol.angles import head_angle as ping360_angle
-from ping360_driver.protocol.message_stream import MessageStream
-from ping360_driver.protocol.messages import MessageError, MessageId
+from imagenex_852_driver.log_file import LogReader, timed
+from imagenex_852_driver.protocol.reply import head_angle as imagenex_angle
+from ping360_driver.ping_viewer_log import NoLogError, PingViewerLog
+from ping360_driver.protocol.messages import MessageError, MessageId, MessageStream
 from ping360_driver.protocol.replies import Beam as HeadBeam
 from ping360_driver.protocol.replies import beam as head_beam
-from ping360_driver.protocol.sampling import bin_length
+from ping360_driver.protocol.scan_command import bin_length
+from ping360_driver.protocol.scan_command import head_angle as ping360_angle
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from sonar_processing.beams.beam import Beam

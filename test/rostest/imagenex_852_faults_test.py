@@ -13,9 +13,10 @@ sys.path.insert(0, os.path.join(_HERE, os.pardir, "unit", "imagenex_852_driver")
 from driver_listener import beams, diagnostics, values  # noqa: E402
 from fault_experiment import GOOD, NumberedEchoes, RecordingInjector, fault_rates  # noqa: E402
 
-from imagenex_852_driver.emulator import Emulated852  # noqa: E402
-from imagenex_852_driver.line.timing import LineTiming  # noqa: E402
-from sonar_driver.emulator import Fault, HeadServer, PtyLine  # noqa: E402
+from imagenex_852_driver.emulated_852 import Emulated852  # noqa: E402
+from imagenex_852_driver.line.parameters import LineTiming  # noqa: E402
+from sonar_driver.emulator.faults import Fault  # noqa: E402
+from sonar_driver.emulator.head_server import HeadServer, PtyLine  # noqa: E402
 
 _TIMING = LineTiming(baud_rate=1152000, speed_of_sound=15000.0)
 

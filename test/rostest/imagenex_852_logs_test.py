@@ -13,9 +13,9 @@ import rostest
 from driver_listener import beams, diagnostics, values
 from graph import PATIENCE, recording
 
-from imagenex_852_driver.logs import log_file
-from imagenex_852_driver.logs.log_record import LoggedPing
-from imagenex_852_driver.protocol import Reply, ReplyKind
+from imagenex_852_driver.log_file import LogReader, LogWriter
+from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 from underwater_map_construction.msg import SonarScanLine
 
 PACKAGE = "underwater_map_construction"
@@ -44,7 +44,7 @@ class TestLogs(unittest.TestCase):
         self.folder = Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, self.folder)
         self.log = self.folder / "made_up.852"
-        with log_file.LogWriter(self.log) as writer:
+        with LogWriter(self.log) as writer:
             for index in range(10):
                 writer.write(logged(index))
 
@@ -126,7 +126,7 @@ class TestLogs(unittest.TestCase):
         for message in sent:
             publisher.publish(message)
         assert health.wait(lambda arrays: arrays and values(arrays[-1]).get("pings written") == "10")
-        for made, written in zip(map(logged, range(10)), log_file.read(copy)):
+        for made, written in zip(map(logged, range(10)), LogReader(copy)):
             assert (written.reply, written.stamp) == (made.reply, made.stamp)
             assert written.start_gain_db == 7
         publisher.unregister()

@@ -15,7 +15,8 @@ from numbered_pings import RecordingInjector  # noqa: E402
 from ping360_fault_experiment import fault_rates  # noqa: E402
 from ping360_line import emulated, served_line  # noqa: E402
 
-from sonar_driver.emulator import Fault, HeadServer  # noqa: E402
+from sonar_driver.emulator.faults import Fault  # noqa: E402
+from sonar_driver.emulator.head_server import HeadServer  # noqa: E402
 
 _GOOD = (Fault.NONE, Fault.DOUBLED, Fault.LATE)
 

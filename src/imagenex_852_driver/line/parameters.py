@@ -1,17 +1,168 @@
-"""Every parameter of the driver in one set: the line, the head and how its beams are published."""
+"""Every parameter of the driver: the head's settings, validated before any of them is sent, the line and its timing."""
 
 from dataclasses import dataclass
+from enum import Enum
 
-from imagenex_852_driver.line.connection import ConnectionParameters
-from imagenex_852_driver.protocol.settings import HeadSettings
-from sonar_driver.line.parameters import MountingParameters
+from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
+from imagenex_852_driver.protocol.command import SwitchCommand
+from imagenex_852_driver.protocol.reply import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError
+from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_driver.line.parameters import LineParameters, MountingParameters
+from sonar_driver.line.port import transmission_time
+
+MECHANICAL_LIMIT_DEG = 210  # the head's mechanical stops, to either side of straight ahead
+
+
+class Direction(Enum):
+    """Which way the head turns, seen from above, if it is mounted upright."""
+
+    CLOCKWISE = "clockwise"
+    COUNTERCLOCKWISE = "counterclockwise"
+
+
+@dataclass(frozen=True)
+class HeadSettings(ParameterSet):
+    """Every setting of the head; angles are degrees, clockwise, as the head counts them.
+
+    Raises ParameterError for a value out of range and for values that do not fit together.
+    """
+
+    max_range: int = parameter(
+        20, "range of a beam: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range"
+    )
+    direction: Direction = parameter(
+        Direction.CLOCKWISE, "direction the head turns, seen from above", thesis_name="Direction"
+    )
+    start_gain_db: int = parameter(20, "receiver gain", unit="dB", low=0, high=40, thesis_name="Gain")
+    absorption_db_per_m: float = parameter(
+        0.2, "absorption of the water", unit="dB/m", low=0.0, high=2.55, thesis_name="Absorption"
+    )
+    train_angle_deg: int = parameter(
+        0, "centre of the sector, in steps of 3", unit="deg", low=-210, high=210, thesis_name="Train angle"
+    )
+    sector_width_deg: int = parameter(
+        360, "width of the sector, in steps of 3", unit="deg", low=0, high=360, thesis_name="Sector width"
+    )
+    step_size_deg: int = parameter(
+        3, "turn between pings: 0, 3 or 6", unit="deg", low=0, high=6, thesis_name="Step size"
+    )
+    pulse_length_us: int = parameter(
+        100, "length of the pulse; 253 is not possible", unit="us", low=1, high=255, thesis_name="Pulse length"
+    )
+    data_points: int = parameter(500, "echoes per beam: 250 or 500", low=250, high=500, thesis_name="Data points")
+    switch_delay_ms: int = parameter(
+        0, "pause before the reply, in steps of 2; 506 is not possible",
+        unit="ms", low=0, high=510, thesis_name="Switch delay",
+    )  # fmt: skip
+    frequency_khz: int = parameter(
+        675, "sound frequency: 675 or 850", unit="kHz", low=675, high=850, thesis_name="Frequency"
+    )
+    head_id: int = parameter(
+        SONAR_HEAD_ID, "identification of the head: 16 sonar, 17 to 21 echo sounders",
+        low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False,
+    )  # fmt: skip
+
+    def check(self) -> None:
+        """Raise ParameterError for values between the allowed steps and for a sector the head cannot scan."""
+        super().check()
+        self._require_one_of("max_range", RANGES)
+        self._require_one_of("step_size_deg", (0, 3, 6))
+        self._require_one_of("data_points", (250, 500))
+        self._require_one_of("frequency_khz", (675, 850))
+        self._require_step("train_angle_deg", 3, "deg")
+        self._require_step("sector_width_deg", 3, "deg")
+        self._require_step("switch_delay_ms", 2, "ms")
+        self._check_sector()
+        self.command()
+
+    def command(self) -> SwitchCommand:
+        """Return the command that asks for one ping with these settings."""
+        try:
+            return SwitchCommand(
+                head_id=self.head_id,
+                max_range=self.max_range,
+                reverse=self.direction is Direction.COUNTERCLOCKWISE,
+                start_gain_db=self.start_gain_db,
+                absorption_centi_db_per_m=round(self.absorption_db_per_m * 100),
+                train_angle_deg=self.train_angle_deg,
+                sector_width_deg=self.sector_width_deg,
+                step_size_deg=self.step_size_deg,
+                pulse_length_us=self.pulse_length_us,
+                data_points=self.data_points,
+                switch_delay_ms=self.switch_delay_ms,
+                frequency_khz=self.frequency_khz,
+            )
+        except FrameError as error:
+            raise ParameterError(self._terminator_complaint() or str(error)) from error
+
+    def _check_sector(self) -> None:
+        reach = abs(self.train_angle_deg) + self.sector_width_deg / 2
+        if reach > MECHANICAL_LIMIT_DEG:
+            raise ParameterError(
+                f"train_angle_deg = {self.train_angle_deg} with sector_width_deg = {self.sector_width_deg}: "
+                f"the sector would end at {reach:g} deg, the head stops at {MECHANICAL_LIMIT_DEG} deg"
+            )
+        if 0 < self.sector_width_deg < self.step_size_deg:
+            raise ParameterError(
+                f"sector_width_deg = {self.sector_width_deg}: narrower than step_size_deg = {self.step_size_deg}"
+            )
+
+    def _require_one_of(self, name: str, allowed: tuple) -> None:
+        if getattr(self, name) not in allowed:
+            choices = ", ".join(str(value) for value in allowed)
+            raise ParameterError(f"{name} = {getattr(self, name)}: must be one of {choices}")
+
+    def _require_step(self, name: str, step: int, unit: str) -> None:
+        if getattr(self, name) % step:
+            raise ParameterError(f"{name} = {getattr(self, name)}: must be a multiple of {step} {unit}")
+
+    def _terminator_complaint(self) -> str:
+        suspects = {"pulse_length_us": 253, "switch_delay_ms": 506}
+        names = [name for name, value in suspects.items() if getattr(self, name) == value]
+        if round(self.absorption_db_per_m * 100) == 253:
+            names.append("absorption_db_per_m")
+        complaints = (f"{name} = {getattr(self, name)}" for name in names)
+        return f"{', '.join(complaints)}: its byte would be 253, which ends a command" if names else ""
+
+
+@dataclass(frozen=True)
+class LineTiming:
+    """Baud rate (8N1) and speed of sound; all results are seconds after the command's first bit."""
+
+    baud_rate: int = 115200
+    speed_of_sound: float = 1500.0
+
+    def transmission(self, byte_count: int) -> float:
+        """Return the time that `byte_count` bytes take on the line."""
+        return transmission_time(byte_count, self.baud_rate)
+
+    def ping_leaves(self) -> float:
+        """Return when the head transmits: it acts on the last byte of the command."""
+        return self.transmission(COMMAND_LENGTH)
+
+    def reply_begins(self, command: SwitchCommand) -> float:
+        """Return when the reply can leave the head at the earliest: after the farthest echo and the switch delay."""
+        travel = 2 * command.max_range / self.speed_of_sound
+        return self.ping_leaves() + travel + command.switch_delay_ms / 1000
+
+    def reply_ends(self, command: SwitchCommand) -> float:
+        """Return when the last byte of the reply can have arrived at the earliest."""
+        return self.reply_begins(command) + self.transmission(command.reply_kind.length)
+
+
+@dataclass(frozen=True)
+class ConnectionParameters(LineParameters):
+    """Where the head is connected, and how long its replies take."""
+
+    speed_of_sound: float = parameter(
+        1500.0, "speed of sound that the head assumes", unit="m/s", low=1000.0, tunable=False
+    )
+
+    def timing(self) -> LineTiming:
+        """Return the timing of pings on this line."""
+        return LineTiming(self.baud_rate, self.speed_of_sound)
 
 
 @dataclass(frozen=True)
 class DriverParameters(MountingParameters, HeadSettings, ConnectionParameters):
     """Parameters of imagenex_852_driver; usable wherever a `HeadSettings` or `ConnectionParameters` is expected."""
-
-    def check(self) -> None:
-        """Raise ParameterError when settings of the head, or of the line, do not fit together."""
-        HeadSettings.check(self)
-        ConnectionParameters.check(self)

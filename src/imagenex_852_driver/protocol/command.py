@@ -1,9 +1,9 @@
 """The switch command, 27 bytes to the head (thesis 4.1.4, manufacturer's serial interface specification)."""
 
 from dataclasses import dataclass, fields
+from typing import List
 
-from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError, require
-from imagenex_852_driver.protocol.reply import ReplyKind
+from imagenex_852_driver.protocol.reply import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError, ReplyKind, require
 
 HEADER = b"\xfe\x44"
 TERMINATOR = 0xFD  # Bytes and codes of the manufacturer's serial interface specification
@@ -116,3 +116,32 @@ class SwitchCommand:
             switch_delay_ms=frame[24] * 2,
             frequency_khz=_FREQUENCIES_KHZ[frame[25]],
         )
+
+
+class CommandReader:
+    """Incremental reader of switch commands; `rejected` counts commands that began but turned out to be invalid."""
+
+    def __init__(self) -> None:
+        self.rejected = 0
+        self._buffer = bytearray()
+
+    def feed(self, data: bytes) -> List[SwitchCommand]:
+        """Take the next bytes of the stream, return the commands they complete; never raises."""
+        self._buffer += data
+        commands = []
+        while self._find_header() and len(self._buffer) >= LENGTH:
+            try:
+                commands.append(SwitchCommand.decode(bytes(self._buffer[:LENGTH])))
+                del self._buffer[:LENGTH]
+            except FrameError:
+                self.rejected += 1
+                del self._buffer[:1]
+        return commands
+
+    def _find_header(self) -> bool:
+        start = self._buffer.find(HEADER)
+        if start < 0:
+            del self._buffer[: -1 if self._buffer.endswith(HEADER[:1]) else None]
+            return False
+        del self._buffer[:start]
+        return True

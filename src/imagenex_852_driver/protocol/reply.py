@@ -1,16 +1,37 @@
-"""The head's reply: 12 bytes of header, 0, 252 or 500 echo strengths, one terminator (thesis 4.1.4)."""
+"""The head's reply: 12 bytes of header, 0, 252 or 500 echo strengths, one terminator (thesis 4.1.4); and its angles."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
+from typing import Any, Container
 
-from imagenex_852_driver.protocol.errors import HEAD_IDS, RANGES, SONAR_HEAD_ID, require
-
+RANGES = (5, 10, 20, 30, 40, 50)  # m: the only ranges that the head takes (manufacturer's specification)
+SONAR_HEAD_ID = 0x10  # As delivered (manufacturer's specification)
+HEAD_IDS = range(0x10, 0x16)
+AHEAD = 1400  # Head position straight ahead; positions are 0.15 deg, clockwise (manufacturer's specification)
+_RADIANS_PER_POSITION = math.radians(0.15)
 HEADER_LENGTH = 12  # Lengths, bytes and bits of the manufacturer's serial interface specification
 TERMINATOR = 0xFC
 SWITCHES_ACCEPTED = 0x40
 OVERRUN = 0x80
-
 _CLOCKWISE_BIT = 0x40
+
+
+class FrameError(ValueError):
+    """A frame, or a value meant for one, that the protocol does not allow; the text names field and value."""
+
+
+def require(name: str, value: Any, allowed: Container) -> None:
+    """Raise FrameError unless `value` is in `allowed`."""
+    if value not in allowed:
+        raise FrameError(f"{name} = {value!r}: not allowed by the protocol, which takes {_in_words(allowed)}")
+
+
+def _in_words(allowed: Container) -> str:
+    if not isinstance(allowed, range):
+        return ", ".join(str(value) for value in allowed)
+    steps = f" in steps of {allowed.step}" if allowed.step != 1 else ""
+    return f"{allowed[0]} to {allowed[-1]}{steps}"
 
 
 class ReplyKind(Enum):
@@ -111,6 +132,21 @@ class Reply:
             profile_range_cm=_unpacked(frame[8], frame[9]),
             echoes=bytes(frame[HEADER_LENGTH:-1]),
         )
+
+
+def head_angle(head_position: int, inverted: bool = False) -> float:
+    """Return the angle of the beam about +z from +x, counter-clockwise radians in [-pi, pi] (REP-103).
+
+    `inverted` means a head mounted upside down: what it counts clockwise is then counter-clockwise.
+    """
+    clockwise = (head_position - AHEAD) * _RADIANS_PER_POSITION
+    return math.remainder(clockwise if inverted else -clockwise, 2 * math.pi)
+
+
+def head_position(angle: float, inverted: bool = False) -> int:
+    """Return the position nearest to `angle`, among those within half a turn of straight ahead."""
+    wrapped = math.remainder(angle, 2 * math.pi)
+    return AHEAD + round((wrapped if inverted else -wrapped) / _RADIANS_PER_POSITION)
 
 
 def check_header(data: bytes) -> ReplyKind:

@@ -4,8 +4,7 @@ import re
 from dataclasses import dataclass
 from typing import List, NamedTuple, Optional
 
-from imagenex_852_driver.protocol.errors import HEAD_IDS, FrameError
-from imagenex_852_driver.protocol.reply import HEADER_LENGTH, Reply, ReplyKind, check_header
+from imagenex_852_driver.protocol.reply import HEAD_IDS, HEADER_LENGTH, FrameError, Reply, ReplyKind, check_header
 
 _LETTERS = re.compile(b"I[MGP]X")
 _UNFINISHED_LETTERS = re.compile(b"I[MGP]?\\Z")

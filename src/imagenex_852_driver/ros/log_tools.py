@@ -2,33 +2,108 @@
 
 import math
 import os
+import sys
 import threading
 import time
-from argparse import Namespace
+from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from dataclasses import replace
 from pathlib import Path
-from typing import Optional
+from typing import List, Optional
 
 import rosbag
 import rospy
 from dynamic_reconfigure.encoding import decode_config
 from dynamic_reconfigure.msg import Config
+from rosgraph.names import anonymous_name
 
-from imagenex_852_driver.logs import log_file
-from imagenex_852_driver.logs.log_record import LoggedPing
-from imagenex_852_driver.logs.playback import timed
-from imagenex_852_driver.protocol.angles import head_position
-from imagenex_852_driver.protocol.settings import HeadSettings
-from imagenex_852_driver.ros.messages import logged_ping, scan_line
+from imagenex_852_driver.line.parameters import HeadSettings
+from imagenex_852_driver.log_file import LogReader, LogWriter, timed
+from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind, head_position
+from imagenex_852_driver.ros.nodes import reply_message
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.files import whole_file
 from node_support.headers import check_stamp
+from node_support.help import CommandLine
 from node_support.parameters import ParameterError
 from node_support.ros.callbacks import guarded, make_health
-from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError
+from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, run
 from underwater_map_construction.msg import SonarScanLine
 
+_KINDS = {kind.echo_count: kind for kind in ReplyKind if kind.echo_count}
 _WAIT_STEP = 0.05  # s: soon enough for a person
+
+
+def run_player() -> None:
+    """Publish a log, then end; several may play at once."""
+    options = play_arguments(rospy.myargv()[1:])
+    run(anonymous_name("play_852"), lambda: LogPlayer(options))
+
+
+def run_recorder() -> None:
+    """Record a log until Ctrl-C."""
+    options = record_arguments(rospy.myargv()[1:])
+    run("record_852", lambda: LogRecorder(options))
+
+
+def run_converter() -> None:
+    """Convert a log to a bag; needs no ROS master."""
+    try:
+        print(f"convert_852: {convert(convert_arguments(sys.argv[1:]))}")
+    except StartError as error:
+        sys.exit(f"convert_852: {error}")
+
+
+def play_arguments(arguments: List[str]) -> Namespace:
+    """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
+    parser = CommandLine("play_852", description="Publish the pings of a .852 log on sonar/raw.")
+    parser.add_argument("file", help="log to play")
+    _add_rate(parser)
+    parser.add_argument("--loop", action="store_true", help="start again at the end")
+    parser.add_argument("--wait-for-subscribers", action="store_true", help="start when somebody subscribes")
+    _add_mount(parser)
+    return parser.parse_args(arguments)
+
+
+def record_arguments(arguments: List[str]) -> Namespace:
+    """Return file and driver; exits on a bad command line."""
+    parser = CommandLine("record_852", description="Append the beams of sonar/raw to a .852 log.")
+    parser.add_argument("file", help="log to append to")
+    parser.add_argument("--driver", default="imagenex_852_driver", help="node whose settings go into the log")
+    return parser.parse_args(arguments)
+
+
+def convert_arguments(arguments: List[str]) -> Namespace:
+    """Return file, out, rate, start, topic, frame_id and inverted; exits on a bad command line."""
+    parser = CommandLine("convert_852", description="Convert a .852 log to a bag.")
+    parser.add_argument("file", help="log to convert")
+    parser.add_argument("--out", required=True, help="bag to write; an existing one is replaced")
+    _add_rate(parser)
+    parser.add_argument(
+        "--start", type=_positive, help="time of the first ping, s since 1970 (default: the log's, else the file's)"
+    )
+    parser.add_argument("--topic", default=f"/{topics.BEAMS}")
+    _add_mount(parser)
+    return parser.parse_args(arguments)
+
+
+def _add_rate(parser: ArgumentParser) -> None:
+    parser.add_argument(
+        "--rate", type=_positive, help="pings per second (default: as logged, and 10 where the log has no times)"
+    )
+
+
+def _add_mount(parser: ArgumentParser) -> None:
+    parser.add_argument("--frame-id", default="sonar", help="frame of the head")
+    parser.add_argument("--inverted", action="store_true", help="the head was mounted upside down")
+
+
+def _positive(text: str) -> float:
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise ArgumentTypeError(f"{text}: must be above 0")
+    return value
 
 
 class LogPlayer:
@@ -122,7 +197,7 @@ class LogRecorder:
         self._last_position: Optional[int] = None
         self._clockwise = True
         try:
-            self._writer = log_file.LogWriter(options.file)
+            self._writer = LogWriter(options.file)
         except OSError as error:
             raise StartError(f"{options.file}: {error.strerror}") from error
         rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(self._health, self._take_settings))
@@ -158,15 +233,40 @@ class LogRecorder:
         self._writer.close()
 
 
-def opened(path: str) -> log_file.LogReader:
+def logged_ping(
+    message: SonarScanLine, settings: HeadSettings, inverted: bool = False, clockwise: bool = True
+) -> LoggedPing:
+    """Return the log's form of a message, with the settings that the message does not contain.
+
+    Raises RefusedInput for a message that a head of this kind cannot have sent.
+    """
+    kind = _KINDS.get(len(message.intensities))
+    if kind is None:
+        counts = " or ".join(str(count) for count in _KINDS)
+        raise RefusedInput("beams refused", f"{len(message.intensities)} intensities, a log takes {counts}")
+    try:
+        reply = Reply(
+            kind,
+            max_range=round(message.maxrange_meters),
+            echoes=bytes(message.intensities),
+            head_id=settings.head_id,
+            head_position=head_position(message.angle, inverted),
+            clockwise=clockwise,
+        )
+    except ValueError as error:
+        raise RefusedInput("beams refused", str(error)) from error
+    return replace(LoggedPing.of(message.header.stamp.to_sec(), settings.command(), reply), start_gain_db=message.gain)
+
+
+def opened(path: str) -> LogReader:
     """Return the reader of a log; raises StartError if it cannot be read."""
     try:
-        return log_file.read(path)
+        return LogReader(path)
     except OSError as error:
         raise StartError(f"{path}: {error.strerror}") from error
 
 
-def summary(reader: log_file.LogReader) -> str:
+def summary(reader: LogReader) -> str:
     """Return in words what the part of a log that was read contains."""
     damages = "; ".join(str(damage) for damage in reader.damages[:3])
     skipped = f", skipped {reader.damage_count} damaged parts: {damages}" if reader.damage_count else ""
@@ -174,4 +274,7 @@ def summary(reader: log_file.LogReader) -> str:
 
 
 def _message(ping: LoggedPing, stamp: float, options: Namespace) -> Optional[SonarScanLine]:
-    return scan_line(stamp, ping.reply, ping.start_gain_db, options.frame_id, options.inverted)
+    message = reply_message(ping.reply, ping.start_gain_db, options.inverted)
+    if message is not None:
+        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp), options.frame_id
+    return message

@@ -1,43 +1,52 @@
-"""The executables of this package."""
+"""The nodes of the Imagenex 852: its driver and its emulated head."""
 
-import sys
+from typing import Optional
 
-import rospy
-from rosgraph.names import anonymous_name
-
-from imagenex_852_driver.logs.arguments import convert_arguments, play_arguments, record_arguments
-from imagenex_852_driver.ros.log_tools import LogPlayer, LogRecorder, convert
-from imagenex_852_driver.ros.model import EmulatedImagenex852, Imagenex852
-from node_support.ros.node import StartError, run
-from sonar_driver.ros.driver_node import DriverNode
-from sonar_driver.ros.emulator_node import EmulatorNode, WorldEchoes
+from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
+from imagenex_852_driver.line.device import PROBLEMS, Ping, SonarDevice
+from imagenex_852_driver.line.parameters import DriverParameters
+from imagenex_852_driver.protocol.reply import Reply, head_angle
+from node_support.ros.node import run
+from sonar_driver.emulator.emulated_head import EchoSource
+from sonar_driver.emulator.faults import FaultInjector
+from sonar_driver.emulator.head_server import PtyLine
+from sonar_driver.ros.driver_node import DriverNode, SonarModel
+from sonar_driver.ros.emulator_node import EmulatorNode, HeadModel, WorldEchoes
+from underwater_map_construction.msg import SonarScanLine
 
 
 def run_driver() -> None:
     """Run the driver."""
-    run(Imagenex852.name, lambda: DriverNode(Imagenex852()))
+    model = SonarModel("imagenex_852_driver", "Imagenex852", DriverParameters, PROBLEMS, SonarDevice, _ping_message)
+    run(model.name, lambda: DriverNode(model))
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
     """Run the emulated head; `world_echoes` builds the echoes of the simulator."""
-    run(EmulatedImagenex852.name, lambda: EmulatorNode(EmulatedImagenex852(), world_echoes))
+    model = HeadModel("imagenex_852_emulator", "Imagenex852Emulator", EmulatorParameters, _head, _line)
+    run(model.name, lambda: EmulatorNode(model, world_echoes))
 
 
-def run_player() -> None:
-    """Publish a log, then end; several may play at once."""
-    options = play_arguments(rospy.myargv()[1:])
-    run(anonymous_name("play_852"), lambda: LogPlayer(options))
+def reply_message(reply: Reply, gain_db: int, inverted: bool) -> Optional[SonarScanLine]:
+    """Return the message of a reply, without header and sensorAngle; None if it holds no echoes."""
+    if not reply.echoes:
+        return None
+    message = SonarScanLine()
+    message.angle = head_angle(reply.head_position, inverted)
+    message.intensities = reply.echoes
+    message.maxrange_meters = reply.max_range
+    message.range_resolution = reply.range_resolution
+    message.gain = gain_db
+    return message
 
 
-def run_recorder() -> None:
-    """Record a log until Ctrl-C."""
-    options = record_arguments(rospy.myargv()[1:])
-    run("record_852", lambda: LogRecorder(options))
+def _ping_message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:
+    return reply_message(ping.reply, ping.command.start_gain_db, parameters.inverted)
 
 
-def run_converter() -> None:
-    """Convert a log to a bag; needs no ROS master."""
-    try:
-        print(f"convert_852: {convert(convert_arguments(sys.argv[1:]))}")
-    except StartError as error:
-        sys.exit(f"convert_852: {error}")
+def _head(parameters: EmulatorParameters, source: EchoSource, faults: FaultInjector) -> Emulated852:
+    return Emulated852(source, faults, parameters.timing(), parameters.head_id)
+
+
+def _line(parameters: EmulatorParameters) -> PtyLine:
+    return PtyLine(parameters.link)

@@ -2,15 +2,12 @@
 
 from typing import Optional
 
-from ping360_driver.line.beam_time import beam_time, turning_time
 from ping360_driver.line.message_line import Arrival, MessageLine
-from ping360_driver.line.outcome import Outcome
-from ping360_driver.line.parameters import ConnectionParameters
-from ping360_driver.line.request_scan import pinged
-from ping360_driver.protocol.angles import TURN
+from ping360_driver.line.request_scan import Outcome, beam_time, pinged, turning_time
 from ping360_driver.protocol.messages import MessageError, MessageId
 from ping360_driver.protocol.replies import Beam, beam, refusal
-from ping360_driver.protocol.scan_command import ScanCommand, information_request, motor_off
+from ping360_driver.protocol.scan_command import TURN, ScanCommand, information_request, motor_off
+from sonar_driver.line.parameters import LineParameters
 
 _PATIENCE = 2  # Beams that have to be missing before the head counts as silent
 _ANSWER_TIME = 0.3  # s: within this time a head that is alive answers a question
@@ -24,7 +21,7 @@ class AutoScan:
     def __init__(
         self,
         line: MessageLine,
-        connection: ConnectionParameters,
+        connection: LineParameters,
         baud_rate: float,
         can_interrupt: bool,
         has_scanned: bool = False,

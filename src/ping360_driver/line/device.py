@@ -1,24 +1,63 @@
-"""The head on its line: greets it, chooses who turns it, and stamps its beams."""
+"""The head on its line: greets it, chooses who turns it, stamps its beams, and counts."""
 
-import threading
-import time
-from dataclasses import dataclass
-from typing import Callable, Optional, Union
+from dataclasses import dataclass, field
+from typing import Any, Dict, Optional, Union
 
 from ping360_driver.line.auto_scan import AutoScan
 from ping360_driver.line.message_line import MessageLine
-from ping360_driver.line.outcome import Outcome
-from ping360_driver.line.parameters import ConnectionParameters
-from ping360_driver.line.request_scan import RequestScan
-from ping360_driver.line.stats import Ping360Stats
+from ping360_driver.line.request_scan import Outcome, RequestScan
 from ping360_driver.protocol.messages import MessageId
 from ping360_driver.protocol.replies import Beam, DeviceInformation, device_information
-from ping360_driver.protocol.scan_command import ScanCommand, ScanMode, information_request, motor_off
+from ping360_driver.protocol.scan_command import (
+    TICK,
+    PulseSettings,
+    ScanCommand,
+    ScanMode,
+    information_request,
+    motor_off,
+)
 from sonar_driver.line.device import LineDevice
-from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port, open_port
+from sonar_driver.line.driver_health import LineStats, Problem
+from sonar_driver.line.parameters import LineParameters
+from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port
 
+PROBLEMS = {
+    "timeouts": Problem("timeouts", "no reply; check the head's power and the cable"),
+    "bad_frames": Problem("bad frames", "a broken message; check the cable, lower baud_rate"),
+    "unexpected_replies": Problem("unexpected replies", "a reply came late or twice and was dropped"),
+    "refusals": Problem("refusals", "the head did not accept a command"),
+    "missing_beams": Problem("missing beams", "the head scanned on, but not every beam arrived"),
+}
+"""Counts that should stay zero."""
 _GREETINGS = 3
 _ANSWER_TIME = 0.3  # s: a head at rest answers within a few milliseconds; one that scans, between two beams
+
+
+@dataclass(frozen=True)
+class Ping360Stats(LineStats):
+    """Counts since the start, and what the newest beam says of itself.
+
+    `refusals`: commands that the head did not accept. `missing_beams`: directions of a full turn of which no beam came
+    while the head scanned by itself; each of them was also a bad frame if its bytes arrived broken.
+    """
+
+    refusals: int = 0
+    missing_beams: int = 0
+    firmware: str = ""
+    mode: str = ScanMode.AUTO_TRANSMIT.value
+    pulse: PulseSettings = field(default_factory=PulseSettings)
+
+    def details(self) -> Dict[str, str]:
+        """Return what else /diagnostics shows: firmware, who turns the head, and the pulse as the head reports it."""
+        return {
+            "firmware": self.firmware,
+            "scan mode": self.mode,
+            "gain setting": str(self.pulse.gain_setting),
+            "frequency [kHz]": str(self.pulse.transmit_frequency),
+            "transmit duration [us]": str(self.pulse.transmit_duration),
+            "sample period [us]": f"{1e6 * self.pulse.sample_period * TICK:.3f}",
+            "samples": str(self.pulse.number_of_samples),
+        }
 
 
 @dataclass(frozen=True)
@@ -32,16 +71,11 @@ class Ping:
 class Ping360Device(LineDevice[ScanCommand, Ping]):
     """Gets beams from a head that scans by itself, or that is asked for every ping where it cannot."""
 
-    def __init__(
-        self,
-        connection: ConnectionParameters,
-        stop: Optional[threading.Event] = None,
-        clock: Callable[[], float] = time.time,
-        elapsed: Callable[[], float] = time.monotonic,
-        opener: Callable[[str, int], Port] = open_port,
-    ) -> None:
+    zero = Ping360Stats()
+
+    def __init__(self, connection: LineParameters, *arguments: Any, **options: Any) -> None:
         """As `LineDevice` takes them."""
-        super().__init__(connection, Ping360Stats(), stop, clock, elapsed, opener)
+        super().__init__(connection, *arguments, **options)
         self._is_serial = not is_datagram_port(connection.port)
         self._baud_rate = connection.baud_rate if self._is_serial else float("inf")
         self._line: Optional[MessageLine] = None

@@ -1,25 +1,84 @@
-"""Scans by asking for every single ping."""
+"""Scans by asking for every single ping; what comes of one, and how long it takes at most."""
 
-from typing import Optional
+from dataclasses import dataclass
+from typing import Dict, Optional
 
-from ping360_driver.line.beam_time import beam_time
 from ping360_driver.line.message_line import Arrival, MessageLine
-from ping360_driver.line.outcome import Outcome
-from ping360_driver.line.parameters import ConnectionParameters
-from ping360_driver.protocol.angles import TURN
-from ping360_driver.protocol.messages import MessageError, MessageId
+from ping360_driver.protocol.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageError, MessageId
 from ping360_driver.protocol.replies import Beam, beam, refusal
-from ping360_driver.protocol.scan_command import ScanCommand
-from ping360_driver.protocol.sector_walk import SectorWalk
+from ping360_driver.protocol.scan_command import TURN, PulseSettings, ScanCommand, SectorWalk
+from sonar_driver.line.parameters import LineParameters
+from sonar_driver.line.port import transmission_time
 
+# s: a full turn takes 2.4 s by Ping Viewer's constants, and no command more than 4 s by the ping protocol.
+_SLOWEST_TURN = 4.0
+_BEAM_HEADER = 20  # Bytes of an AUTO_DEVICE_DATA message besides its samples; a DEVICE_DATA message has fewer
 # A reply that begins within this share of the listening time is too early to be the answer.
 _SURELY_TOO_EARLY = 0.9
+_COUNTS = ("timeouts", "bad_frames", "refusals", "interrupted", "unexpected_replies", "missing_beams")
+
+
+@dataclass
+class Outcome:
+    """A beam and when its ping left, in seconds of the line's clock, or what came instead; and what else came.
+
+    `timeouts`, `bad_frames`, `refusals` and `interrupted` are pings without a beam. `unexpected_replies` and
+    `missing_beams` are as in `Ping360Stats`. `error` says in words what was wrong.
+    """
+
+    beam: Optional[Beam] = None
+    pinged: float = 0.0
+    timeouts: int = 0
+    bad_frames: int = 0
+    refusals: int = 0
+    interrupted: int = 0
+    unexpected_replies: int = 0
+    missing_beams: int = 0
+    error: str = ""
+
+    @property
+    def is_over(self) -> bool:
+        """Whether the ping has come to any end."""
+        return self.beam is not None or bool(self._without_beam())
+
+    def interrupt(self) -> None:
+        """Note that the ping ended before its time, unless it has come to another end already; a timeout is none."""
+        self.timeouts = 0
+        if not self.is_over:
+            self.interrupted, self.error = 1, ""
+
+    def counts(self) -> Dict[str, int]:
+        """Return what is added to the counts of the device."""
+        replies = int(self.beam is not None)
+        return {"pings": replies + self._without_beam(), "replies": replies, **{n: getattr(self, n) for n in _COUNTS}}
+
+    def _without_beam(self) -> int:
+        return self.timeouts + self.bad_frames + self.refusals + self.interrupted
+
+
+def turning_time(gradians: int) -> float:
+    """Return how long the head takes at most to turn by so many gradians, in seconds."""
+    return _SLOWEST_TURN * gradians / TURN
+
+
+def sending_time(pulse: PulseSettings, baud_rate: float) -> float:
+    """Return how long a beam takes on the line, in seconds."""
+    length = HEADER_LENGTH + _BEAM_HEADER + pulse.number_of_samples + CHECKSUM_LENGTH
+    return transmission_time(length, baud_rate)
+
+
+def beam_time(step: int, pulse: PulseSettings, baud_rate: float) -> float:
+    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds.
+
+    baud_rate: bits per second.
+    """
+    return turning_time(step) + pulse.listening_time + sending_time(pulse, baud_rate)
 
 
 class RequestScan:
     """Sends one request at a time. The angle of a beam tells which request it answers."""
 
-    def __init__(self, line: MessageLine, connection: ConnectionParameters, baud_rate: float) -> None:
+    def __init__(self, line: MessageLine, connection: LineParameters, baud_rate: float) -> None:
         self._line = line
         self._margin = connection.reply_margin
         self._late_window = connection.late_window

@@ -3,9 +3,8 @@
 from dataclasses import dataclass
 from typing import Optional, Tuple
 
-from ping360_driver.protocol.angles import TURN
 from ping360_driver.protocol.messages import MessageError, MessageId, PingMessage
-from ping360_driver.protocol.scan_command import PulseSettings
+from ping360_driver.protocol.scan_command import TURN, PulseSettings
 
 _PING360 = 2  # Device type (ping protocol)
 # Ping Viewer lets the head scan by itself from the first firmware after this one.

@@ -1,12 +1,28 @@
-"""What the driver tells the head: to scan a sector by itself, or to send one ping in one direction."""
+"""What the driver tells the head: to scan a sector by itself, or to send one ping in one direction.
 
+The ping protocol counts gradians (0.9 deg) from 0 to 399. Ping Viewer, the manufacturer's program, shows 200 ahead and
+turns clockwise, as seen from above when the transducer is on top. What the device allows is from the ping protocol's
+definition of its messages, and from Ping Viewer (src/sensor/ping360.h), which names the limits of the firmware and its
+engineer's rule for the pulse.
+"""
+
+import math
 from dataclasses import dataclass, field
 from enum import Enum
+from typing import Optional, Tuple
 
-from ping360_driver.protocol.angles import AHEAD, TURN
 from ping360_driver.protocol.messages import MessageId, packed
-from ping360_driver.protocol.sampling import TICK
 
+TURN = 400  # gradians
+AHEAD = 200
+_RADIANS_PER_GRADIAN = 2 * math.pi / TURN
+TICK = 25e-9  # s: the unit of the sample period
+SAMPLES = (200, 1200)  # Least and most of a beam
+PERIOD_TICKS = (80, 40000)  # Shortest and longest sample period
+PULSE_US = (5, 500)  # Shortest and longest pulse that the firmware makes
+_PULSE_US_PER_TRAVEL_SECOND = 8000  # Pulse in us for each second that sound takes to the range, one way
+_PULSE_PERIODS = 2.5  # A shorter pulse would fall between two samples
+_LONGEST_PULSE_PERIODS = 64  # The firmware cuts longer ones, to protect its transmitter
 _MODE = 1  # Operating mode of a Ping360 (ping protocol)
 
 
@@ -86,3 +102,71 @@ def information_request() -> bytes:
 def motor_off() -> bytes:
     """Return the message that ends a scan and switches the motor off."""
     return packed(MessageId.MOTOR_OFF)
+
+
+class SectorWalk:
+    """Goes through a full turn clockwise without end, and through a sector to and fro, from one edge to the other."""
+
+    def __init__(self) -> None:
+        self._last: Optional[int] = None
+        self._clockwise = True
+
+    def next(self, command: ScanCommand) -> int:
+        """Return the angle of the next ping, in gradians from 0 to 399."""
+        self._last = self._following(command)
+        return self._last
+
+    def _following(self, command: ScanCommand) -> int:
+        if self._last is None:
+            return command.start
+        if command.is_full_turn:
+            return (self._last + command.step) % TURN
+        position = (self._last - command.start) % TURN
+        if position > command.width:
+            self._clockwise = True
+            return command.start
+        if position == (command.width if self._clockwise else 0):
+            self._clockwise = not self._clockwise
+        position += command.step if self._clockwise else -command.step
+        return (command.start + min(max(position, 0), command.width)) % TURN
+
+
+def head_angle(gradians: int, inverted: bool = False) -> float:
+    """Return the angle of the beam about +z from +x, counter-clockwise radians in [-pi, pi] (REP-103).
+
+    `inverted` means a head whose transducer points down: what it counts clockwise is then counter-clockwise.
+    """
+    clockwise = (gradians - AHEAD) * _RADIANS_PER_GRADIAN
+    return math.remainder(clockwise if inverted else -clockwise, 2 * math.pi)
+
+
+def gradians(degrees: float) -> int:
+    """Return the whole number of gradians nearest to an angle in degrees."""
+    return round(degrees * TURN / 360)
+
+
+def sampling(max_range: float, samples: int, speed_of_sound: float) -> Tuple[int, int]:
+    """Return the number of samples, and the sample period in ticks, whose range is nearest to `max_range` [m].
+
+    There are fewer than `samples` where the range is too short for so many.
+    """
+    ticks = 2 * max_range / (speed_of_sound * TICK)
+    number = max(SAMPLES[0], min(samples, int(ticks / PERIOD_TICKS[0])))
+    return number, min(max(PERIOD_TICKS[0], round(ticks / number)), PERIOD_TICKS[1])
+
+
+def bin_length(period_ticks: int, speed_of_sound: float) -> float:
+    """Return the length of one range bin in metres: sound travels there and back in one sample period."""
+    return period_ticks * TICK * speed_of_sound / 2
+
+
+def longest_pulse_us(period_ticks: int) -> int:
+    """Return the longest pulse that the firmware makes at this sample period, in us."""
+    return max(PULSE_US[0], min(PULSE_US[1], int(_LONGEST_PULSE_PERIODS * period_ticks * TICK * 1e6)))
+
+
+def pulse_us(max_range: float, period_ticks: int, speed_of_sound: float) -> int:
+    """Return the pulse in us that suits a range [m]: longer for a longer range, at least 2.5 sample periods."""
+    of_range = _PULSE_US_PER_TRAVEL_SECOND * max_range / speed_of_sound
+    wanted = round(max(of_range, _PULSE_PERIODS * period_ticks * TICK * 1e6))
+    return max(PULSE_US[0], min(longest_pulse_us(period_ticks), wanted))

@@ -1,16 +1,53 @@
-"""The executables of this package."""
+"""The nodes of the Ping360: its driver and its emulated head."""
+
+from typing import Optional
 
 from node_support.ros.node import run
-from ping360_driver.ros.model import EmulatedPing360Model, Ping360
-from sonar_driver.ros.driver_node import DriverNode
-from sonar_driver.ros.emulator_node import EmulatorNode, WorldEchoes
+from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
+from ping360_driver.line.device import PROBLEMS, Ping, Ping360Device
+from ping360_driver.line.parameters import DriverParameters
+from ping360_driver.protocol.scan_command import bin_length, head_angle
+from sonar_driver.emulator.emulated_head import EchoSource
+from sonar_driver.emulator.faults import FaultInjector
+from sonar_driver.emulator.head_server import PtyLine, ServedLine, UdpLine
+from sonar_driver.line.port import datagram_address, is_datagram_port
+from sonar_driver.ros.driver_node import DriverNode, SonarModel
+from sonar_driver.ros.emulator_node import EmulatorNode, HeadModel, WorldEchoes
+from underwater_map_construction.msg import SonarScanLine
 
 
 def run_driver() -> None:
     """Run the driver."""
-    run(Ping360.name, lambda: DriverNode(Ping360()))
+    model = SonarModel("ping360_driver", "Ping360", DriverParameters, PROBLEMS, Ping360Device, _message)
+    run(model.name, lambda: DriverNode(model))
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
     """Run the emulated head; `world_echoes` builds the echoes of the simulator."""
-    run(EmulatedPing360Model.name, lambda: EmulatorNode(EmulatedPing360Model(), world_echoes))
+    model = HeadModel("ping360_emulator", "Ping360Emulator", EmulatorParameters, _head, _line)
+    run(model.name, lambda: EmulatorNode(model, world_echoes))
+
+
+def _message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:
+    """Return the message of a ping; its range is what the head's own sample period makes of it."""
+    beam = ping.beam
+    if not beam.echoes:
+        return None
+    message = SonarScanLine()
+    message.angle = head_angle(beam.angle, parameters.inverted)
+    message.intensities = beam.echoes
+    message.range_resolution = bin_length(beam.pulse.sample_period, parameters.speed_of_sound)
+    message.maxrange_meters = len(beam.echoes) * message.range_resolution
+    message.gain = beam.pulse.gain_setting
+    return message
+
+
+def _head(parameters: EmulatorParameters, source: EchoSource, faults: FaultInjector) -> EmulatedPing360:
+    baud_rate = float("inf") if is_datagram_port(parameters.link) else parameters.baud_rate
+    return EmulatedPing360(source, faults, baud_rate, parameters.speed_of_sound, parameters.auto_transmit)
+
+
+def _line(parameters: EmulatorParameters) -> ServedLine:
+    if is_datagram_port(parameters.link):
+        return UdpLine(*datagram_address(parameters.link))
+    return PtyLine(parameters.link)

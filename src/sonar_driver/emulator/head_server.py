@@ -1,35 +1,112 @@
-"""Serves an emulated head on a line, which it can take away and bring back."""
+"""Serves an emulated head on a line, a pseudo-terminal or a UDP port, which it can take away and bring back."""
 
+import contextlib
 import os
 import select
+import socket
 import threading
 import time
+import tty
 from collections import deque
-from typing import Callable, Deque, Optional, Protocol
+from typing import Callable, Deque, Optional, Tuple, Union
 
 from sonar_driver.emulator.emulated_head import EmulatedHead, Transmission
 
 _PATIENCE = 1.0  # s: a thread that has not changed its state by now has failed
 _WAKE_SIZE = 4096  # Bytes: more than are ever written to wake the server
+_READ_SIZE = 4096  # Bytes: many commands; a read takes what is there
+_LONGEST_DATAGRAM = 65535  # Bytes
 
 
-class ServedLine(Protocol):
-    """The head's end of a line. It is used from one thread at a time."""
+class PtyLine:
+    """The head's end of a pseudo-terminal; `link` is a symbolic link to the end that the driver opens."""
+
+    def __init__(self, link: str) -> None:
+        self._link = link
+        self._master: Optional[int] = None
+        self._slave: Optional[int] = None
 
     def open(self) -> None:
-        """Make the line appear; raises OSError."""
+        """Make the terminal and the link to it; raises OSError."""
+        if os.path.exists(self._link) and not os.path.islink(self._link):
+            raise FileExistsError(f"{self._link} exists and is not a symbolic link")
+        self._master, self._slave = os.openpty()
+        tty.setraw(self._slave)
+        os.set_blocking(self._master, False)
+        temporary = f"{self._link}.{os.getpid()}"
+        with contextlib.suppress(FileNotFoundError):
+            os.unlink(temporary)
+        os.symlink(os.ttyname(self._slave), temporary)
+        os.replace(temporary, self._link)
 
     def close(self) -> None:
-        """Make the line disappear, if it is there."""
+        """Remove the link, unless somebody else has put theirs there, and hang up."""
+        if self._master is None:
+            return
+        with contextlib.suppress(FileNotFoundError):
+            if os.readlink(self._link) == os.ttyname(self._slave):
+                os.unlink(self._link)
+        os.close(self._slave)
+        os.close(self._master)
+        self._master = self._slave = None
 
     def fileno(self) -> int:
         """Return the descriptor that becomes readable when bytes arrive."""
+        return self._master
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, possibly none; never waits."""
+        """Return the bytes that have arrived, possibly none."""
+        with contextlib.suppress(BlockingIOError):
+            return os.read(self._master, _READ_SIZE)
+        return b""
 
     def write(self, data: bytes) -> None:
-        """Send bytes; those that the line cannot take are lost, like on a line that nobody reads. Never waits."""
+        """Send bytes; a full terminal loses them."""
+        with contextlib.suppress(BlockingIOError):
+            os.write(self._master, data)
+
+
+class UdpLine:
+    """The head's end of a UDP connection."""
+
+    def __init__(self, host: str, number: int) -> None:
+        self._address = (host, number)
+        self._socket: Optional[socket.socket] = None
+        self._peer: Optional[Tuple[str, int]] = None
+
+    def open(self) -> None:
+        """Listen at the address; raises OSError."""
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.bind(self._address)
+        self._socket.setblocking(False)
+        self._peer = None
+
+    def close(self) -> None:
+        """Stop listening: who sends something then is told that nobody is there."""
+        if self._socket is not None:
+            self._socket.close()
+            self._socket = None
+
+    def fileno(self) -> int:
+        """Return the descriptor that becomes readable when bytes arrive."""
+        return self._socket.fileno()
+
+    def read(self) -> bytes:
+        """Return the bytes of the next datagram, possibly none."""
+        with contextlib.suppress(BlockingIOError, ConnectionError):
+            data, self._peer = self._socket.recvfrom(_LONGEST_DATAGRAM)
+            return data
+        return b""
+
+    def write(self, data: bytes) -> None:
+        """Send a datagram to whoever spoke last; it is lost where nobody has."""
+        if self._peer is not None:
+            with contextlib.suppress(BlockingIOError, ConnectionError):
+                self._socket.sendto(data, self._peer)
+
+
+ServedLine = Union[PtyLine, UdpLine]
+"""The head's end of a line. It is used from one thread at a time, and never waits."""
 
 
 class HeadServer:

@@ -1,24 +1,80 @@
-"""Opens a serial port, and says in one line why one cannot be opened."""
+"""Opens a serial port or a UDP connection, and says in one line why it cannot be opened."""
 
 import errno
 import grp
 import os
+import socket
 import termios
+import time
 from contextlib import contextmanager
 from typing import Iterator, Protocol, Tuple
 
 import serial
 
-from sonar_driver.line.udp_port import UdpPort
-
+_BITS_PER_BYTE = 10  # 8N1: one start bit, eight data bits, one stop bit
+_LONGEST_DATAGRAM = 65535  # Bytes
 # Seconds. A read returns after this time at the latest, so that a request to stop is noticed.
 READ_TIMEOUT = 0.05
 WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is lost
-
 _REMOTE = ("socket://", "rfc2217://", "loop://")
 _USUAL_GROUP = "dialout"
 _DATAGRAMS = "udp://"
 _PORT_NUMBERS = 1 << 16
+
+
+def transmission_time(byte_count: int, baud_rate: float) -> float:
+    """Return how long `byte_count` bytes take at `baud_rate` bit/s, in seconds; no time at an infinite rate."""
+    return byte_count * _BITS_PER_BYTE / baud_rate
+
+
+class UdpPort:
+    """A port on which each message is a datagram; what arrives is a stream of bytes to the reader."""
+
+    def __init__(self, host: str, number: int, read_timeout: float) -> None:
+        """Raises OSError. Nobody notices whether somebody listens there before something is sent."""
+        self._read_timeout = read_timeout
+        self._buffer = bytearray()
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        try:
+            self._socket.connect((host, number))
+        except OSError:
+            self._socket.close()
+            raise
+
+    @property
+    def in_waiting(self) -> int:
+        """Number of bytes that were received and not yet read. Raises OSError."""
+        self._receive(0.0)
+        return len(self._buffer)
+
+    def read(self, size: int = 1) -> bytes:
+        """Return up to `size` bytes: once there are so many, or after the timeout those that there are."""
+        deadline = time.monotonic() + self._read_timeout
+        while len(self._buffer) < size and self._receive(deadline - time.monotonic()):
+            pass
+        data = bytes(self._buffer[:size])
+        del self._buffer[:size]
+        return data
+
+    def write(self, data: bytes) -> int:
+        """Send a datagram. Raises OSError, also for an earlier one that nobody received."""
+        return self._socket.send(data)
+
+    def send_break(self) -> None:
+        """Do nothing: there is no line to break."""
+
+    def close(self) -> None:
+        """Close the connection."""
+        self._socket.close()
+
+    def _receive(self, timeout: float) -> bool:
+        """Wait for one datagram; return whether one came."""
+        self._socket.settimeout(max(timeout, 0.0))
+        try:
+            self._buffer += self._socket.recv(_LONGEST_DATAGRAM)
+        except (socket.timeout, BlockingIOError):
+            return False
+        return True
 
 
 class Port(Protocol):

@@ -1,8 +1,8 @@
 """The ROS side of every driver: settings in; beams and diagnostics out (thesis 4.5.1)."""
 
 import threading
-from abc import ABC, abstractmethod
-from typing import Any, Mapping, Optional, Type
+from dataclasses import dataclass
+from typing import Any, Callable, Mapping, Optional, Type
 
 import rospy
 
@@ -13,40 +13,31 @@ from node_support.ros.callbacks import guarded
 from node_support.ros.node import StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import JointAngle
-from sonar_driver.line.device import LineDevice
-from sonar_driver.line.driver_health import DriverHealth, Problem
+from sonar_driver.line.device import LineDevice, Scanner
+from sonar_driver.line.driver_health import DriverHealth, LineStats, Problem
 from sonar_driver.line.port import PortError
-from sonar_driver.line.scanner import Scanner
-from sonar_driver.line.stats import LineStats
 from underwater_map_construction.msg import SonarScanLine
 
 _LONGEST_STOP = 1.0  # s: a ping at the longest range ends within this time
 _PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 
 
-class SonarModel(ABC):
-    """What the node needs to know of one kind of sonar."""
+@dataclass(frozen=True)
+class SonarModel:
+    """What the node needs to know of one kind of sonar.
+
+    name: the node's. config_name: of the .cfg file. parameters: those of line, mounting and head, with a `command`;
+    `LineParameters` and `MountingParameters` are among their bases. problems: the counts of the device that should stay
+    zero, by their fields. device: takes parameters, a stop event and a clock. message: makes the message of a ping, but
+    for its header and the angle of the servo; None if the ping holds no echoes.
+    """
 
     name: str
-    """The node's name."""
     config_name: str
-    """The name of the .cfg file."""
     parameters: Type[ParameterSet]
-    """Those of line, mounting and head; `LineParameters` and `MountingParameters` are among its bases."""
     problems: Mapping[str, Problem]
-    """The counts of its device that should stay zero, by their fields."""
-
-    @abstractmethod
-    def device(self, parameters: Any, stop: threading.Event) -> LineDevice:
-        """Return the head on its line, not yet open; its pings are stamped with `rospy.get_time`."""
-
-    @abstractmethod
-    def command(self, parameters: Any) -> Any:
-        """Return the command of these settings, as the device's `ping` takes it."""
-
-    @abstractmethod
-    def message(self, ping: Any, parameters: Any, sensor_angle: float) -> Optional[SonarScanLine]:
-        """Return the message of a ping; None if it holds no echoes."""
+    device: Callable[[Any, threading.Event, Callable[[], float]], LineDevice]
+    message: Callable[[Any, Any], Optional[SonarScanLine]]
 
 
 class DriverNode:
@@ -78,9 +69,9 @@ class DriverNode:
         return self._last_stats
 
     def _use_parameters(self, parameters: ParameterSet) -> None:
-        command = self._model.command(parameters)
+        command = parameters.command()
         if self._scanner is None:
-            self._device = self._model.device(parameters, self._stop)
+            self._device = self._model.device(parameters, self._stop, rospy.get_time)
             self._scanner = Scanner(self._device, command, guarded(self.health, self._publish))
         self._scanner.command = command
 
@@ -102,8 +93,11 @@ class DriverNode:
     def _publish(self, ping: Any) -> None:
         # A ping leaves before its reply comes: with a clock near 0 its stamp is negative, which rospy.Time refuses.
         check_stamp(round(ping.stamp * 1e9))
-        message = self._model.message(ping, self._live.current, self._tilt.for_beam())
+        parameters = self._live.current
+        message = self._model.message(ping, parameters)
         if message is not None:
+            message.header.stamp, message.header.frame_id = rospy.Time.from_sec(ping.stamp), parameters.frame_id
+            message.sensorAngle = self._tilt.for_beam()
             self._beams.publish(message)
             self.health.count("beams out")
 

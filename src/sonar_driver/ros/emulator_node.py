@@ -1,44 +1,62 @@
 """The ROS side of every emulated head: parameters and requests for faults in; a line to a sonar out."""
 
 import os
-from abc import ABC, abstractmethod
 from contextlib import ExitStack
+from dataclasses import dataclass
 from typing import Any, Callable, Optional, Type
 
+import numpy as np
 import rospkg
 import rospy
 
+from node_support.health import Health
 from node_support.ros.callbacks import every, make_health
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from sonar_driver.emulator import EchoSource, EmulatedHead, Fault, FaultInjector, FixedPattern, HeadServer, ServedLine
-from sonar_driver.emulator.parameters import EchoSourceKind, EmulatedHeadParameters
-from sonar_driver.ros.head_place import Place, place_in_tf
+from node_support.ros.transforms import TfBuffer
+from sonar_driver.emulator.emulated_head import EchoSource, EmulatedHead, FixedPattern
+from sonar_driver.emulator.faults import EchoSourceKind, EmulatedHeadParameters, Fault, FaultInjector
+from sonar_driver.emulator.head_server import HeadServer, ServedLine
 from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
 
+WORLD_FRAME = "world"
+"""Frame of the world file that the emulated head hears."""
+
+Place = Callable[[], Optional[np.ndarray]]
+"""Returns the (4, 4) T_world_head of now; None where it is not known."""
 PACKAGE = "underwater_map_construction"
 _MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
-
 # Builds the simulator's echoes; passed in, because no driver may depend on the simulator.
 WorldEchoes = Callable[[EmulatedHeadParameters, Optional[Place]], EchoSource]
 
 
-class HeadModel(ABC):
-    """What the node needs to know of one kind of emulated head."""
+def place_in_tf(frame: str, health: Health) -> Place:
+    """Return what looks up the newest place of `frame` in the world; pings before tf knows it are counted."""
+    transforms = TfBuffer(health)
+
+    def place() -> Optional[np.ndarray]:
+        found = transforms.newest(WORLD_FRAME, frame)
+        if found is None:
+            health.problem("pings without a place", f"tf does not know {frame!r} in {WORLD_FRAME!r}; see head_frame")
+            return None
+        return found[1]
+
+    return place
+
+
+@dataclass(frozen=True)
+class HeadModel:
+    """What the node needs to know of one kind of emulated head.
+
+    name: the node's. config_name: of the .cfg file. head: makes the head. line: makes the line that it is served on,
+    not yet open.
+    """
 
     name: str
-    """The node's name."""
     config_name: str
-    """The name of the .cfg file."""
     parameters: Type[EmulatedHeadParameters]
-
-    @abstractmethod
-    def head(self, parameters: Any, source: EchoSource, faults: FaultInjector) -> EmulatedHead:
-        """Return the head."""
-
-    @abstractmethod
-    def line(self, parameters: Any) -> ServedLine:
-        """Return the line that it is served on, not yet open."""
+    head: Callable[[Any, EchoSource, FaultInjector], EmulatedHead]
+    line: Callable[[Any], ServedLine]
 
 
 class EmulatorNode:

@@ -5,11 +5,10 @@ from contextlib import contextmanager
 
 from scanning import Scanning
 
-from imagenex_852_driver.emulator import Emulated852
-from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.emulated_852 import Emulated852
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.protocol.settings import HeadSettings
-from sonar_driver.emulator import HeadServer, PtyLine
+from imagenex_852_driver.line.parameters import ConnectionParameters, HeadSettings
+from sonar_driver.emulator.head_server import HeadServer, PtyLine
 
 FAST = {
     "baud_rate": 1152000,

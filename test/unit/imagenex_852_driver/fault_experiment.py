@@ -14,13 +14,11 @@ sys.path.append(os.path.join(os.path.dirname(os.path.realpath(__file__)), os.par
 from numbered_pings import NumberedEchoes, RecordingInjector
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
-from imagenex_852_driver.emulator import Emulated852, FaultRates852
-from imagenex_852_driver.line.connection import ConnectionParameters
-from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.stats import DeviceStats
-from imagenex_852_driver.protocol.settings import HeadSettings
-from sonar_driver.emulator import Fault
-from sonar_driver.line.scanner import Scanner
+from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
+from imagenex_852_driver.line.device import DeviceStats, SonarDevice
+from imagenex_852_driver.line.parameters import ConnectionParameters, HeadSettings
+from sonar_driver.emulator.faults import Fault
+from sonar_driver.line.device import Scanner
 
 GOOD = (Fault.NONE, Fault.DOUBLED, Fault.OVERRUN)
 # Beyond the longest wait for a reply.
@@ -38,11 +36,11 @@ class Account:
     seconds: float
 
 
-def fault_rates(rate: float, reply_margin: float) -> FaultRates852:
+def fault_rates(rate: float, reply_margin: float) -> EmulatorParameters:
     """Return `rate` for every fault; late replies come after the driver's wait, `reply_margin` s, is over."""
     names = ("dropped", "garbled", "truncated", "late", "doubled", "overrun", "silence", "disappearance")
     lasting = {"lateness": reply_margin + LATENESS, "silence_duration": 0.2, "absence_duration": 0.05}
-    return FaultRates852(**dict.fromkeys(names, rate), **lasting)
+    return EmulatorParameters(**dict.fromkeys(names, rate), **lasting)
 
 
 def run(commands: int, rate: float, seed: int = 0, reply_margin: float = 0.1) -> Account:

@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from imagenex_852_driver.protocol.angles import head_angle, head_position
+from imagenex_852_driver.protocol.reply import head_angle, head_position
 
 
 def test_straight_ahead_is_zero():

@@ -2,11 +2,13 @@ import pytest
 from driver_line import served
 from virtual_line import VirtualLine, VirtualStop, VirtualStopAt, VirtualTime
 
-from imagenex_852_driver.emulator import Emulated852, FaultRates852
-from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.protocol import ReplyKind, SwitchCommand
-from sonar_driver.emulator import Fault, FaultInjector, Transmission
+from imagenex_852_driver.line.parameters import ConnectionParameters
+from imagenex_852_driver.protocol.command import SwitchCommand
+from imagenex_852_driver.protocol.reply import ReplyKind
+from sonar_driver.emulator.emulated_head import Transmission
+from sonar_driver.emulator.faults import Fault, FaultInjector
 from sonar_driver.line.port import PortUnavailableError
 
 COMMAND = SwitchCommand(max_range=50)
@@ -37,7 +39,7 @@ def virtual_device(head, connection, stop=None):
 
 @pytest.fixture
 def faults():
-    return FaultInjector(FaultRates852(lateness=0.2, silence_duration=0.3))
+    return FaultInjector(EmulatorParameters(lateness=0.2, silence_duration=0.3))
 
 
 @pytest.fixture

@@ -1,9 +1,12 @@
 import pytest
 
-from imagenex_852_driver.emulator import Emulated852, FaultRates852
-from imagenex_852_driver.protocol import ReplyKind, ReplyParser, SwitchCommand
+from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
+from imagenex_852_driver.protocol.command import SwitchCommand
+from imagenex_852_driver.protocol.reply import ReplyKind
+from imagenex_852_driver.protocol.reply_parser import ReplyParser
 from node_support.parameters import ParameterError
-from sonar_driver.emulator import EchoSource, Fault, FaultInjector
+from sonar_driver.emulator.emulated_head import EchoSource
+from sonar_driver.emulator.faults import Fault, FaultInjector
 
 COMMAND = SwitchCommand(max_range=30, data_points=500)
 
@@ -14,7 +17,7 @@ def answers(head, command=COMMAND, time=0.0):
 
 
 def head_with(fault):
-    faults = FaultInjector(FaultRates852(lateness=0.5, silence_duration=3.0, absence_duration=4.0))
+    faults = FaultInjector(EmulatorParameters(lateness=0.5, silence_duration=3.0, absence_duration=4.0))
     faults.order(fault)
     return Emulated852(faults=faults)
 
@@ -134,17 +137,17 @@ def test_a_disappearance_names_the_time_of_return():
 
 def test_fault_rates_above_one_in_all_are_refused():
     with pytest.raises(ParameterError, match=r"dropped = 0\.6"):
-        FaultRates852(dropped=0.6, late=0.6)
+        EmulatorParameters(dropped=0.6, late=0.6)
 
 
 def test_the_same_seed_gives_the_same_faults():
-    rates = FaultRates852(dropped=0.2, garbled=0.2)
+    rates = EmulatorParameters(dropped=0.2, garbled=0.2)
     first, second = FaultInjector(rates, seed=3), FaultInjector(rates, seed=3)
     assert [first.next() for _ in range(50)] == [second.next() for _ in range(50)]
 
 
 def test_every_fault_happens_about_as_often_as_its_rate():
-    faults = FaultInjector(FaultRates852(dropped=0.05, doubled=0.1))
+    faults = FaultInjector(EmulatorParameters(dropped=0.05, doubled=0.1))
     for _ in range(5000):
         faults.next()
     assert faults.counts[Fault.DROPPED] == pytest.approx(250, abs=60)

@@ -4,9 +4,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.logs import log_file
-from imagenex_852_driver.logs.log_record import LoggedPing
-from imagenex_852_driver.protocol import Reply, ReplyKind
+from imagenex_852_driver.log_file import LogReader, LogWriteError, LogWriter
+from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 
 
 def numbered(number):
@@ -24,12 +24,12 @@ def log(tmp_path):
 
 def read_back(path, data):
     path.write_bytes(data)
-    reader = log_file.read(path)
+    reader = LogReader(path)
     return list(reader), reader
 
 
 def test_every_ping_of_the_real_log_is_read(hydroball):
-    reader = log_file.read(hydroball)
+    reader = LogReader(hydroball)
     seen = {
         (ping.reply.max_range, len(ping.reply.echoes), ping.start_gain_db, ping.reply.head_id, ping.stamp)
         for ping in reader
@@ -39,17 +39,17 @@ def test_every_ping_of_the_real_log_is_read(hydroball):
 
 
 def test_what_was_written_is_read_back(log):
-    with log_file.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         for ping in PINGS:
             writer.write(ping)
-    assert list(log_file.read(log)) == PINGS
+    assert list(LogReader(log)) == PINGS
 
 
 def test_a_writer_appends_to_what_is_there(log):
     for ping in PINGS:
-        with log_file.LogWriter(log) as writer:
+        with LogWriter(log) as writer:
             writer.write(ping)
-    assert list(log_file.read(log)) == PINGS
+    assert list(LogReader(log)) == PINGS
 
 
 def test_an_empty_log_has_no_pings(log):
@@ -98,14 +98,14 @@ def test_no_damage_ends_the_reading_or_costs_a_whole_ping(tmp_path_factory, befo
 
 def test_a_full_disk_leaves_whole_pings_only(log, monkeypatch):
     write = os.write
-    with log_file.LogWriter(log) as writer:
+    with LogWriter(log) as writer:
         writer.write(PINGS[0])
         monkeypatch.setattr(os, "write", lambda file, data: write(file, data[:100]))
-        with pytest.raises(log_file.LogWriteError, match="100 of 640"):
+        with pytest.raises(LogWriteError, match="100 of 640"):
             writer.write(PINGS[1])
     assert log.read_bytes() == RECORDS[0]
 
 
 def test_a_log_that_is_not_there_raises_at_once(tmp_path):
     with pytest.raises(FileNotFoundError):
-        log_file.read(tmp_path / "none.852")
+        LogReader(tmp_path / "none.852")

@@ -1,8 +1,8 @@
 import pytest
 
-from imagenex_852_driver.logs.log_record import LoggedPing
-from imagenex_852_driver.logs.playback import timed
-from imagenex_852_driver.protocol import Reply, ReplyKind
+from imagenex_852_driver.log_file import timed
+from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 
 REPLY = Reply(ReplyKind.IPX, 20, b"")
 

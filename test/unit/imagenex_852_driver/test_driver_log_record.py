@@ -3,8 +3,8 @@ from driver_strategies import commands, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.logs.log_record import LoggedPing, check_record_header, decode_record
-from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind
+from imagenex_852_driver.log_record import LoggedPing, check_record_header, decode_record
+from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind
 
 REPLY = Reply(ReplyKind.IGX, 50, bytes(range(250)) * 2, head_id=0x11)
 

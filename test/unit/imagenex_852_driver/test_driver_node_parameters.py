@@ -1,6 +1,6 @@
 import pytest
 
-from imagenex_852_driver.emulator.parameters import EmulatorParameters
+from imagenex_852_driver.emulated_852 import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
 from node_support.parameters import ParameterError
 

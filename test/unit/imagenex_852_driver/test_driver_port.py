@@ -6,10 +6,10 @@ import pytest
 import serial
 from driver_line import served
 
-from imagenex_852_driver.emulator import Emulated852
-from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.emulated_852 import Emulated852
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.protocol import SwitchCommand
+from imagenex_852_driver.line.parameters import ConnectionParameters
+from imagenex_852_driver.protocol.command import SwitchCommand
 from node_support.parameters import ParameterError
 from sonar_driver.line.port import (
     PortBusyError,

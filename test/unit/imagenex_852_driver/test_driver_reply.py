@@ -5,7 +5,7 @@ from driver_strategies import replies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind
+from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind
 
 RECORDED_HEADER = bytes.fromhex("49475811 45780a32 40037403")
 

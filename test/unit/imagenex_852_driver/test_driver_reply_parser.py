@@ -2,7 +2,8 @@ from driver_strategies import chunks_of, garbage, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol import Reply, ReplyKind, ReplyParser
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind
+from imagenex_852_driver.protocol.reply_parser import ReplyParser
 
 WHOLE = Reply(ReplyKind.IGX, 50, bytes(range(250)) * 2)
 

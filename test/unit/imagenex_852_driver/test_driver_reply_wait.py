@@ -1,8 +1,10 @@
 import pytest
 
-from imagenex_852_driver.line.connection import ConnectionParameters
-from imagenex_852_driver.line.reply_wait import ReplyWait
-from imagenex_852_driver.protocol import ParsedReply, Reply, ReplyKind, SwitchCommand
+from imagenex_852_driver.line.device import ReplyWait
+from imagenex_852_driver.line.parameters import ConnectionParameters
+from imagenex_852_driver.protocol.command import SwitchCommand
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind
+from imagenex_852_driver.protocol.reply_parser import ParsedReply
 
 COMMAND = SwitchCommand(max_range=30)
 CONNECTION = ConnectionParameters(reply_margin=0.25, byte_gap=0.1)

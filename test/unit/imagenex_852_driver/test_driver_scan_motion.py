@@ -1,7 +1,7 @@
 import pytest
 
-from imagenex_852_driver.emulator.head_rotation import HeadRotation
-from imagenex_852_driver.protocol import SwitchCommand
+from imagenex_852_driver.emulated_852 import HeadRotation
+from imagenex_852_driver.protocol.command import SwitchCommand
 
 
 def positions(command, count, motion=None):

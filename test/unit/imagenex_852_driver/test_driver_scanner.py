@@ -4,13 +4,12 @@ from driver_line import scanning, served
 from fault_experiment import run
 from virtual_line import VirtualLine, VirtualStopAt, VirtualTime
 
-from imagenex_852_driver.emulator import Emulated852, FaultRates852
-from imagenex_852_driver.line.connection import ConnectionParameters
+from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
 from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.protocol.settings import Direction, HeadSettings
-from sonar_driver.emulator import Fault, FaultInjector
+from imagenex_852_driver.line.parameters import ConnectionParameters, Direction, HeadSettings
+from sonar_driver.emulator.faults import Fault, FaultInjector
+from sonar_driver.line.device import Scanner
 from sonar_driver.line.port import PortBusyError
-from sonar_driver.line.scanner import Scanner
 
 
 def positions(pings):
@@ -71,7 +70,7 @@ def test_the_scan_goes_on_after_the_head_rebooted(tmp_path):
 def test_scanning_resumes_within_two_seconds_however_long_the_port_was_away(absence):
     virtual = VirtualTime()
     stop = VirtualStopAt(virtual, absence + 5.0)
-    faults, times = FaultInjector(FaultRates852(absence_duration=absence)), []
+    faults, times = FaultInjector(EmulatorParameters(absence_duration=absence)), []
     scanner = virtual_scanner(stop, faults, lambda _: times.append(virtual.now))
     faults.order(Fault.NONE)
     faults.order(Fault.DISAPPEARANCE)
@@ -89,7 +88,7 @@ def test_a_port_that_appears_after_the_driver_is_found(tmp_path):
 
 
 def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(tmp_path):
-    faults = FaultInjector(FaultRates852(silence_duration=0.5))
+    faults = FaultInjector(EmulatorParameters(silence_duration=0.5))
     with served(tmp_path, reopen_after=0.2) as (server, connection):
         server.head = Emulated852(faults=faults, timing=connection.timing())
         with scanning(connection) as scan:
@@ -118,7 +117,7 @@ def test_a_stop_ends_the_scan(tmp_path, gone):
 @pytest.mark.parametrize("fault", [Fault.NONE, Fault.SILENCE, Fault.DISAPPEARANCE])
 def test_a_stop_ends_the_scan_at_once(fault):
     stop = VirtualStopAt(VirtualTime(), 20.0)
-    faults = FaultInjector(FaultRates852(silence_duration=60.0, absence_duration=60.0))
+    faults = FaultInjector(EmulatorParameters(silence_duration=60.0, absence_duration=60.0))
     scanner = virtual_scanner(stop, faults, lambda _: None)
     faults.order(fault)
     scanner.run()
@@ -132,7 +131,7 @@ def account():
 
 
 def test_the_experiment_met_every_fault(account):
-    assert set(account.faults) == {Fault.NONE, *FaultRates852.known()}
+    assert set(account.faults) == {Fault.NONE, *EmulatorParameters.known()}
 
 
 def test_with_every_fault_each_good_reply_is_delivered_once_and_in_order(account):

@@ -2,7 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol.settings import Direction, HeadSettings
+from imagenex_852_driver.line.parameters import Direction, HeadSettings
 from node_support.parameters import ParameterError
 
 

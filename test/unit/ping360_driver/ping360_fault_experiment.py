@@ -15,12 +15,11 @@ from numbered_pings import RecordingInjector
 from ping360_line import BAUD_RATE, SETTINGS, connection_to, emulated, number
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
-from ping360_driver.emulator import Ping360FaultRates
-from ping360_driver.line.device import Ping360Device
-from ping360_driver.line.stats import Ping360Stats
+from ping360_driver.emulated_ping360 import EmulatorParameters
+from ping360_driver.line.device import Ping360Device, Ping360Stats
 from ping360_driver.protocol.scan_command import ScanMode
-from sonar_driver.emulator import Fault
-from sonar_driver.line.scanner import Scanner
+from sonar_driver.emulator.faults import Fault
+from sonar_driver.line.device import Scanner
 
 
 @dataclass(frozen=True)
@@ -39,10 +38,10 @@ class Account:
     seconds: float
 
 
-def fault_rates(rate: float) -> Ping360FaultRates:
+def fault_rates(rate: float) -> EmulatorParameters:
     """Return `rate` for every fault."""
     lasting = {"lateness": 0.3, "silence_duration": 0.4, "absence_duration": 0.2}
-    return Ping360FaultRates(**dict.fromkeys((fault.value for fault in Ping360FaultRates.known()), rate), **lasting)
+    return EmulatorParameters(**dict.fromkeys((fault.value for fault in EmulatorParameters.known()), rate), **lasting)
 
 
 def run(mode: ScanMode, commands: int, rate: float, seed: int = 0) -> Account:

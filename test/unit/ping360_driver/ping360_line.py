@@ -6,11 +6,11 @@ from contextlib import contextmanager
 from numbered_pings import NumberedEchoes
 from scanning import Scanning
 
-from ping360_driver.emulator import EmulatedPing360
+from ping360_driver.emulated_ping360 import EmulatedPing360
 from ping360_driver.line.device import Ping360Device
-from ping360_driver.line.parameters import ConnectionParameters
-from ping360_driver.protocol.settings import HeadSettings
-from sonar_driver.emulator import HeadServer, PtyLine, UdpLine
+from ping360_driver.line.parameters import HeadSettings
+from sonar_driver.emulator.head_server import HeadServer, PtyLine, UdpLine
+from sonar_driver.line.parameters import LineParameters
 from sonar_driver.line.port import datagram_address, is_datagram_port
 
 BAUD_RATE = 1152000
@@ -21,7 +21,7 @@ SETTINGS = HeadSettings(max_range=1.0, data_points=200)
 def connection_to(port, **changes):
     """Return the parameters of a fast line, on a machine that may be busy."""
     fast = {"baud_rate": BAUD_RATE, "reply_margin": 2.0, "late_window": 0.3, "byte_gap": 0.05, "back_off_first": 0.02}
-    return ConnectionParameters(port=port, **{**fast, **changes})
+    return LineParameters(port=port, **{**fast, **changes})
 
 
 def emulated(port, faults=None, **options):

@@ -4,11 +4,12 @@ import pytest
 from ping360_line import SETTINGS, connection_to, emulated, running, scanning, served_line
 from scanning import PATIENCE
 
-from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
+from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
 from ping360_driver.line.device import Ping360Device
 from ping360_driver.protocol.messages import MessageId, packed
-from ping360_driver.protocol.sampling import bin_length
-from sonar_driver.emulator import FaultInjector, HeadServer, PtyLine
+from ping360_driver.protocol.scan_command import bin_length
+from sonar_driver.emulator.faults import FaultInjector
+from sonar_driver.emulator.head_server import HeadServer, PtyLine
 from sonar_driver.line.port import PortUnavailableError
 
 SECTOR = SETTINGS.changed({"sector_width_deg": 18.0})
@@ -16,7 +17,7 @@ REQUESTS = SETTINGS.changed({"scan_mode": "request"})
 
 
 def faults(**rates):
-    return FaultInjector(Ping360FaultRates(**{"silence_duration": 0.5, "absence_duration": 0.3, **rates}))
+    return FaultInjector(EmulatorParameters(**{"silence_duration": 0.5, "absence_duration": 0.3, **rates}))
 
 
 def test_the_mode_is_told(port):

@@ -1,9 +1,9 @@
 import pytest
 from ping360_fault_experiment import run
 
-from ping360_driver.emulator import Ping360FaultRates
+from ping360_driver.emulated_ping360 import EmulatorParameters
 from ping360_driver.protocol.scan_command import ScanMode
-from sonar_driver.emulator import Fault
+from sonar_driver.emulator.faults import Fault
 
 pytestmark = pytest.mark.newest_only("10,000 replies; the other tests send single ones with every version")
 
@@ -15,7 +15,7 @@ def account(request):
 
 
 def test_the_experiment_met_every_fault(account):
-    assert set(account.faults) == {Fault.NONE, *Ping360FaultRates.known()}
+    assert set(account.faults) == {Fault.NONE, *EmulatorParameters.known()}
 
 
 def test_with_every_fault_each_good_reply_is_delivered_once_and_in_order(account):

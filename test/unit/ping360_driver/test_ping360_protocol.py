@@ -4,7 +4,6 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ping360_driver.protocol.angles import gradians, head_angle
 from ping360_driver.protocol.messages import (
     MessageError,
     MessageId,
@@ -15,8 +14,18 @@ from ping360_driver.protocol.messages import (
     unpacked,
 )
 from ping360_driver.protocol.replies import beam, device_information, refusal
-from ping360_driver.protocol.sampling import bin_length, longest_pulse_us, pulse_us, sampling
-from ping360_driver.protocol.scan_command import PulseSettings, ScanCommand, information_request, motor_off
+from ping360_driver.protocol.scan_command import (
+    PulseSettings,
+    ScanCommand,
+    bin_length,
+    gradians,
+    head_angle,
+    information_request,
+    longest_pulse_us,
+    motor_off,
+    pulse_us,
+    sampling,
+)
 
 
 def test_a_request_has_the_bytes_that_the_protocol_gives():

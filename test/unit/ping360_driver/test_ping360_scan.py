@@ -4,9 +4,9 @@ from ping360_line import SETTINGS
 from virtual_line import VirtualStopAt, VirtualTime
 from virtual_scan import VirtualScan
 
-from ping360_driver.emulator import EmulatedPing360, Ping360FaultRates
+from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
 from ping360_driver.protocol.messages import MessageId
-from sonar_driver.emulator import Fault, FaultInjector
+from sonar_driver.emulator.faults import Fault, FaultInjector
 
 REQUESTS = SETTINGS.changed({"scan_mode": "request"})
 MODES = pytest.mark.parametrize("settings", [SETTINGS, REQUESTS], ids=["auto_transmit", "request"])
@@ -19,7 +19,7 @@ def port(request):
 
 @pytest.fixture
 def injector():
-    return FaultInjector(Ping360FaultRates(lateness=0.4))
+    return FaultInjector(EmulatorParameters(lateness=0.4))
 
 
 @MODES
@@ -117,7 +117,7 @@ def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(port, inje
 @pytest.mark.parametrize("fault", [Fault.SILENCE, Fault.DISAPPEARANCE])
 @pytest.mark.parametrize("absence", [1.0, 7.3, 100.0])
 def test_the_scan_goes_on_within_two_seconds_after_the_head_was_away(port, settings, fault, absence):
-    injector = FaultInjector(Ping360FaultRates(silence_duration=absence, absence_duration=absence))
+    injector = FaultInjector(EmulatorParameters(silence_duration=absence, absence_duration=absence))
     scan = VirtualScan(port, settings, injector, stop=VirtualStopAt(VirtualTime(), absence + 5.0))
     injector.order(Fault.NONE)
     injector.order(fault)
@@ -129,7 +129,7 @@ def test_the_scan_goes_on_within_two_seconds_after_the_head_was_away(port, setti
 @MODES
 @pytest.mark.parametrize("fault", [Fault.NONE, Fault.SILENCE, Fault.DISAPPEARANCE])
 def test_a_stop_ends_the_scan_at_once(port, settings, fault):
-    injector = FaultInjector(Ping360FaultRates(silence_duration=60.0, absence_duration=60.0))
+    injector = FaultInjector(EmulatorParameters(silence_duration=60.0, absence_duration=60.0))
     scan = VirtualScan(port, settings, injector, stop=VirtualStopAt(VirtualTime(), 20.0))
     injector.order(fault)
     scan.scan()

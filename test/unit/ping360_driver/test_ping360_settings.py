@@ -1,11 +1,9 @@
 import pytest
 
 from node_support.parameters import ParameterError
-from ping360_driver.emulator import EmulatorParameters
-from ping360_driver.line.parameters import DriverParameters
-from ping360_driver.protocol.scan_command import ScanCommand
-from ping360_driver.protocol.sector_walk import SectorWalk
-from ping360_driver.protocol.settings import HeadSettings
+from ping360_driver.emulated_ping360 import EmulatorParameters
+from ping360_driver.line.parameters import DriverParameters, HeadSettings
+from ping360_driver.protocol.scan_command import ScanCommand, SectorWalk
 
 
 def walk(count, **sector):

@@ -2,8 +2,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ping360_driver.protocol.message_stream import MessageStream
-from ping360_driver.protocol.messages import MessageId, packed, packed_nack
+from ping360_driver.protocol.messages import MessageId, MessageStream, packed, packed_nack
 
 
 def beam_frame(angle=0, data=bytes(range(200))):

@@ -4,10 +4,10 @@ from numbered_pings import NumberedEchoes
 from ping360_line import BAUD_RATE, SETTINGS, connection_to, number
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
-from ping360_driver.emulator import EmulatedPing360
+from ping360_driver.emulated_ping360 import EmulatedPing360
 from ping360_driver.line.device import Ping360Device
+from sonar_driver.line.device import Scanner
 from sonar_driver.line.port import is_datagram_port
-from sonar_driver.line.scanner import Scanner
 
 _MOST_PINGS = 1000
 

@@ -6,9 +6,9 @@ import foreign_bag as foreign
 import numpy as np
 import pytest
 
-from imagenex_852_driver.logs.log_file import LogWriter
-from imagenex_852_driver.logs.log_record import LoggedPing
-from imagenex_852_driver.protocol import Reply, ReplyKind
+from imagenex_852_driver.log_file import LogWriter
+from imagenex_852_driver.log_record import LoggedPing
+from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 from mlsm_manager.offline.bag_recording import read_recording
 from recordings.bags.bag import RecordingError
 from recordings.motion.vehicle_motion import MotionNames, MotionSource

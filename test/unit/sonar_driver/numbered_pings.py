@@ -2,7 +2,8 @@
 
 from typing import List
 
-from sonar_driver.emulator import EchoSource, Fault, FaultInjector
+from sonar_driver.emulator.emulated_head import EchoSource
+from sonar_driver.emulator.faults import Fault, FaultInjector
 
 # Faults of which no ping comes.
 WITHOUT_PING = (Fault.SILENCE, Fault.DISAPPEARANCE, Fault.REFUSED)

@@ -3,7 +3,7 @@
 import threading
 import time
 
-from sonar_driver.line.scanner import Scanner
+from sonar_driver.line.device import Scanner
 
 PATIENCE = 60.0
 _POLL = 0.01

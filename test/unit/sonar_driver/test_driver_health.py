@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from imagenex_852_driver.line.stats import PROBLEMS, DeviceStats
+from imagenex_852_driver.line.device import PROBLEMS, DeviceStats
 from node_support.health import Level
 from sonar_driver.line.driver_health import DriverHealth
 

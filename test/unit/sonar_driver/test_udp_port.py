@@ -3,7 +3,7 @@ import time
 
 import pytest
 
-from sonar_driver.emulator import UdpLine
+from sonar_driver.emulator.head_server import UdpLine
 from sonar_driver.line.port import PortNameError, PortUnavailableError, datagram_address, open_port, port_losses
 
 NO_SPEED = 0

@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass
 from typing import Optional
 
-from imagenex_852_driver.protocol import FrameError, Reply, ReplyKind, SwitchCommand
-from imagenex_852_driver.protocol.errors import require
+from imagenex_852_driver.protocol.command import SwitchCommand
+from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind, require
 
 MAGIC = b"852"
 HEADER_LENGTH = 100  # Bytes before the reply in each record (manufacturer's log format)

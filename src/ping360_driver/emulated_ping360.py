@@ -1,31 +1,38 @@
-"""The emulated head: a state machine from messages to messages with the delays of motor, sound and line."""
+"""A Ping360 in software: a state machine from messages to messages with the delays of motor, sound and line."""
 
+from dataclasses import dataclass
 from typing import List, Optional
 
-from ping360_driver.emulator.parameters import Ping360FaultRates
-from ping360_driver.emulator.sector_scan import SectorScan
-from ping360_driver.protocol.angles import AHEAD, TURN, head_angle
-from ping360_driver.protocol.message_stream import MessageStream
-from ping360_driver.protocol.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageId, PingMessage, packed, packed_nack
-from ping360_driver.protocol.sampling import PERIOD_TICKS, SAMPLES, bin_length, longest_pulse_us
-from ping360_driver.protocol.scan_command import PulseSettings
-from sonar_driver.emulator import (
-    EchoSource,
-    EmulatedHead,
-    Fault,
-    FaultInjector,
-    FixedPattern,
-    PingRequest,
-    Transmission,
+from node_support.parameters import parameter, with_defaults
+from ping360_driver.protocol.messages import (
+    CHECKSUM_LENGTH,
+    HEADER_LENGTH,
+    MessageId,
+    MessageStream,
+    PingMessage,
+    packed,
+    packed_nack,
 )
+from ping360_driver.protocol.scan_command import (
+    AHEAD,
+    PERIOD_TICKS,
+    SAMPLES,
+    TURN,
+    PulseSettings,
+    bin_length,
+    head_angle,
+    longest_pulse_us,
+)
+from sonar_driver.emulator.emulated_head import EchoSource, EmulatedHead, FixedPattern, PingRequest, Transmission
+from sonar_driver.emulator.faults import EmulatedHeadParameters, Fault, FaultInjector
 
+_HALF_TURN = TURN // 2
 _PING360 = 2
 _FIRMWARES = {True: (3, 3, 1), False: (3, 1, 1)}  # With and without auto-transmit
 _TURNING_TIME = 2.4 / TURN  # s per gradian: Ping Viewer's angular speed of the head
 _ANSWER_TIME = 0.002  # s: what a processor needs for an answer that takes no ping
 _STILL_UNREAD = 0.1  # s: nobody waits for the driver to read a beam before the head sends the next one
 _GAINS_DB = (-6.0, 0.0, 6.0)  # Of the emulated echoes; the manufacturer gives no figures
-
 # What the ping protocol allows in a command to ping.
 _ALLOWED = {
     "gain_setting": range(3),
@@ -41,6 +48,46 @@ _ALLOWED = {
 }
 
 
+@dataclass(frozen=True)
+@with_defaults(beam_height_deg=25.0, beam_width_deg=2.0)
+class EmulatorParameters(EmulatedHeadParameters):
+    """Parameters of ping360_emulator."""
+
+    refused: float = parameter(0.0, "share of replies instead of which the head refuses", low=0.0, high=1.0)
+    link: str = parameter(
+        "/tmp/ping360", "path at which the port appears, or udp://HOST:PORT to listen at", tunable=False
+    )
+    auto_transmit: bool = parameter(
+        True, "the firmware can scan a sector by itself; older ones need a request per ping", tunable=False
+    )
+
+
+class SectorScan:
+    """Steps from start to stop; back again in a sector of up to half a turn, from the start again in a wider one."""
+
+    def __init__(self, start: int, stop: int, step: int) -> None:
+        self.angle = start
+        self._start = start
+        self._width = (stop - start) % TURN
+        self._step = step
+        self._clockwise = True
+
+    def turn(self) -> int:
+        """Go to the angle of the next ping; return by how many gradians the head turns."""
+        position = (self.angle - self._start) % TURN
+        following = position + (self._step if self._clockwise else -self._step)
+        if not 0 <= following <= self._width:
+            following = self._beyond_the_edge(position)
+        self.angle = (self._start + following) % TURN
+        return min((following - position) % TURN, (position - following) % TURN)
+
+    def _beyond_the_edge(self, position: int) -> int:
+        if self._width > _HALF_TURN:
+            return 0
+        self._clockwise = not self._clockwise
+        return min(max(position + (self._step if self._clockwise else -self._step), 0), self._width)
+
+
 class EmulatedPing360(EmulatedHead):
     """A Ping360 in software. A silence or a disappearance ends its scan, like a loss of power."""
 
@@ -52,7 +99,7 @@ class EmulatedPing360(EmulatedHead):
         speed_of_sound: float = 1500.0,
         auto_transmit: bool = True,
     ) -> None:
-        super().__init__(faults or FaultInjector(Ping360FaultRates()), baud_rate)
+        super().__init__(faults or FaultInjector(EmulatorParameters()), baud_rate)
         self._echo_source = echo_source or FixedPattern()
         self._speed_of_sound = speed_of_sound
         self._auto_transmit = auto_transmit

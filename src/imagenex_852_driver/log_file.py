@@ -1,12 +1,12 @@
-"""Reads and writes the manufacturer's `.852` logs."""
+"""Reads, plays and appends to the manufacturer's `.852` logs."""
 
 import mmap
 import os
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterator, List, Optional, Tuple, Union
+from typing import Iterable, Iterator, List, Optional, Tuple, Union
 
-from imagenex_852_driver.logs.log_record import (
+from imagenex_852_driver.log_record import (
     HEADER_LENGTH,
     MAGIC,
     LoggedPing,
@@ -14,12 +14,27 @@ from imagenex_852_driver.logs.log_record import (
     decode_record,
     record_length,
 )
-from imagenex_852_driver.protocol import FrameError
+from imagenex_852_driver.protocol.reply import FrameError
 
-__all__ = ["DamagedPart", "LogReader", "LogWriteError", "LogWriter", "LoggedPing", "read"]
-
+USUAL_RATE = 10.0  # 1/s: pings of a head at 30 m, for logs whose stamps do not tell
 # Damaged parts beyond this number are only counted.
 _REMEMBERED_DAMAGES = 100
+
+
+def timed(pings: Iterable[LoggedPing], rate: Optional[float] = None) -> Iterator[Tuple[float, LoggedPing]]:
+    """Yield every ping with its time in seconds after the first one; times never go back.
+
+    They follow each other at `rate` (1/s). Without a rate they keep the intervals of the log's stamps, or follow
+    at `USUAL_RATE` where the stamps cannot be read.
+    """
+    step = 1.0 / (rate or USUAL_RATE)
+    time, last_stamp = 0.0, None
+    for index, ping in enumerate(pings):
+        if index:
+            known = rate is None and ping.stamp is not None and last_stamp is not None
+            time += max(0.0, ping.stamp - last_stamp) if known else step
+        last_stamp = ping.stamp
+        yield time, ping
 
 
 class LogWriteError(OSError):
@@ -36,11 +51,6 @@ class DamagedPart:
 
     def __str__(self) -> str:
         return f"{self.length} damaged bytes at byte {self.offset}: {self.reason}"
-
-
-def read(path: Union[str, Path]) -> "LogReader":
-    """Return an iterator over the pings of a log; raises OSError when the file cannot be opened."""
-    return LogReader(path)
 
 
 class LogReader:

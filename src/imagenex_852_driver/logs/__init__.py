@@ -1,1 +1,0 @@
-"""The manufacturer's `.852` logs."""

@@ -1,1 +1,0 @@
-"""The logs of Ping Viewer, the manufacturer's program."""
