@@ -13,7 +13,7 @@ from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_yaml
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
-from node_support.parameter_text import default_yaml, markdown_table
+from node_support.parameter_text import default_yaml, markdown_table, start_up_yaml
 from node_support.parameters import ParameterSet, describe
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
@@ -25,8 +25,7 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.tilt_scan import SonarControlParameters
 from sonar_processing.shapes.circles import CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetectorParameters
-from sonar_simulator.default_yaml import gazebo_sonar_yaml, simulator_yaml
-from sonar_simulator.gazebo.parameters import GazeboSonarParameters
+from sonar_simulator import gazebo_beams
 from sonar_simulator.simulation.simulation import SimulatorParameters
 from sonar_simulator.simulation.simulation_setup import GROUPS
 
@@ -76,7 +75,7 @@ LIVE_NODES: Dict[str, LiveNode] = {
 
 START_UP_NODES: Dict[str, Type[ParameterSet]] = {
     "sonar_simulator": SimulatorParameters,
-    "gazebo_sonar": GazeboSonarParameters,
+    "gazebo_sonar": gazebo_beams.GazeboSonarParameters,
 }
 """Nodes that read their parameters only when they start."""
 
@@ -86,8 +85,9 @@ def generated() -> Dict[Path, str]:
     texts = {
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, node.parameters) for name, node in LIVE_NODES.items()
     }
-    texts[ROOT / "yaml/sonar_simulator_default.yaml"] = simulator_yaml()
-    texts[ROOT / "yaml/gazebo_sonar_default.yaml"] = gazebo_sonar_yaml()
+    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS}
+    for name, parameters in START_UP_NODES.items():
+        texts[ROOT / f"yaml/{name}_default.yaml"] = start_up_yaml(name, parameters, groups[name])
     for kind in OdometryKind:
         texts[ROOT / f"yaml/odometry_{kind.value.lower()}.yaml"] = profile_yaml(kind)
     texts[ROOT / "docs/nodes.md"] = nodes_page()

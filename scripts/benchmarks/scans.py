@@ -16,12 +16,12 @@ from sonar_processing.filters.echo_extractor import EchoExtractorParameters, ext
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.echoes.laser_cone import LaserCone, LaserConeParameters
+from sonar_simulator.echoes.thesis_models import LaserCone, LaserConeParameters
 from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.world.sdf import load_sdf
 from sonar_simulator.world.world import Shape, World
+from sonar_simulator.world.world_file import load_sdf
 
 RAYS = {15: (5, 3), 45: (15, 3), 150: (30, 5), 500: (50, 10)}
 HEAD = SonarHead(beams_per_turn=120, seconds_per_turn=16.0)

@@ -17,8 +17,7 @@ from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from node_support.files import write_whole
 from sonar_processing.beams.beam import Beam
 from sonar_processing.scans.image import PolarImage, SonarImageParameters
-from sonar_simulator.world.world import World
-from sonar_simulator.world.world_mesh import world_triangles
+from sonar_simulator.world.world import World, world_triangles
 from thesis_results.page import prose
 
 MOST_BYTES = 200_000

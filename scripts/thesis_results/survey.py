@@ -21,7 +21,7 @@ from sonar_processing.scans.tilt_scan import SonarControlParameters, TiltScan
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
+from sonar_simulator.vehicle.robot import Servo, ServoParameters, tilted
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.page import joined, prose, table

@@ -2,7 +2,7 @@
 
 import dataclasses
 from enum import Enum
-from typing import List, Type
+from typing import List, Mapping, Type
 
 from node_support.parameters import ParameterSet, describe
 
@@ -13,6 +13,15 @@ def default_yaml(node: str, parameters: Type[ParameterSet]) -> str:
     """Return the text of yaml/<node>_default.yaml: every key with its meaning, what is allowed, and its default."""
     lines = [f"# Defaults of {node}. Keys marked * can be changed while it runs (dynamic_reconfigure)."]
     return "\n".join(lines + yaml_keys(parameters, live=True)) + "\n"
+
+
+def start_up_yaml(node: str, parameters: Type[ParameterSet], groups: Mapping[str, Type[ParameterSet]]) -> str:
+    """Return the text for a node that reads its parameters only when it starts: its own keys, then those of groups."""
+    lines = [f"# Defaults of {node}, read only at start-up.", *yaml_keys(parameters, live=False)]
+    for name, group in groups.items():
+        lines += ["", f"{name}:"]
+        lines += [f"  {line}" if line else "" for line in yaml_keys(group, live=False)[1:]]
+    return "\n".join(lines) + "\n"
 
 
 def yaml_keys(parameters: Type[ParameterSet], live: bool) -> List[str]:

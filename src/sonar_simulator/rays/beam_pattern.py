@@ -1,10 +1,13 @@
-"""The rays that represent one beam, and the planes that bound it."""
+"""The rays of a beam: a fan, a fan with side lobes, and a round cone."""
 
 import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+
+# Gazebo's unit_cone, the shape of the thesis's sensor, is also a pyramid with many sides.
+_SIDES = 16
 
 
 class RayPattern(Protocol):
@@ -79,6 +82,81 @@ class BeamPattern:
         Angles count counter-clockwise about +z from +x.
         """
         return self.sample(len(angles), rng) @ head_turns(angles).transpose(0, 2, 1)
+
+
+@dataclass(frozen=True)
+class FanWithSideLobes:
+    """The rays of `fan`, followed by `side_rays` more over all bearings at the fan's elevations.
+
+    Only the fan bounds the beam: what only side lobes hear is not part of it.
+    """
+
+    fan: BeamPattern
+    side_rays: int
+
+    @property
+    def rays(self) -> int:
+        """Number of rays in one beam."""
+        return self.fan.rays + self.side_rays
+
+    @property
+    def rays_inside(self) -> int:
+        """Number of rays, from the first, that are between the planes."""
+        return self.fan.rays
+
+    def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
+        """Return (beams, rays, 3) unit vectors in the frame of the beam, drawn anew for each beam."""
+        jitter = rng.random((2, beams, self.side_rays))
+        bearing = 2.0 * math.pi * (np.arange(self.side_rays) + jitter[0]) / max(1, self.side_rays)
+        elevation = (jitter[1] - 0.5) * self.fan.vertical_opening
+        level = np.cos(elevation)
+        side = np.stack([level * np.cos(bearing), level * np.sin(bearing), np.sin(elevation)], axis=-1)
+        return np.concatenate([self.fan.sample(beams, rng), side], axis=1)
+
+    def shares(self) -> np.ndarray:
+        """Return (rays,) the share of the fan's solid angle that each ray represents."""
+        turns = 2.0 * math.pi / self.fan.horizontal_opening
+        return np.concatenate([self.fan.shares(), np.full(self.side_rays, turns / max(1, self.side_rays))])
+
+    def planes(self) -> np.ndarray:
+        """Return (4, 3) inward normals of the fan's sides."""
+        return self.fan.planes()
+
+
+@dataclass(frozen=True)
+class ConePattern:
+    """Rays spread evenly over a cone of full angle `opening`, rad (thesis 6.4.1, 6.4.2).
+
+    The cone is a pyramid with 16 sides, like a mesh of a cone; each flat side touches the round cone from outside.
+    """
+
+    opening: float
+    rays: int
+
+    @property
+    def rays_inside(self) -> int:
+        """Number of rays between the planes: all."""
+        return self.rays
+
+    def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
+        """Return (beams, rays, 3) unit vectors in the frame of the beam: a sunflower, rotated anew for each beam."""
+        number = np.arange(self.rays)
+        turn = number * math.pi * (3.0 - math.sqrt(5.0)) + 2.0 * math.pi * rng.random((beams, 1))
+        radius = math.tan(self.opening / 2.0) * np.sqrt((number + rng.random((beams, self.rays))) / self.rays)
+        slopes = np.stack([np.ones_like(turn), radius * np.cos(turn), radius * np.sin(turn)], axis=-1)
+        return slopes / np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
+
+    def shares(self) -> np.ndarray:
+        """Return (rays,) equal shares."""
+        return np.full(self.rays, 1.0 / self.rays)
+
+    def planes(self) -> np.ndarray:
+        """Return (16, 3) inward normals; four of them bound the cone below, above, right and left."""
+        half = self.opening / 2.0
+        turn = np.arange(_SIDES) * 2.0 * math.pi / _SIDES
+        return np.column_stack(
+            [np.full(_SIDES, math.sin(half)), -math.cos(half) * np.cos(turn), -math.cos(half) * np.sin(turn)]
+        )
 
 
 def head_turns(angles: np.ndarray) -> np.ndarray:

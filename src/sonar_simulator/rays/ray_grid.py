@@ -1,11 +1,145 @@
-"""Contacts from a grid of measured ranges, as Gazebo's ray sensor publishes it."""
+"""Grids of rays, as Gazebo's ray sensors send them, and the contacts of a beam made of them."""
 
+import math
+from dataclasses import dataclass
 from typing import Optional, Tuple
 
 import numpy as np
 
-from sonar_simulator.rays.contacts import Contacts
-from sonar_simulator.world.materials import DEFAULT_MATERIAL, Material, material_of_reflection
+from node_support.errors import RefusedInput
+from sonar_simulator.rays.beam_tracer import Contacts
+from sonar_simulator.world.world import DEFAULT_MATERIAL, Material, material_of_reflection
+
+_NO_BEARING = 1e-6  # rad: less than any ray sensor's step; all rays of one column
+
+
+@dataclass(frozen=True)
+class Rays:
+    """A grid of rays around the sensor's +x: (rows, columns) ranges, m, inf where nothing was hit.
+
+    elevations: (rows,) above the sensor's x-y plane; bearings: (columns,) counter-clockwise about its +z; rad.
+    retro: (rows, columns) laser_retro of what was hit, or None if the sensor does not provide it.
+    """
+
+    ranges: np.ndarray
+    elevations: np.ndarray
+    bearings: np.ndarray
+    retro: Optional[np.ndarray]
+
+    def within(self, bearing: float, opening: float) -> "Rays":
+        """Return the columns within `opening` rad (full width) around `bearing`, with bearings relative to it.
+
+        Raises RefusedInput when there are none.
+        """
+        off = np.remainder(self.bearings - bearing + math.pi, 2.0 * math.pi) - math.pi
+        inside = np.flatnonzero(np.abs(off) <= 0.5 * opening + 1e-9)
+        if not len(inside):
+            raise RefusedInput(
+                "scans refused",
+                f"no ray within {math.degrees(opening):.2f} deg of {math.degrees(bearing):.1f} deg: the sensor must "
+                "reach around the whole circle, with rays closer together than the beam is wide",
+            )
+        columns = inside[np.argsort(off[inside])]
+        retro = None if self.retro is None else self.retro[:, columns]
+        return Rays(self.ranges[:, columns], self.elevations, off[columns], retro)
+
+
+@dataclass(frozen=True)
+class ScanLayout:
+    """The layout of a ray sensor in sensor_msgs/LaserScan: columns by its angles, row after row; m and rad."""
+
+    angle_min: float
+    angle_max: float
+    angle_increment: float
+    range_max: float
+
+    @property
+    def columns(self) -> int:
+        """Number of rays in a row; raises RefusedInput if the angles are inconsistent."""
+        span = self.angle_max - self.angle_min
+        if not (math.isfinite(span) and math.isfinite(self.angle_increment)):
+            raise RefusedInput("scans refused", f"angles {self.angle_min} to {self.angle_max}, must be finite")
+        # For a single ray, Gazebo publishes an increment that cannot be used as a divisor.
+        if abs(self.angle_increment) < _NO_BEARING:
+            return 1
+        columns = round(span / self.angle_increment) + 1
+        if columns < 1:
+            raise RefusedInput("scans refused", f"angle_increment {self.angle_increment} does not lead to angle_max")
+        return columns
+
+
+def rays_of_scan(layout: ScanLayout, ranges: np.ndarray, intensities: np.ndarray, vertical_opening: float) -> Rays:
+    """Return the rays of a LaserScan as gazebo_ros_laser publishes it: the rows of a pyramid, one after the other.
+
+    ranges: (n,) m, inf or at least range_max where nothing was hit, -inf where something was too near.
+    intensities: (n,) or (0,), laser_retro. vertical_opening: rad from the lowest row to the highest, which the
+    message does not contain. Raises RefusedInput.
+    """
+    columns = layout.columns
+    if not len(ranges) or len(ranges) % columns:
+        raise RefusedInput(
+            "scans refused",
+            f"{len(ranges)} ranges are not a multiple of the {columns} columns between angle_min and angle_max",
+        )
+    rows = len(ranges) // columns
+    grid = np.asarray(ranges, dtype=np.float64).reshape(rows, columns)
+    retro = np.asarray(intensities, dtype=np.float64).reshape(rows, columns) if len(intensities) == grid.size else None
+    half = 0.5 * vertical_opening
+    return Rays(
+        _without_misses(grid, layout.range_max),
+        np.linspace(-half, half, rows) if rows > 1 else np.zeros(1),
+        np.linspace(layout.angle_min, layout.angle_max, columns),
+        retro,
+    )
+
+
+def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: int, nothing_range: float) -> Rays:
+    """Return the rays of a point cloud as gazebo_ros_block_laser publishes it: one point per ray, row after row.
+
+    points: (n, 3) m in the sensor's frame. rows: their number; 0 to derive it from the points, for a
+    pyramid narrower than 180 deg. A ray that hits nothing gives a point at `nothing_range` m, or farther, which is the
+    sensor's greatest range minus its smallest. Raises RefusedInput if the points are not such a grid.
+    """
+    points = np.asarray(points, dtype=np.float64).reshape(-1, 3)
+    distances = np.linalg.norm(points, axis=1)
+    if not len(points) or not np.isfinite(points).all() or not distances.all():
+        raise RefusedInput(
+            "scans refused",
+            f"{len(points)} points; there must be at least one, all finite and none at the sensor's centre",
+        )
+    bearings = np.arctan2(points[:, 1], points[:, 0])
+    rows = rows or _row_count(bearings)
+    if len(points) % rows:
+        raise RefusedInput("scans refused", f"{len(points)} points are not {rows} rows")
+    shape = (rows, len(points) // rows)
+    elevations = np.arcsin(points[:, 2] / distances).reshape(shape)
+    retro = None if intensities is None else np.asarray(intensities, dtype=np.float64).reshape(shape)
+    return Rays(
+        _without_misses(distances.reshape(shape), nothing_range),
+        np.median(elevations, axis=1),
+        np.median(np.unwrap(bearings.reshape(shape), axis=1), axis=0),
+        retro,
+    )
+
+
+def _row_count(bearings: np.ndarray) -> int:
+    """Return the number of rows: how often the bearing returns to the beginning of a row, plus one."""
+    span = np.ptp(bearings)
+    if span > math.pi:
+        raise RefusedInput(
+            "scans refused", "the number of rows is unknown for points all around the sensor; set ray_rows"
+        )
+    if span <= _NO_BEARING:
+        return len(bearings)
+    steps = np.diff(bearings)
+    return int(np.count_nonzero(steps * np.sign(steps[0]) < -0.5 * span)) + 1
+
+
+def _without_misses(ranges: np.ndarray, nothing_range: float) -> np.ndarray:
+    """Replace ranges without a hit by inf; allows for the single precision of clouds."""
+    ranges = np.where(np.isnan(ranges), np.inf, ranges)
+    hit = (ranges > 0.0) & (ranges < nothing_range * (1.0 - 1e-6) - 1e-6)
+    return np.where(hit, ranges, np.inf)
 
 
 def contacts_of_grid(

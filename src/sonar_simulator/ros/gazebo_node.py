@@ -1,24 +1,91 @@
-"""gazebo_sonar: makes sonar beams from the scans of a ray sensor in Gazebo, so that no plugin has to be built."""
+"""The node gazebo_sonar: makes beams of the scans of Gazebo's ray sensors."""
 
-from typing import Optional
+from typing import Callable, Dict, Optional
 
 import genpy
+import numpy as np
 import rospy
+from genpy import DeserializationError, Message
+from rospy import AnyMsg
+from sensor_msgs.msg import LaserScan, PointCloud, PointCloud2, PointField
 
 from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.headers import check_frame, check_stamp
 from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.node import run
 from node_support.ros.transforms import JointAngle
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.gazebo.beams import GazeboBeams, RayScan
-from sonar_simulator.gazebo.parameters import GROUPS, GazeboSonarParameters, HeadMode
-from sonar_simulator.ros.gazebo_messages import ray_scan
-from sonar_simulator.ros.simulator_messages import MESSAGES
+from sonar_simulator.gazebo_beams import GROUPS, GazeboBeams, GazeboSonarParameters, HeadMode, RayScan
+from sonar_simulator.rays.ray_grid import Rays, ScanLayout, rays_of_points, rays_of_scan
+from sonar_simulator.ros.publisher import MESSAGES
 from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 from underwater_map_construction.msg import SonarScanLine
 
+_NUMPY_TYPES = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
+
+
+def ray_scan(message: AnyMsg, parameters: GazeboSonarParameters) -> RayScan:
+    """Return the scan in a message of one of the three types; raises RefusedInput for one that cannot be used."""
+    kind = message._connection_header["type"]
+    if kind not in _KINDS:
+        raise RefusedInput("scans refused", f"type {kind}, must be one of {', '.join(_KINDS)}")
+    try:
+        typed = _KINDS[kind]().deserialize(message._buff)
+    except DeserializationError as error:
+        raise RefusedInput("scans refused", f"{kind}: {error}") from error
+    stamp_ns, frame_id = typed.header.stamp.to_nsec(), typed.header.frame_id.lstrip("/")
+    check_stamp(stamp_ns)
+    check_frame(frame_id, "scans refused")
+    return RayScan(_CONVERSIONS[kind](typed, parameters), stamp_ns, frame_id)
+
+
+def _of_laser_scan(scan: LaserScan, parameters: GazeboSonarParameters) -> Rays:
+    layout = ScanLayout(scan.angle_min, scan.angle_max, scan.angle_increment, scan.range_max)
+    return rays_of_scan(layout, np.asarray(scan.ranges), np.asarray(scan.intensities), parameters.vertical_opening)
+
+
+def _of_point_cloud(cloud: PointCloud, parameters: GazeboSonarParameters) -> Rays:
+    points = np.array([(point.x, point.y, point.z) for point in cloud.points]).reshape(-1, 3)
+    # gazebo_ros_block_laser leaves the name of its only channel empty.
+    values = [channel.values for channel in cloud.channels if len(channel.values) == len(points)]
+    intensities = np.asarray(values[0]) if values else None
+    return rays_of_points(points, intensities, parameters.ray_rows, parameters.nothing_range)
+
+
+def _of_point_cloud2(cloud: PointCloud2, parameters: GazeboSonarParameters) -> Rays:
+    columns = {name: _field(cloud, name) for name in ("x", "y", "z", "intensity")}
+    missing = [name for name in ("x", "y", "z") if columns[name] is None]
+    if missing:
+        raise RefusedInput("scans refused", f"no float field {', '.join(missing)}")
+    points = np.column_stack([columns[name] for name in ("x", "y", "z")])
+    rows = parameters.ray_rows or (cloud.height if cloud.height > 1 else 0)
+    return rays_of_points(points, columns["intensity"], rows, parameters.nothing_range)
+
+
+def _field(cloud: PointCloud2, name: str) -> Optional[np.ndarray]:
+    found = [field for field in cloud.fields if field.name == name and field.datatype in _NUMPY_TYPES]
+    if not found:
+        return None
+    count, step = cloud.width * cloud.height, cloud.point_step
+    kind = np.dtype((">" if cloud.is_bigendian else "<") + _NUMPY_TYPES[found[0].datatype])
+    if len(cloud.data) != count * step or found[0].offset + kind.itemsize > step:
+        raise RefusedInput("scans refused", f"{len(cloud.data)} bytes for {count} points of {step} bytes")
+    if count == 0:
+        return np.zeros(0)
+    row = np.dtype({"names": [name], "formats": [kind], "offsets": [found[0].offset], "itemsize": step})
+    return np.frombuffer(cloud.data, dtype=row)[name].astype(np.float64)
+
+
+_KINDS: Dict[str, type] = {kind._type: kind for kind in (LaserScan, PointCloud, PointCloud2)}
+_CONVERSIONS: Dict[str, Callable[[Message, GazeboSonarParameters], Rays]] = {
+    LaserScan._type: _of_laser_scan,
+    PointCloud._type: _of_point_cloud,
+    PointCloud2._type: _of_point_cloud2,
+}
 # A scan of 100,000 rays several times over; rospy reads one that is larger in pieces, slowly.
 _SCAN_BUFFER_BYTES = 2**23
 _ANY_TIME = 1.0  # s: Gazebo says when the next scan comes, so the head's own period does not count
@@ -78,3 +145,8 @@ class GazeboSonar:
         stamp, frame = genpy.Time(*divmod(scan.stamp_ns, 10**9)), self._parameters.frame_id
         self._publisher.publish(MESSAGES.scan_line(ping, self._tilt.for_beam(), stamp, frame, self._beams.max_range))
         self.health.count("beams out")
+
+
+def run_gazebo_sonar() -> None:
+    """Run gazebo_sonar."""
+    run("gazebo_sonar", GazeboSonar)

@@ -14,13 +14,13 @@ from node_support import topics
 from node_support.files import package_folder
 from node_support.parameters import ParameterError
 from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.node import run
 from node_support.timing import Pace
-from sonar_simulator.ros.simulator_publisher import SimulatorPublisher
-from sonar_simulator.ros.true_sonar import TrueSonar
+from sonar_simulator.ros.publisher import SimulatorPublisher, TrueSonar
 from sonar_simulator.simulation.moment_messages import map_origin
 from sonar_simulator.simulation.simulation import Drive, Head, Moment
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
-from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
+from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 _WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
@@ -132,3 +132,8 @@ def _robot() -> RobotDescription:
         raise ParameterError("robot_description is not set; the simulator reads the sonar's mount from it") from error
     except DescriptionError as error:
         raise ParameterError(str(error)) from error
+
+
+def run_simulator() -> None:
+    """Run sonar_simulator."""
+    run("sonar_simulator", Simulator)

@@ -9,10 +9,9 @@ import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
-from sonar_simulator.vehicle.movement import Movement, VehicleState
 from sonar_simulator.vehicle.odometry import Estimate, NoOdometry, Odometry
-from sonar_simulator.vehicle.scripted_vehicle import TiltCommand
-from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
+from sonar_simulator.vehicle.robot import Servo, ServoParameters, tilted
+from sonar_simulator.vehicle.scripted_vehicle import Movement, TiltCommand, VehicleState
 
 
 class Drive(Enum):

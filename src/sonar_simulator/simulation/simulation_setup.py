@@ -13,12 +13,9 @@ from sonar_simulator.simulation.simulation import Drive, Head, Instruments, Simu
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle.commanded_vehicle import CommandedVehicle, VehicleParameters
 from sonar_simulator.vehicle.odometry import NoOdometry, Odometry, OdometryParameters
-from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
-from sonar_simulator.vehicle.script_file import load_script
-from sonar_simulator.vehicle.scripted_vehicle import ScriptError
-from sonar_simulator.vehicle.servo import Servo, ServoParameters
-from sonar_simulator.world.errors import WorldError
-from sonar_simulator.world.world import World
+from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription, Servo, ServoParameters
+from sonar_simulator.vehicle.scripted_vehicle import ScriptError, load_script
+from sonar_simulator.world.world import World, WorldError
 from sonar_simulator.world.world_file import load_world
 
 BASE_FRAME = "base_link"

@@ -1,14 +1,38 @@
-"""A vehicle that follows a script of moves: its pose and twist at any time, in closed form."""
+"""A vehicle that follows a script, and the files of scripts."""
 
 import math
 from dataclasses import dataclass
-from typing import Any, List, Mapping, NamedTuple, Sequence, Tuple
+from pathlib import Path
+from typing import Any, List, Mapping, NamedTuple, Protocol, Sequence, Tuple, Union
 
 import numpy as np
+import yaml
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError, ParameterSet, parameter
-from sonar_simulator.vehicle.movement import VehicleState
+
+
+@dataclass(frozen=True)
+class VehicleState:
+    """The vehicle's true pose and velocity.
+
+    T_world_base: (4, 4). twist: (6,) in the body frame, linear x y z m/s, angular x y z rad/s. is_still: at rest.
+    """
+
+    T_world_base: np.ndarray
+    twist: np.ndarray
+    is_still: bool
+
+
+class Movement(Protocol):
+    """A vehicle in motion."""
+
+    duration: float
+    """When the motion ends, s since its start; inf if it has no end."""
+
+    def state(self, time: float) -> VehicleState:
+        """Return the state at `time` s since the start; times must not decrease from call to call."""
+
 
 # Peak speed over mean speed of the minimum-jerk law: its greatest slope, reached half way.
 _PEAK = 1.875
@@ -190,3 +214,22 @@ def _entry(kind: type, values: Any, name: str) -> Any:
         return kind.from_mapping(values)
     except ParameterError as error:
         raise ScriptError(f"{name}: {error}") from error
+
+
+_KEYS = ("start", "moves")
+
+
+def load_script(path: Union[str, Path]) -> VehicleScript:
+    """Return the script in a file. Raises ScriptError, naming the file, if it cannot be read or followed."""
+    try:
+        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ScriptError(f"{path}: {error.strerror}") from error
+    except (UnicodeDecodeError, yaml.YAMLError) as error:
+        raise ScriptError(f"{path}: not yaml: {' '.join(str(error).split())}") from error
+    if not isinstance(data, dict) or set(data) - set(_KEYS):
+        raise ScriptError(f"{path}: must hold the keys {' and '.join(_KEYS)} and no others")
+    try:
+        return VehicleScript.from_yaml_data(data.get("moves"), data.get("start"))
+    except ScriptError as error:
+        raise ScriptError(f"{path}: {error}") from error

@@ -1,11 +1,10 @@
-"""Triangle meshes of primitive shapes, centred on the origin: vertices (n, 3) in m, faces (m, 3) int32."""
+"""Triangle meshes of boxes, cylinders, spheres and planes."""
 
 from typing import Tuple
 
 import numpy as np
 
 Mesh = Tuple[np.ndarray, np.ndarray]
-
 # The chords of a 64-gon are at most 0.12 % of the radius inside the circle, less than a bin at any range.
 _SEGMENTS = 64
 _RINGS = 32  # Half of the segments, so that the facets of a sphere are as high as wide

@@ -1,14 +1,74 @@
-"""The world around the sonar: shapes, their triangles, materials, and outlines from above."""
+"""A world: shapes with materials as one mesh of triangles, and the errors of reading one."""
 
-from dataclasses import dataclass
+import sys
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 from scipy.spatial import ConvexHull
 
-from sonar_simulator.world import primitives
-from sonar_simulator.world.materials import DEFAULT_MATERIAL, Colour, Material
+from sonar_simulator.world.primitives import MESHES, Mesh
+
+
+class WorldError(ValueError):
+    """A file cannot be loaded as a world; the text names the file."""
+
+
+class MissingPackageError(WorldError):
+    """A Python package that the simulator needs is not installed; the text says how to install it."""
+
+    def __init__(self, purpose: str, package: str, reason: ImportError) -> None:
+        """`purpose` says what the package does here; `package` is its name at PyPI."""
+        super().__init__(f"{reason}: it {purpose}; install it: {sys.executable} -m pip install {package}")
+
+
+Colour = Tuple[float, float, float, float]
+
+
+@dataclass(frozen=True)
+class Material:
+    """The acoustic properties of a surface at high frequencies.
+
+    reflection: share of the pressure reflected at normal incidence, 0 to 1, from the impedances of water and
+        material: (Z - Zw) / (Z + Zw).
+    slope: rms slope of the surface's facets (tangent); small is like a mirror, large scatters sound in all directions.
+    lambert_db: strength of Lambert's diffuse scattering, dB (10 log mu, APL-UW TR 9407).
+    mirror: share of the reflected intensity that is reflected as by a mirror, 0 to 1.
+    colour: red, green, blue, alpha, 0 to 1, for pictures.
+    """
+
+    name: str
+    reflection: float
+    slope: float
+    lambert_db: float
+    mirror: float
+    colour: Colour = (0.6, 0.6, 0.6, 1.0)
+
+
+# Reflections from impedances in MRayl (water 1.5): concrete 8, steel 45, granite 13, quartz sand 3.5, mud 1.8, oak 3,
+# PVC 3.3, glass fibre 4.5, rubber 1.8. Lambert's strengths of sediments and rock after APL-UW TR 9407.
+_ALL = (
+    Material("concrete", 0.68, 0.30, -12.0, 0.5, (0.62, 0.62, 0.60, 1.0)),
+    Material("steel", 0.93, 0.15, -20.0, 0.8, (0.45, 0.50, 0.56, 1.0)),
+    Material("rock", 0.79, 0.50, -10.0, 0, (0.45, 0.42, 0.38, 1.0)),
+    Material("gravel", 0.50, 0.40, -17.0, 0, (0.55, 0.52, 0.45, 1.0)),
+    Material("sand", 0.40, 0.25, -22.0, 0.1, (0.80, 0.72, 0.50, 1.0)),
+    Material("mud", 0.10, 0.25, -27.0, 0.1, (0.40, 0.33, 0.25, 1.0)),
+    Material("wood", 0.33, 0.30, -16.0, 0.3, (0.55, 0.38, 0.20, 1.0)),
+    Material("plastic", 0.38, 0.15, -18.0, 0.8, (0.95, 0.55, 0.10, 1.0)),
+    Material("fibreglass", 0.50, 0.15, -18.0, 0.8, (0.55, 0.70, 0.80, 1.0)),
+    Material("rubber", 0.09, 0.20, -20.0, 0.5, (0.15, 0.15, 0.15, 1.0)),
+)
+MATERIALS: Dict[str, Material] = {material.name: material for material in _ALL}
+DEFAULT_MATERIAL = MATERIALS["concrete"]
+
+
+def material_of_reflection(reflection: float) -> Material:
+    """Return a material that reflects this share of the pressure, 0 to 1, and is otherwise the default."""
+    like = DEFAULT_MATERIAL
+    return Material(f"reflection {reflection:g}", reflection, like.slope, like.lambert_db, like.mirror, like.colour)
+
 
 # A shape that is this many times wider than high, in both directions, is ground and gets no outline among the walls.
 _GROUND_RATIO = 10.0
@@ -32,12 +92,12 @@ class Shape:
     pose: np.ndarray
     size: Tuple[float, ...]
     material: Material = DEFAULT_MATERIAL
-    mesh: Optional[primitives.Mesh] = None
+    mesh: Optional[Mesh] = None
     colour: Optional[Colour] = None
 
-    def triangles(self) -> primitives.Mesh:
+    def triangles(self) -> Mesh:
         """Return vertices (n, 3) in the world frame, m, and faces (m, 3) as indices into them."""
-        vertices, faces = primitives.MESHES[self.kind](*self.size) if self.mesh is None else self.mesh
+        vertices, faces = MESHES[self.kind](*self.size) if self.mesh is None else self.mesh
         if self.mesh is not None:
             vertices = vertices * np.array(self.size)
         return vertices @ self.pose[:3, :3].T + self.pose[:3, 3], faces
@@ -106,3 +166,45 @@ def _outline(points: np.ndarray) -> np.ndarray:
         ends = points[np.argsort(points @ np.ptp(points, axis=0))[[0, -1]]]
         return ends[[0, 1, 0]]
     return points[np.append(corners, corners[0])]
+
+
+# m; extent shown of infinite planes if there is nothing else.
+_SHOWN = 100.0
+
+
+@dataclass(frozen=True)
+class WorldTriangles:
+    """Corners, three per triangle: points (3 m, 3) in the world frame, m, colours (3 m, 4) RGBA from 0 to 1."""
+
+    points: np.ndarray
+    colours: np.ndarray
+
+
+def world_triangles(world: World) -> WorldTriangles:
+    """Return all triangles of a world; infinite planes are cut to the extent of the rest."""
+    bounded = [shape for shape in world.shapes if np.isfinite(shape.size).all()]
+    low, high = _extent(bounded)
+    points, colours = [np.empty((0, 3))], [np.empty((0, 4), dtype=np.float32)]
+    for shape in world.shapes:
+        vertices, faces = (shape if np.isfinite(shape.size).all() else _cut(shape, low, high)).triangles()
+        points.append(vertices[faces].reshape(-1, 3))
+        colour = shape.material.colour if shape.colour is None else shape.colour
+        colours.append(np.tile(np.array(colour, dtype=np.float32), (3 * len(faces), 1)))
+    return WorldTriangles(np.concatenate(points), np.concatenate(colours))
+
+
+def _extent(shapes: list) -> Tuple[np.ndarray, np.ndarray]:
+    if not shapes:
+        return np.full(3, -_SHOWN / 2.0), np.full(3, _SHOWN / 2.0)
+    vertices = np.concatenate([shape.triangles()[0] for shape in shapes])
+    return vertices.min(axis=0), vertices.max(axis=0)
+
+
+def _cut(plane: Shape, low: np.ndarray, high: np.ndarray) -> Shape:
+    """Return the part of an infinite plane below, above and beside a box from `low` to `high` m in the world."""
+    corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)]) * (high - low) + low
+    flat = (corners - plane.pose[:3, 3]) @ plane.pose[:3, :2]
+    pose = plane.pose.copy()
+    pose[:3, 3] += plane.pose[:3, :2] @ ((flat.min(axis=0) + flat.max(axis=0)) / 2.0)
+    width, length = np.maximum(np.ptp(flat, axis=0), 1e-3)
+    return replace(plane, pose=pose, size=(float(width), float(length)))

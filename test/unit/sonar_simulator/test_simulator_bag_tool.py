@@ -7,9 +7,8 @@ import pytest
 import rosbag
 import yaml
 
-from sonar_simulator.simulation.bag_tool import main
-from sonar_simulator.simulation.simulated_bag import SimulatedBag
-from sonar_simulator.vehicle.script_file import load_script
+from sonar_simulator.simulation.simulate_bag import SimulatedBag, main
+from sonar_simulator.vehicle.scripted_vehicle import load_script
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = "moves: [{wait: 1}, {x: 2, y: 1, yaw_deg: 40, seconds: 4}, {tilt_deg: 20}, {wait: 1}]"
@@ -171,7 +170,7 @@ def test_a_bag_that_could_not_be_finished_leaves_the_older_one(tmp_path, script,
     def stop(*_):
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("sonar_simulator.simulation.simulated_bag.SimulatedBag.add", stop)
+    monkeypatch.setattr("sonar_simulator.simulation.simulate_bag.SimulatedBag.add", stop)
     assert _write(tmp_path, script)[0] == 130
     assert "nothing was written" in capsys.readouterr().err
     assert out.read_bytes() == before

@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
-from sonar_simulator.echoes.collision import CollisionParameters
 from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.echoes.thesis_models import CollisionParameters
 from sonar_simulator.rays.beam_pattern import BeamPattern
-from sonar_simulator.rays.contacts import Contacts
+from sonar_simulator.rays.beam_tracer import Contacts
 
 EXACT = {"increments": 0}
 

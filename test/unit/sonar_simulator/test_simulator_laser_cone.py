@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from node_support.parameters import ParameterError
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.rays.contacts import Contacts
+from sonar_simulator.rays.beam_tracer import Contacts
 
 NOISE_FREE = {"spread": 0.0, "noise_echoes": 0}
 

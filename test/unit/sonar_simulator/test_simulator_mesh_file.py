@@ -3,8 +3,8 @@ import sys
 import numpy as np
 import pytest
 
-from sonar_simulator.world.errors import MissingPackageError, WorldError
-from sonar_simulator.world.mesh_file import load_mesh
+from sonar_simulator.world.model_files import load_mesh
+from sonar_simulator.world.world import MissingPackageError, WorldError
 from sonar_simulator.world.world_file import load_world
 
 trimesh = pytest.importorskip("trimesh")

@@ -4,13 +4,10 @@ import numpy as np
 import pytest
 
 from node_support.geometry import pose_matrix
-from sonar_simulator.echoes.side_lobes import FanWithSideLobes
-from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.beam_pattern import BeamPattern, FanWithSideLobes
 from sonar_simulator.rays.beam_tracer import BeamTracer
-from sonar_simulator.rays.mirrors import Mirrors, legs
-from sonar_simulator.rays.ray_caster import RayCaster
-from sonar_simulator.world.materials import MATERIALS
-from sonar_simulator.world.world import Shape, World
+from sonar_simulator.rays.ray_caster import Mirrors, RayCaster, legs
+from sonar_simulator.world.world import MATERIALS, Shape, World
 
 pytest.importorskip("embreex")
 STEEL, ROCK = MATERIALS["steel"], MATERIALS["rock"]

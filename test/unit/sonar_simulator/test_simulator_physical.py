@@ -3,11 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_simulator.echoes.acoustics import Scattering, absorption
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.echoes.physical import Physical, PhysicalParameters
-from sonar_simulator.rays.contacts import Contacts
-from sonar_simulator.world.materials import MATERIALS
+from sonar_simulator.echoes.physical import Physical, PhysicalParameters, Scattering, absorption
+from sonar_simulator.rays.beam_tracer import Contacts
+from sonar_simulator.world.world import MATERIALS
 
 STILL = {"speckle": 0.0, "noise_level_db": -300.0, "volume_scattering_db": -300.0, "ringing": 0.0}
 AMPLITUDE = {"detector": "amplitude", "source_level_db": 100.0}

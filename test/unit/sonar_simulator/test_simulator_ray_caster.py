@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from node_support.geometry import pose_matrix
 from sonar_simulator.rays.ray_caster import RayCaster
-from sonar_simulator.world.errors import MissingPackageError
-from sonar_simulator.world.world import Shape, World
+from sonar_simulator.world.world import MissingPackageError, Shape, World
 
 HALF = np.array([60.0, 25.0, 5.0])
 ROOM = RayCaster(World.from_shapes("room", [Shape("room", "box", np.eye(4), tuple(2.0 * HALF))]))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from node_support.geometry import pose_matrix
-from sonar_simulator.vehicle.robot_description import DescriptionError, RobotDescription
+from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription
 
 CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())
 CHAIN = """<robot name="r">

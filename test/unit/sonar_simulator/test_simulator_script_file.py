@@ -5,8 +5,7 @@ import pytest
 
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
-from sonar_simulator.vehicle.script_file import load_script
-from sonar_simulator.vehicle.scripted_vehicle import ScriptError
+from sonar_simulator.vehicle.scripted_vehicle import ScriptError, load_script
 from sonar_simulator.world.world_file import load_world
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -3,7 +3,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sonar_simulator.world.sdf import WorldError, load_sdf
+from sonar_simulator.world.world import WorldError
+from sonar_simulator.world.world_file import load_sdf
 
 BASIN = Path(__file__).resolve().parents[3] / "worlds" / "basin.sdf"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"

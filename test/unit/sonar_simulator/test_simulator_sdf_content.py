@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_simulator.world.materials import MATERIALS
-from sonar_simulator.world.sdf import load_sdf
+from sonar_simulator.world.world import MATERIALS
+from sonar_simulator.world.world_file import load_sdf
 
 WORLDS = Path(__file__).resolve().parents[3] / "worlds"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"

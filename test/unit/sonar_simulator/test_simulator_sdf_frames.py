@@ -6,8 +6,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry import pose_matrix
-from sonar_simulator.world.sdf import load_sdf
-from sonar_simulator.world.sdf_frames import Scope, own_pose
+from sonar_simulator.world.sdf_geometry import Scope, own_pose
+from sonar_simulator.world.world_file import load_sdf
 
 NUMBERS = st.floats(-100.0, 100.0).map(lambda number: round(number, 6))
 ANGLES = st.floats(-3.2, 3.2).map(lambda number: round(number, 6))

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterError
-from sonar_simulator.vehicle.servo import Servo, ServoParameters, tilted
+from sonar_simulator.vehicle.robot import Servo, ServoParameters, tilted
 
 
 def _servo(**values):

@@ -9,8 +9,8 @@ from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.beam_pattern import BeamPattern
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.world.sdf import load_sdf
 from sonar_simulator.world.world import Shape, World
+from sonar_simulator.world.world_file import load_sdf
 
 PATTERN = BeamPattern(math.radians(22.0), math.radians(2.5), 50, 10)
 HEAD = SonarHead(120, 16.0)

@@ -8,7 +8,7 @@ import pytest
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_simulator.simulation.world_echoes import WorldEchoes, world_echoes
+from sonar_simulator.simulation.sonar_head import WorldEchoes, world_echoes
 from sonar_simulator.world.world import Shape, World
 
 pytest.importorskip("embreex")

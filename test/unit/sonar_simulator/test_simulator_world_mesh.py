@@ -3,9 +3,7 @@ import math
 import numpy as np
 
 from node_support.geometry import pose_matrix
-from sonar_simulator.world.materials import MATERIALS
-from sonar_simulator.world.world import Shape, World
-from sonar_simulator.world.world_mesh import world_triangles
+from sonar_simulator.world.world import MATERIALS, Shape, World, world_triangles
 
 BOX = Shape("box", "box", pose_matrix((10, 0, -2)), (2.0, 4.0, 1.0), material=MATERIALS["steel"])
 FLOOR = Shape("floor", "plane", pose_matrix((0, 0, -3)), (math.inf, math.inf))

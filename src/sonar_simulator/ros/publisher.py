@@ -1,17 +1,84 @@
-"""Publishes the state at one moment of a simulation."""
+"""What the simulator publishes: moments, the clock, the world, and where its sonar truly is."""
+
+from typing import Dict
 
 import numpy as np
 import rospy
+import tf2_ros
+from genpy import Message
+from geometry_msgs.msg import Point, Pose, Quaternion, TransformStamped, Twist, Vector3
+from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock
-from std_msgs.msg import Float32
+from sensor_msgs.msg import Imu, JointState
+from std_msgs.msg import ColorRGBA, Float32, Float64
+from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 from node_support import topics
-from sonar_simulator.ros.simulator_messages import CLASSES, MESSAGES
-from sonar_simulator.ros.world_marker import world_marker
-from sonar_simulator.simulation.moment_messages import MAP_FRAME, TOPICS
+from node_support.ros.transforms import pose_from_matrix
+from sonar_simulator.simulation.moment_messages import MAP_FRAME, TOPICS, MomentMessages
 from sonar_simulator.simulation.simulation import Drive, Instruments, Moment
-from sonar_simulator.world.world import World
+from sonar_simulator.world.world import World, world_triangles
+from underwater_map_construction.msg import SonarScanLine
+
+CLASSES: Dict[str, type] = {
+    kind._type: kind for kind in (Float64, Imu, JointState, Odometry, SonarScanLine, TFMessage, TransformStamped, Twist)
+}
+"""By their names."""
+
+
+def _made(kind: str) -> Message:
+    return CLASSES[kind]()
+
+
+MESSAGES = MomentMessages(_made, lambda values: values.tobytes())
+"""Fills in messages of rospy."""
+# Transparent, because the map grows on the world and must be visible through it.
+_OPACITY = 0.45
+
+
+def world_marker(world: World, frame_id: str, origin: np.ndarray) -> Marker:
+    """Return all triangles of a world; stamped 0, so that rviz places it at any time.
+
+    origin: (3,) m, where the frame begins in the world.
+    """
+    triangles = world_triangles(world)
+    marker = Marker(ns="world", type=Marker.TRIANGLE_LIST, action=Marker.ADD, frame_locked=True)
+    marker.header.frame_id = frame_id
+    marker.pose = Pose(position=Point(*(-origin).tolist()), orientation=Quaternion(w=1.0))
+    marker.scale = Vector3(1.0, 1.0, 1.0)
+    marker.color = ColorRGBA(1.0, 1.0, 1.0, _OPACITY)
+    marker.points = [Point(*corner) for corner in triangles.points.tolist()]
+    marker.colors = [ColorRGBA(red, green, blue, _OPACITY * a) for red, green, blue, a in triangles.colours.tolist()]
+    return marker
+
+
+WORLD_FRAME = "world"
+TRUE_SONAR_FRAME = "true_sonar"
+
+
+class TrueSonar:
+    """Publishes world -> true_sonar, and world -> map as where the vehicle's map begins, so that both have one root."""
+
+    def __init__(self, origin: np.ndarray) -> None:
+        """origin: (3,) m, of the map in the world."""
+        self._broadcaster = tf2_ros.TransformBroadcaster()
+        self._T_world_map = np.eye(4)
+        self._T_world_map[:3, 3] = origin
+
+    def publish(self, T_world_sonar: np.ndarray, stamp: rospy.Time) -> None:
+        """Publish where the sonar is, (4, 4)."""
+        poses = {TRUE_SONAR_FRAME: T_world_sonar, MAP_FRAME: self._T_world_map}
+        self._broadcaster.sendTransform([_transform(frame, pose, stamp) for frame, pose in poses.items()])
+
+
+def _transform(frame: str, T_world_frame: np.ndarray, stamp: rospy.Time) -> TransformStamped:
+    message = TransformStamped(child_frame_id=frame)
+    message.header.stamp, message.header.frame_id = stamp, WORLD_FRAME
+    pose = pose_from_matrix(T_world_frame)
+    message.transform.translation, message.transform.rotation = pose.position, pose.orientation
+    return message
+
 
 _QUEUE_SIZE = 100  # A second of every topic at the usual rates
 

@@ -1,5 +1,6 @@
-"""What the thesis's two echo models have in common: they count contacts by range, then add noise echoes (6.4)."""
+"""The echo models of the thesis, which count contacts (6.4)."""
 
+import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Tuple
@@ -7,9 +8,9 @@ from typing import Tuple
 import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.rays.beam_pattern import BeamPattern, RayPattern
-from sonar_simulator.rays.contacts import Contacts
-from sonar_simulator.rays.mirrors import Mirrors
+from sonar_simulator.rays.beam_pattern import BeamPattern, ConePattern, RayPattern
+from sonar_simulator.rays.beam_tracer import Contacts
+from sonar_simulator.rays.ray_caster import Mirrors
 
 
 @dataclass(frozen=True)
@@ -84,3 +85,66 @@ class ContactEcho(ABC):
         """Return bin numbers, and which of them exist; a bin includes its far end but not its near end."""
         index = np.ceil(ranges * self.bins / self.max_range).astype(np.int64) - 1
         return index, (index >= 0) & (index < self.bins)
+
+
+@dataclass(frozen=True)
+class LaserConeParameters(ContactEchoParameters):
+    """Parameters of `LaserCone`; the defaults are the thesis's numbers."""
+
+    echo_strength: int = parameter(15, "strength that one echo adds to its bin", low=0, high=255)
+
+
+class LaserCone(ContactEcho):
+    """Each contact adds one echo of a fixed strength near its range."""
+
+    def __init__(self, parameters: LaserConeParameters) -> None:
+        super().__init__(parameters)
+        self.parameters = parameters
+
+    def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
+        beam, ray = np.nonzero(np.isfinite(ranges))
+        spread = ranges[beam, ray] + rng.normal(0.0, self.parameters.spread, size=len(beam))
+        counts = self.counts(len(ranges), beam, spread)
+        return np.minimum(counts * self.parameters.echo_strength, self.parameters.saturation).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class CollisionParameters(ContactEchoParameters):
+    """Parameters of `Collision`; the defaults are the thesis's numbers. The thesis's sensor has no noise."""
+
+    spread: float = parameter(
+        0.6, "standard deviation of the added contacts about their contact", unit="m", low=0.0, high=100.0
+    )
+    noise_echoes: int = parameter(0, "noise echoes written into each beam that hits something", low=0, high=10000)
+    opening_deg: float = parameter(
+        22.0, "full angle of the round cone", unit="deg", low=0.1, high=150.0, thesis_name="opening"
+    )
+    increments: int = parameter(10, "contacts added around each contact", low=0, high=1000)
+
+
+class Collision(ContactEcho):
+    """Counts contacts by range, including those added around each contact; the fullest bin is the strongest.
+
+    Contacts come from rays spread over the cone. The thesis used contacts of meshes as its engine reported them, of
+    which some were missing and some were where there was nothing (6.4, "sonar cone bug").
+    """
+
+    def __init__(self, parameters: CollisionParameters) -> None:
+        super().__init__(parameters)
+        self.parameters = parameters
+
+    def pattern(self, fan: BeamPattern) -> RayPattern:
+        """Return as many rays as `fan` has, spread over the cone."""
+        return ConePattern(math.radians(self.parameters.opening_deg), fan.rays)
+
+    def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
+        """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
+        beam, ray = np.nonzero(np.isfinite(ranges))
+        met = ranges[beam, ray]
+        added = rng.normal(np.repeat(met, self.parameters.increments), self.parameters.spread)
+        all_beams = np.concatenate([beam, np.repeat(beam, self.parameters.increments)])
+        counts = self.counts(len(ranges), all_beams, np.concatenate([met, added]))
+        fullest = np.maximum(counts.max(axis=1, keepdims=True), 1)
+        # Rounded up, so that a single contact is heard beside any number of others.
+        return (-(-self.parameters.saturation * counts // fullest)).astype(np.uint8)

@@ -1,1 +1,0 @@
-"""Sonar beams from the rays of a sensor in Gazebo."""

@@ -1,0 +1,250 @@
+"""The program simulate_bag: writes what a simulated vehicle records into a bag, without a ROS master."""
+
+import argparse
+import sys
+import time
+from argparse import Namespace
+from pathlib import Path
+from typing import Any, Callable, Dict, List, Sequence, Tuple
+
+import numpy as np
+import yaml
+from tqdm import tqdm
+
+from node_support import topics
+from node_support.files import package_folder, whole_file
+from node_support.help import CommandLine
+from node_support.parameter_files import assigned_values, read_values
+from node_support.parameters import ParameterError
+from recordings.bags.bag_writer import BagWriter, PackedMessages
+from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
+from sonar_simulator.simulation.simulation import Drive, Moment, stacked
+from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup, make_setup
+from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription, tilted
+
+START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
+BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head
+_RENAMED = {topics.VELOCITY: topics.VELOCITY_COMMANDS}
+_SETTINGS_TOPIC = "/sonar_simulator/settings"
+
+
+class SimulatedBag:
+    """Writes moments into a bag, at the times and on the topics that the simulator node would use."""
+
+    def __init__(self, bag: BagWriter, setup: Setup, settings: Settings) -> None:
+        self._bag = bag
+        self._setup = setup
+        self._settings = settings
+        self._messages = MomentMessages(bag.make, np.asarray)
+        self._origin = map_origin(setup.T_world_start, settings.simulator.instruments)
+
+    def begin(self, robot: RobotDescription) -> None:
+        """Write what applies to the whole bag: the fixed transforms and the parameters."""
+        stamp_ns = _stamp_ns(0.0)
+        stamp = self._bag.time(stamp_ns)
+        transforms = [
+            self._messages.transform(joint.T_parent_child, stamp, joint.parent, joint.child)
+            for joint in robot.fixed_joints
+        ]
+        self._write(topics.STATIC_TRANSFORMS, self._messages.transforms(transforms), stamp_ns)
+        told = self._bag.make("std_msgs/String")
+        told.data = _told(self._settings)
+        self._write(_SETTINGS_TOPIC, told, stamp_ns)
+
+    def add(self, moments: Sequence[Moment]) -> None:
+        """Write everything that belongs to moments, one after the other; the transforms of a moment are one message."""
+        kinds: Dict[Tuple[bool, bool], List[int]] = {}
+        for number, moment in enumerate(moments):
+            kinds.setdefault((moment.is_tick, moment.ping is not None), []).append(number)
+        packed: Dict[int, Tuple[List[PackedMessages], int]] = {}
+        for numbers in kinds.values():
+            topics_of_kind = self._packed(stacked([moments[number] for number in numbers]))
+            packed.update((number, (topics_of_kind, place)) for place, number in enumerate(numbers))
+        for number in range(len(moments)):
+            topics_of_kind, place = packed[number]
+            for messages in topics_of_kind:
+                self._bag.append(messages, place)
+
+    def _packed(self, moment: Moment) -> List[PackedMessages]:
+        """Return the messages of moments of a kind, topic by topic."""
+        stamps_ns = np.array([_stamp_ns(seconds) for seconds in moment.time.tolist()])
+        stamp = self._bag.time(stamps_ns)
+        instruments = self._settings.simulator.instruments
+        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments, self._origin)
+        if messages[0][0] != topics.TRANSFORMS:
+            messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
+        messages[0][1].transforms.append(self._mounts(moment.tilt, stamp))
+        return [self._bag.pack(_name(topic), message, stamps_ns) for topic, message in messages]
+
+    def _mounts(self, tilts: np.ndarray, stamp: Any) -> Any:
+        """Return the sonar's mount at each of the tilts (n,) as one message."""
+        angles, places = np.unique(tilts, return_inverse=True)
+        poses = np.array([tilted(self._setup.T_base_sonar, angle) for angle in angles])
+        return self._messages.transform(poses[places], stamp, BASE_FRAME, SONAR_FRAME)
+
+    def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
+        self._bag.write(_name(topic), message, stamp_ns)
+
+
+def _stamp_ns(seconds: float) -> int:
+    return round(float(START_TIME + seconds) * 1e9)
+
+
+def _name(topic: str) -> str:
+    """Return a topic of the simulator as the bag has it."""
+    topic = _RENAMED.get(topic, topic)
+    return topic if topic.startswith("/") else f"/{topic}"
+
+
+def write_bag(
+    path: Path,
+    setup: Setup,
+    settings: Settings,
+    robot: RobotDescription,
+    compression: str = "none",
+    tell: Callable[[float], object] = lambda time: None,
+) -> int:
+    """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
+
+    `tell` receives the simulated time [s] from time to time. Raises OSError.
+    """
+    beams = 0
+    with whole_file(path) as temporary, BagWriter(temporary, compression) as bag:
+        writer = SimulatedBag(bag, setup, settings)
+        writer.begin(robot)
+        for moments in setup.simulation.batches(settings.simulator.clock_rate, BEAMS_AT_ONCE):
+            if moments:
+                writer.add(moments)
+                beams += sum(moment.ping is not None for moment in moments)
+                tell(moments[-1].time)
+    return beams
+
+
+def _told(settings: Settings) -> str:
+    """Return the settings as yaml, with file names only, so that the bag does not depend on the folder."""
+    values = settings.to_mapping()
+    files = {key: Path(values[key]).name for key in ("world", "script")}
+    return yaml.safe_dump({**values, **files}, sort_keys=False)
+
+
+COMPRESSIONS = ("none", "lz4", "bz2")
+_EPILOG = """\
+examples:
+  simulate_bag --world basin --out basin.bag
+  simulate_bag --world harbour --out harbour.bag --set echo_model=physical odometry.scale_error=0.1
+  simulate_bag --world my_pool.dae --script my_moves.yaml --out pool.bag --set sonar.ray_rows=15 seed=7
+
+yaml/sonar_simulator_default.yaml lists the keys that --set takes."""
+
+
+def parse(arguments: Sequence[str]) -> argparse.Namespace:
+    """Return world, script, out, parameters, set, robot, compression and quiet; exits on a bad command line."""
+    parser = CommandLine(
+        "simulate_bag",
+        description="Write the bag of a simulated survey: beams, tf, odometry and truth. Needs no ROS master.",
+        epilog=_EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    parser.add_argument(
+        "--world", required=True, help="file, or the name of a world of this package: basin, tank, harbour"
+    )
+    parser.add_argument("--script", help="yaml file of the vehicle's moves (default: the tour of the package's world)")
+    parser.add_argument("--out", required=True, type=Path, help="bag to write; an existing one is replaced")
+    parser.add_argument(
+        "--parameters", type=Path, help="yaml file of the simulator's parameters (default: the world's)"
+    )
+    parser.add_argument(
+        "--set",
+        nargs="+",
+        action="extend",
+        default=[],
+        metavar="KEY=VALUE",
+        help="any parameter; GROUP.KEY=VALUE for those in groups",
+    )
+    parser.add_argument("--robot", type=Path, help="URDF that says where the sonar is mounted (default: Charl-e)")
+    parser.add_argument("--compression", choices=COMPRESSIONS, default="none", help="of the bag (default: %(default)s)")
+    parser.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
+    return parser.parse_args(arguments)
+
+
+def settings_of(options: argparse.Namespace, package: Path) -> Dict[str, Any]:
+    """Return the simulator's parameters that a command line asks for; raises ParameterError.
+
+    `package` is the package's folder, which holds the worlds, the tours and the demo's parameters.
+    """
+    own = package / "yaml" / f"sonar_simulator_{options.world}.yaml"
+    chosen = options.parameters or (own if own.is_file() else None)
+    values = read_values(chosen) if chosen else {}
+    for key, value in assigned_values(options.set).items():
+        _set(values, key, value)
+    shipped = package / "worlds" / f"{options.world}.sdf"
+    world = shipped if shipped.is_file() else Path(options.world).expanduser().absolute()
+    if not world.exists():
+        own_worlds = ", ".join(sorted(path.stem for path in shipped.parent.glob("*.sdf")))
+        raise ParameterError(f"--world {options.world}: must be {own_worlds}, or a file that exists")
+    tour = package / "yaml" / f"{options.world}_tour.yaml"
+    if options.script is None and not tour.is_file():
+        raise ParameterError(f"--script is missing: only worlds of this package have a tour, {options.world} has none")
+    values["world"] = str(world)
+    values["script"] = str(Path(options.script or tour).expanduser().absolute())
+    return values
+
+
+def _set(values: Dict[str, Any], key: str, value: Any) -> None:
+    keys = key.split(".")
+    if not all(keys) or len(keys) > 2:
+        raise ParameterError(f"--set {key}: must be KEY=VALUE or GROUP.KEY=VALUE")
+    group = values
+    if len(keys) == 2:
+        group = values[keys[0]] = dict(values.get(keys[0]) or {})
+    group[keys[-1]] = value
+
+
+def run_simulate_bag() -> None:
+    """Run simulate_bag with the command line."""
+    sys.exit(main(sys.argv[1:]))
+
+
+def main(arguments: List[str]) -> int:
+    """Write the bag that a command line asks for; return the exit status. An error is reported in one line."""
+    options = parse(arguments)
+    try:
+        _run(options)
+    except (ParameterError, DescriptionError) as error:
+        print(f"simulate_bag: {error}", file=sys.stderr)
+        return 1
+    except OSError as error:
+        print(f"simulate_bag: {options.out}: {error.strerror}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print("simulate_bag: stopped; nothing was written", file=sys.stderr)
+        return 130
+    return 0
+
+
+def _run(options: Namespace) -> None:
+    package = package_folder()
+    settings = Settings.from_mapping(settings_of(options, package))
+    if settings.simulator.drive is not Drive.SCRIPT:
+        raise ParameterError("drive = 'CMD_VEL': nobody sends commands while a bag is written; must be SCRIPT")
+    robot = RobotDescription.from_file(options.robot or package / "urdf/charle.urdf")
+    setup = make_setup(settings, package, robot, lambda line: print(f"simulate_bag: {line}", file=sys.stderr))
+    start = time.monotonic()
+    duration = setup.simulation.duration
+    with tqdm(total=round(duration), unit="s", disable=options.quiet or None, desc=options.out.name) as bar:
+        beams = write_bag(
+            options.out.absolute(),
+            setup,
+            settings,
+            robot,
+            options.compression,
+            lambda now: bar.update(round(now) - bar.n),
+        )
+        bar.update(bar.total - bar.n)
+    seconds = time.monotonic() - start
+    if not options.quiet:
+        print(
+            f"{options.out}: {duration:.0f} s of simulated time, {beams} beams, "
+            f"{options.out.stat().st_size / 1e6:.1f} MB, written in {seconds:.1f} s "
+            f"({duration / seconds:.0f} times real time)"
+        )
