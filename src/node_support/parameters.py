@@ -84,7 +84,9 @@ class ParameterSet:
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
-            object.__setattr__(self, field.name, _validated(field, getattr(self, field.name)))
+            # Fields that `parameter` did not declare hold objects that were validated where they were made.
+            if _METADATA_KEY in field.metadata:
+                object.__setattr__(self, field.name, _validated(field, getattr(self, field.name)))
         self.check()
 
     def check(self) -> None:

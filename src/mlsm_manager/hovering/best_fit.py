@@ -60,12 +60,12 @@ def _shift_search(live: LiveSolver) -> ShiftSearch:
     def refit(path: np.ndarray) -> np.ndarray:
         return _path(live, settled(live, _on_path(live, path)))
 
-    return ShiftSearch(echoes, log.node_times.copy(), parameters.matching.scan_parts, refit)
+    return ShiftSearch(echoes, log.node_times.copy(), parameters.parts_per_turn, refit)
 
 
 def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], least: float) -> List[BatchResult]:
     """Return fits from paths that shifts of those of `fits` lead to, none if none has a log likelihood of `least`."""
-    if live.log.scan_count > _LONGEST_SHIFTED * live.parameters.matching.scan_parts:
+    if live.log.scan_count > _LONGEST_SHIFTED * live.parameters.parts_per_turn:
         return []
     climbed = search.climbed([_path(live, fit.state) for fit in fits])
     if climbed[0].log_likelihood < least:

@@ -7,9 +7,8 @@ import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place, place_lone
-from mlsm_manager.joint_solver.priors import run_mean
 from mlsm_manager.joint_solver.unknowns.state import State
 
 ACROSS = 0.7  # m: standard deviation of an echo across the surface of another
@@ -44,19 +43,19 @@ class Echoes:
         return len(self.nodes)
 
     @classmethod
-    def of(cls, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, scan: int) -> "Echoes":
+    def of(cls, log: RunLog, odometry: OdometryModel, parameters: SolverParameters, scan: int) -> "Echoes":
         """Return those of a scan of the log."""
         motion = log.node_motion(np.array([scan, scan + 1]))
         nodes = np.zeros((log.scan_count + 1, odometry.width))
         nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
-        state = State(nodes, run_mean(parameters.sonar))
+        state = State(nodes, parameters.run_mean)
         surfaces = place(log, odometry, state, log.rows(scan, scan + 1))
         posts = place_lone(log, odometry, state, log.lone.rows(scan, scan + 1))
-        weights = parameters.matching.lone_quality * _POST_WEIGHT * posts.qualities**_POST_POWER
+        weights = parameters.post_confidence * _POST_WEIGHT * posts.qualities**_POST_POWER
         return cls.joined([cls._made(surfaces, _SURFACE_WEIGHT * surfaces.qualities), cls._made(posts, weights, True)])
 
     @classmethod
-    def of_run(cls, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters) -> "Echoes":
+    def of_run(cls, log: RunLog, odometry: OdometryModel, parameters: SolverParameters) -> "Echoes":
         """Return those of all scans of the log, at least one."""
         return cls.joined([cls.of(log, odometry, parameters, scan) for scan in range(log.scan_count)])
 

@@ -14,7 +14,7 @@ from mlsm_manager.hovering.particles import Particles, drawn, led
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.heading_factors import AHEAD, ASIDE
 from mlsm_manager.joint_solver.motion.odometry_motion import Motion
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import YAW
 from node_support.geometry import rotated
 
@@ -40,7 +40,7 @@ class ParticleFilter:
     echoes: Tuple[Echoes, ...] = ()
     particles: Optional[Particles] = None
 
-    def followed(self, log: RunLog, parameters: MultiViewParameters) -> "ParticleFilter":
+    def followed(self, log: RunLog, parameters: SolverParameters) -> "ParticleFilter":
         """Return the filter after all scans of `log`, the first of which are those followed before."""
         known = self
         while known.scans < log.scan_count:
@@ -57,9 +57,7 @@ class ParticleFilter:
         particles = self.particles or Particles(np.empty((0, 1, 2)), np.empty((0, 2)), np.empty(0))
         return {name: getattr(particles, field).copy() for field, name in _STORED_NAMES.items()}
 
-    def resumed(
-        self, log: RunLog, parameters: MultiViewParameters, stored: Mapping[str, np.ndarray]
-    ) -> "ParticleFilter":
+    def resumed(self, log: RunLog, parameters: SolverParameters, stored: Mapping[str, np.ndarray]) -> "ParticleFilter":
         """Return the filter after all scans of `log`, which `stored` it then. Raises ValueError, KeyError."""
         particles = Particles(**{field: stored[name] for field, name in _STORED_NAMES.items()})
         count, nodes = len(particles.log_weights), particles.paths.shape[1]
@@ -70,15 +68,15 @@ class ParticleFilter:
         echoes = tuple(Echoes.of(log, parameters.odometry, parameters, scan) for scan in scans)
         return replace(self, scans=log.scan_count, echoes=echoes, particles=particles if count else None)
 
-    def placed(self, log: RunLog, nodes: np.ndarray, parameters: MultiViewParameters, is_told: bool) -> np.ndarray:
+    def placed(self, log: RunLog, nodes: np.ndarray, parameters: SolverParameters, is_told: bool) -> np.ndarray:
         """Return the newest of `nodes` (n, width), those of the last turn or all free ones, moved onto the particles.
 
         All are moved where those before the last turn are far from the particles. is_told: whether the place of the
         first node was told; the particles then do not know where they lie in the map, and begin where free nodes do.
         """
         path = self.particles.most_likely()
-        free = min(len(path), parameters.window.free_nodes, len(nodes))
-        parts = min(parameters.matching.scan_parts, free - 1)
+        free = min(len(path), parameters.free_nodes, len(nodes))
+        parts = min(parameters.parts_per_turn, free - 1)
         path, motion = path[-free:], log.node_motion(np.arange(len(nodes) - free, len(nodes)))
         places = motion.poses[:, :2] + nodes[-free:, :2]
         if is_told:
@@ -89,14 +87,14 @@ class ParticleFilter:
         path = path + (places - path)[-parts - 1]
         return on_path(nodes[-free:], path, motion)[-parts:]
 
-    def _next(self, log: RunLog, parameters: MultiViewParameters) -> "ParticleFilter":
+    def _next(self, log: RunLog, parameters: SolverParameters) -> "ParticleFilter":
         scan = self.scans
         rng = np.random.RandomState([self.seed, scan])
         motion = log.node_motion(np.array([scan, scan + 1]))
         duration, turn = float(motion.durations[0]), float(np.diff(motion.poses[:, 2])[0])
         before = self.particles or Particles.begun(_COUNT, motion.poses[0, :2], _START_SPEED, rng)
         sources = Echoes.of(log, parameters.odometry, parameters, scan)
-        longest = self.remembered_turns * parameters.matching.scan_parts + 1
+        longest = self.remembered_turns * parameters.parts_per_turn + 1
         targets = self._targets(scan - (before.paths.shape[1] - 1))
         draw = drawn(before, duration, turn, rng)
         draw = draw if targets is None else led(before, draw, sources, targets, duration, rng)

@@ -11,39 +11,77 @@ from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
 from node_support.parameters import ParameterSet, parameter
 
+# Beams are later than their stamps by so many deviations at most, and s of odometry that are worth waiting for.
+_LATE = 3.0
+_LONGEST_LOOKAHEAD = 1.0
+# Relative deviation of reported distances from which on they hardly hold a path where no surface does; and by how many
+# standard deviations per node such a path may still move when it is as good as it gets.
+_POOR_DISTANCES = 0.1
+_STOP_SIGMA = 0.1
+
 
 @dataclass(frozen=True)
-class SonarCalibration(ParameterSet):
-    """What is known of the sonar's ranges and stamps before the run."""
+class JointSolverParameters(ParameterSet):
+    """What the joint solver needs to know of a sonar and of how a vehicle goes, by the names in the yaml files."""
 
-    range_scale: float = parameter(0.0, "true range over reported range, minus 1", low=-0.5, high=1.0)
+    sonar_delay_deviation: float = parameter(
+        0.0, "how far the beams' stamps may be off, all by the same", unit="s", low=0.0, high=5.0, tunable=False
+    )
+    echo_deviation: float = parameter(
+        0.5, "standard deviation of a point square-on to its surface: half an echo's length",
+        unit="m", low=0.01, high=10.0, tunable=False,
+    )  # fmt: skip
+    free_scans: int = parameter(40, "newest scans whose poses may still change", low=2, high=200, tunable=False)
+    normal_deviation: float = parameter(
+        0.0, "standard deviation of surface normals; above 0, a straight wall gives no information about motion along "
+        "it", unit="rad", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
+    post_confidence: float = parameter(
+        0.0, "confidence that an isolated strong echo is a fixed object such as a post; 0: ignore such echoes",
+        low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
+    parts_per_turn: int = parameter(
+        1, "parts into which each turn of the head is cut, each with its own speed: more where speeds change within a "
+        "turn", low=1, high=12, tunable=False,
+    )  # fmt: skip
+    scans_per_group: int = parameter(
+        5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
+    )
+
+
+class NodeSearch(Protocol):
+    """Finds the newest nodes where only echoes tell the motion within a turn. Each scan makes another one."""
+
+    @property
+    def variance(self) -> float:
+        """How far the places differ that it takes for possible [m^2], in the direction in which they differ most."""
+
+    def followed(self, log: RunLog, parameters: "SolverParameters") -> "NodeSearch":
+        """Return the search after all scans of `log`, the first of which are those followed before."""
+
+    def placed(self, log: RunLog, nodes: np.ndarray, parameters: "SolverParameters", is_told: bool) -> np.ndarray:
+        """Return the newest of `nodes` (n, width) at their likeliest places. is_told: the first one's place was."""
+
+    def stored(self) -> Dict[str, np.ndarray]:
+        """Return what `resumed` needs besides the log, as arrays by name."""
+
+    def resumed(self, log: RunLog, parameters: "SolverParameters", stored: Mapping[str, np.ndarray]) -> "NodeSearch":
+        """Return the search after all scans of `log`, which `stored` it then. Raises ValueError, KeyError."""
+
+
+@dataclass(frozen=True)
+class SolverParameters(JointSolverParameters):
+    """All parameters of a run. odometry: the model of the vehicle's motion, with its own parameters.
+
+    A turn of the head is one scan of the run, or `parts_per_turn` of them. node_search: what finds the nodes of these;
+    None where the odometry reports distances.
+    """
+
+    range_scale_error: float = parameter(0.0, "true range over reported range, minus 1", low=-0.5, high=1.0)
     range_scale_deviation: float = parameter(
         0.02, "its standard deviation: speed of sound between cold fresh and warm salt water", low=0.0, high=0.5
     )
-    world_scale_deviation: float = parameter(
-        0.0,
-        "standard deviation of a scale of ranges and motions together that nothing in the run can tell; it is in the "
-        "told covariances only",
-        low=0.0,
-        high=0.5,
-    )
     sonar_delay: float = parameter(0.0, "seconds by which a beam is later than its stamp", unit="s", low=-5.0, high=5.0)
-    sonar_delay_deviation: float = parameter(
-        1.0, "its standard deviation: clocks set by hand, stamps taken on arrival", unit="s", low=0.0, high=5.0
-    )
-
-
-@dataclass(frozen=True)
-class SurfaceMatching(ParameterSet):
-    """How points of one scan are compared with the surfaces that other scans heard."""
-
-    range_deviation: float = parameter(
-        0.5,
-        "standard deviation of a point square-on to its surface: half an echo's length",
-        unit="m",
-        low=0.01,
-        high=10,
-    )
     beam_half_width: float = parameter(
         0.06, "angle within which a beam may have heard a point: twice the half-power half width of common heads",
         unit="rad", low=0.0, high=0.5,
@@ -59,83 +97,74 @@ class SurfaceMatching(ParameterSet):
     min_cosine: float = parameter(
         0.75, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99
     )
-    normal_deviation: float = parameter(
-        0.0, "standard deviation of surface normals: what a scan may seem to say of the way along a straight wall",
-        unit="rad", low=0.0, high=1.0,
-    )  # fmt: skip
-    lone_quality: float = parameter(
-        0.0, "how certain a strong echo that stands alone is of something small, as a post; 0: none is compared",
-        low=0.0, high=1.0,
-    )  # fmt: skip
-    scan_parts: int = parameter(
-        1, "parts into which each turn of the head is cut, each a scan with its own speed: more where speeds change "
-        "within a turn", low=1, high=12,
-    )  # fmt: skip
-    block_scans: int = parameter(
-        5, "scans that are searched together: about as far as they see the same", low=1, high=600
+    frozen_scans: int = parameter(
+        80, "older scans that a scan is compared with, the nearest: more than see one place in a tour", low=1, high=1000
     )
-
-
-@dataclass(frozen=True)
-class SolverWindow(ParameterSet):
-    """What the live solver keeps free and how far it looks."""
-
-    free_nodes: int = parameter(
-        40, "newest nodes that may still move: about ten minutes, in which most places are seen from all sides",
-        low=2, high=2400,
-    )  # fmt: skip
-    max_frozen_blocks: int = parameter(
-        16,
-        "older blocks that a scan is compared with, the nearest: 80 scans, more than see one place in a tour",
-        low=1,
-        high=500,
-    )
-    lookahead: float = parameter(
-        1.0, "seconds of odometry after a scan that are waited for, as beams may be later than stamped", unit="s",
-        low=0.0, high=5.0,
-    )  # fmt: skip
     live_iterations: int = parameter(3, "Gauss-Newton steps per scan", low=1, high=50)
     batch_iterations: int = parameter(25, "Gauss-Newton steps at most for a whole run", low=1, high=500)
     tolerance: float = parameter(
         0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
-    settled: float = parameter(
-        0.0,
-        "so does one of which each node's share is below so many standard deviations, root mean square: where nothing "
-        "tells a direction, comparisons with nearest neighbours let the path creep along it for ever",
-        low=0.0, high=1.0,
-    )  # fmt: skip
-
-
-class NodeSearch(Protocol):
-    """Finds the newest nodes where only echoes tell the motion within a turn. Each scan makes another one."""
+    odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
+    node_search: Optional[NodeSearch] = None
 
     @property
-    def variance(self) -> float:
-        """How far the places differ that it takes for possible [m^2], in the direction in which they differ most."""
+    def free_nodes(self) -> int:
+        """Newest nodes that may still move."""
+        return self.free_scans * self.parts_per_turn
 
-    def followed(self, log: RunLog, parameters: "MultiViewParameters") -> "NodeSearch":
-        """Return the search after all scans of `log`, the first of which are those followed before."""
+    @property
+    def group_scans(self) -> int:
+        """Scans of the run, whole turns or parts of them, that are searched together."""
+        return self.scans_per_group * self.parts_per_turn
 
-    def placed(self, log: RunLog, nodes: np.ndarray, parameters: "MultiViewParameters", is_told: bool) -> np.ndarray:
-        """Return the newest of `nodes` (n, width) at their likeliest places. is_told: the first one's place was."""
+    @property
+    def frozen_groups(self) -> int:
+        """Older groups of scans that a scan is compared with."""
+        return max(self.frozen_scans // self.scans_per_group, 1)
 
-    def stored(self) -> Dict[str, np.ndarray]:
-        """Return what `resumed` needs besides the log, as arrays by name."""
+    @property
+    def lookahead(self) -> float:
+        """Seconds of odometry after a scan that are waited for, as beams may be later than stamped."""
+        return min(_LATE * self.sonar_delay_deviation, _LONGEST_LOOKAHEAD)
 
-    def resumed(self, log: RunLog, parameters: "MultiViewParameters", stored: Mapping[str, np.ndarray]) -> "NodeSearch":
-        """Return the search after all scans of `log`, which `stored` it then. Raises ValueError, KeyError."""
+    @property
+    def stop_sigma(self) -> float:
+        """Iteration also ends when nodes move by less than this many standard deviations (root mean square).
 
+        Otherwise a path that nothing constrains in one direction creeps for ever.
+        """
+        return 0.0 if self.odometry.distance_deviation < _POOR_DISTANCES else _STOP_SIGMA
 
-@dataclass(frozen=True)
-class MultiViewParameters:
-    """All parameters of a run, in groups. odometry: the model of the vehicle's motion, with its parameters.
+    @property
+    def run_mean(self) -> np.ndarray:
+        """(2,) the run's unknowns, error of the range scale and delay [s], as expected before the run."""
+        return np.array([self.range_scale_error, self.sonar_delay])
 
-    node_search: what finds the nodes of parts of a turn; None where the odometry reports distances.
-    """
+    @property
+    def run_deviations(self) -> np.ndarray:
+        """(2,) their standard deviations.
 
-    odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
-    sonar: SonarCalibration = SonarCalibration()
-    matching: SurfaceMatching = SurfaceMatching()
-    window: SolverWindow = SolverWindow()
-    node_search: Optional[NodeSearch] = None
+        Where the odometry reports no distances, the sonar's ranges are the only measure of lengths, and nothing in the
+        run tells how far they are off: their scale is held, see `world_scale_deviation`.
+        """
+        return np.array([0.0 if self._only_ranges else self.range_scale_deviation, self.sonar_delay_deviation])
+
+    @property
+    def world_scale_deviation(self) -> float:
+        """Standard deviation of a scale of ranges and motions together that nothing in the run can tell.
+
+        It is in the stated covariances only.
+        """
+        return self.range_scale_deviation if self._only_ranges else 0.0
+
+    @property
+    def _only_ranges(self) -> bool:
+        return bool(np.isinf(self.odometry.distance_deviation))
+
+    def variances(self, slant: np.ndarray, other_slant: np.ndarray) -> np.ndarray:
+        """Return the variances (m,) [m^2] of distances of points from surfaces, with slants (m,) [m] of both.
+
+        A beam that meets a surface aslant may have heard it anywhere in its width: such a point is less certain.
+        """
+        return self.echo_deviation**2 + self.beam_half_width**2 * (slant**2 + other_slant**2)

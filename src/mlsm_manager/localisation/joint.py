@@ -5,7 +5,7 @@ from typing import List, Mapping, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
@@ -49,7 +49,7 @@ class Joint(Estimator):
 
     def __init__(
         self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher, sonar_in_base: Sequence[float],
-        parameters: MultiViewParameters,
+        parameters: SolverParameters,
     ) -> None:  # fmt: skip
         """`sonar_in_base`: (2,) m; `mount` changes it from the next run on."""
         self.parameters = parameters
@@ -71,7 +71,7 @@ class Joint(Estimator):
     @property
     def lookahead(self) -> float:
         """Seconds of odometry after a scan's end that it is placed better with, because beams may be late."""
-        return self.parameters.window.lookahead
+        return self.parameters.lookahead
 
     def verdicts(self) -> List[Verdict]:
         """Return whether the newest scans of the run agree with the map, and how uncertain its path has become."""

@@ -81,7 +81,7 @@ def _match(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSes
         status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
         covariance=_fix_covariance(estimate), rate=belief.theta[RATE], motion=belief.theta[MOTION],
         state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
-        iterations=session.solver.parameters.window.live_iterations, seconds=seconds, beam_times=times,
+        iterations=session.solver.parameters.live_iterations, seconds=seconds, beam_times=times,
         beam_poses=session.path(times),
     )  # fmt: skip
 

@@ -4,7 +4,7 @@ from typing import Dict, Mapping, Optional
 
 import numpy as np
 
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.joint_session import JointSession
@@ -51,14 +51,14 @@ class JointMaps:
         ).arrays()  # fmt: skip
 
     def begun(
-        self, parameters: MultiViewParameters, sonar_in_base: np.ndarray, T_map_odom: np.ndarray,
+        self, parameters: SolverParameters, sonar_in_base: np.ndarray, T_map_odom: np.ndarray,
         start: Optional[np.ndarray],
     ) -> JointSession:  # fmt: skip
         """Return a new run among the surfaces of the matched map; see JointSession.begun."""
         known = self.matched.map.blocks.mean[:, :2]
         return JointSession.begun(parameters, sonar_in_base, T_map_odom, start, known)
 
-    def resumed(self, run: StoredRun, parameters: MultiViewParameters) -> JointSession:
+    def resumed(self, run: StoredRun, parameters: SolverParameters) -> JointSession:
         """Return a stored run that goes on, and draw it in these maps, which were stored with it.
 
         Raises ValueError, with some of it drawn already, for a run whose parts do not belong together.

@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
@@ -78,7 +78,7 @@ class JointSession:
     @classmethod
     def resumed(
         cls,
-        parameters: MultiViewParameters,
+        parameters: SolverParameters,
         sonar_in_base: np.ndarray,
         T_map_odom: np.ndarray,
         scans: Sequence[Scan],
@@ -91,7 +91,7 @@ class JointSession:
     @classmethod
     def begun(
         cls,
-        parameters: MultiViewParameters,
+        parameters: SolverParameters,
         sonar_in_base: np.ndarray,
         T_map_odom: np.ndarray,
         start: Optional[np.ndarray],
@@ -103,7 +103,7 @@ class JointSession:
 
     def verdicts(self) -> List[Verdict]:
         """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
-        parts = self.solver.parameters.matching.scan_parts
+        parts = self.solver.parameters.parts_per_turn
         newest = slice(-_CHECKED_SCANS * parts, None)
         estimates, apart = self.solver.estimates, self.solver.islands.apart
         turns = Turns.of(estimates[newest], apart[newest], parts)
@@ -123,13 +123,13 @@ class JointSession:
 
         Of each it is found once: the solver may move a turn later, but hardly against those just before it.
         """
-        solver, matching = self.solver, self.solver.parameters.matching
+        solver, parameters = self.solver, self.solver.parameters
         if not np.isinf(solver.odometry.distance_deviation):
             return ()
-        count = solver.log.scan_count // matching.scan_parts
+        count = solver.log.scan_count // parameters.parts_per_turn
         newest = range(count - len(times), count)
         first = max(newest.start, max(self._shares, default=-1) + 1)
-        found = shares_heard_before(solver.log, solver.odometry, solver.state, matching, first)
+        found = shares_heard_before(solver.log, solver.odometry, solver.state, parameters, first)
         known = {**self._shares, **dict(zip(range(first, count), found))}
         self._shares = {turn: known[turn] for turn in newest}
         return (scans_go_on(times, np.array([self._shares[turn] for turn in newest])),)
@@ -181,7 +181,7 @@ class JointSession:
         """Time [s] of the oldest node that may still move: scans that lie apart move when their place is found."""
         times = self.solver.log.node_times
         newest = len(times) - 1
-        still = times[max(0, newest - self.solver.parameters.window.free_nodes)]
+        still = times[max(0, newest - self.solver.parameters.free_nodes)]
         return float(min(still, max(self.apart_from, times[max(0, newest - _MOST_APART)])))
 
     @property
@@ -193,7 +193,7 @@ class JointSession:
     @property
     def turns_apart(self) -> int:
         """Number of turns of the head that nobody knows the place of in the map."""
-        return int(self.solver.islands.apart.sum()) // self.solver.parameters.matching.scan_parts
+        return int(self.solver.islands.apart.sum()) // self.solver.parameters.parts_per_turn
 
 
 def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:

@@ -96,9 +96,9 @@ class OdometryChoice(ParameterSet):
         """Return the model of the motion."""
         return _MODELS[self.odometry](self, errors)
 
-    def node_search(self, scan_parts: int) -> Optional[NodeSearch]:
+    def node_search(self, parts_per_turn: int) -> Optional[NodeSearch]:
         """Return what finds the nodes of parts of a turn, of which echoes alone tell; None where it is not needed."""
-        if scan_parts == 1 or self.odometry not in _COMPASS_ONLY:
+        if parts_per_turn == 1 or self.odometry not in _COMPASS_ONLY:
             return None
         # Loaded only for vehicles that need it, because of its compiled loops.
         from mlsm_manager.hovering.particle_filter import ParticleFilter
@@ -182,9 +182,9 @@ _COMPASS = (
     Setting("turn_rate_deviation", 7e-5, "the drift of its gyro between two fixes of the compass is far below that"),
 )
 _JOINT = Setting("estimator", "JOINT", "the newest scans find their poses together")
-_NEIGHBOURS = Setting("block_scans", 1, "where little is known of the motion, the scan before is what tells most")
+_NEIGHBOURS = Setting("scans_per_group", 1, "where little is known of the motion, the scan before is what tells most")
 _NORMALS = Setting("normal_deviation", 0.2, "rad: of a straight wall's normals, as a beam of 2.5 degrees hears it")
-_POSTS = Setting("lone_quality", 1.0, "posts and buoys tell the way where walls do not")
+_POSTS = Setting("post_confidence", 1.0, "posts and buoys tell the way where walls do not")
 _NOT_REPORTED = (
     Setting("scale_deviation", 0.0, "no distances are reported"),
     Setting("direction_deviation", 0.0, "no directions of motion are reported"),
@@ -238,7 +238,9 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         *_TRAVEL,
         Setting("slip_deviation", 0.5, "m/s: it strafes as fast as it goes ahead"),
         Setting("slip_time", 10.0, "s: as long as it keeps a speed"),
-        Setting("scan_parts", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"),
+        Setting(
+            "parts_per_turn", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"
+        ),
         _NEIGHBOURS,
         Setting("normal_deviation", 0.1, "rad: half of heading's, so that the little that parts of a turn hear counts"),
         _POSTS,

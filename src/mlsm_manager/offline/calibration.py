@@ -7,7 +7,6 @@ import numpy as np
 
 from mlsm_manager.joint_solver.motion.odometry_model import HELD_DEVIATION
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
-from mlsm_manager.joint_solver.priors import run_deviations, run_mean
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, PartResult
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, RUN_COLUMNS
@@ -33,10 +32,10 @@ class Calibration:
     @classmethod
     def expected(cls, solver: LiveSolver) -> "Calibration":
         """Return what was known before the run."""
-        columns, sonar = solver.odometry.calibrated, solver.parameters.sonar
+        columns, parameters = solver.odometry.calibrated, solver.parameters
         of_node = list(columns.values())
-        values = np.append(run_mean(sonar), solver.odometry.first_node()[of_node])
-        deviations = np.append(run_deviations(sonar), solver.odometry.first_deviations()[of_node])
+        values = np.append(parameters.run_mean, solver.odometry.first_node()[of_node])
+        deviations = np.append(parameters.run_deviations, solver.odometry.first_deviations()[of_node])
         deviations = np.maximum(deviations, HELD_DEVIATION)
         return cls((*_OF_RUN, *columns), values, deviations)
 
@@ -96,7 +95,7 @@ class Calibration:
 def _of_run(deviations: np.ndarray, solver: LiveSolver) -> np.ndarray:
     """Return deviations (2,) as _OF_RUN; a range scale that the run could not tell is as uncertain as before."""
     result = deviations[list(_OF_RUN.values())].copy()
-    result[0] = np.hypot(result[0], solver.parameters.sonar.world_scale_deviation)
+    result[0] = np.hypot(result[0], solver.parameters.world_scale_deviation)
     return result
 
 

@@ -5,7 +5,7 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import POSE, State
@@ -15,13 +15,14 @@ from mlsm_manager.self_check.verdict import Verdict
 _NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5
 """Factors of settings that nobody knows better than that."""
 _MORE_SCANS = 2
+_MANY_SCANS = 40  # in a group, from which on it is made smaller
 _TURNS = 1.0  # of the direction in which the second start lies beside the path, along the whole run
 
 
 def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
     """Return what further fits of the run that `solver` followed say of `batch`, its fit with its own settings."""
     deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
-    start = displaced(batch.state, deviations, solver.parameters.matching.cut)
+    start = displaced(batch.state, deviations, solver.parameters.cut)
     others = [solved(solver, parameters, batch.state) for parameters in other_settings(solver.parameters)]
     second = solved(solver, start=start)
     told = _path(solver, batch.state)
@@ -30,16 +31,16 @@ def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
     return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
 
 
-def other_settings(parameters: MultiViewParameters) -> List[MultiViewParameters]:
+def other_settings(parameters: SolverParameters) -> List[SolverParameters]:
     """Return a handful of parameters, each of which differs from `parameters` in one setting of the comparisons."""
-    own = parameters.matching
+    more = _MORE_SCANS if parameters.scans_per_group < _MANY_SCANS else -_MORE_SCANS
     changes = (
-        {"cut": _NARROWER * own.cut},
-        {"range_deviation": _WIDER * own.range_deviation},
-        {"weight": _HALF * own.weight},
-        {"block_scans": own.block_scans + _MORE_SCANS * own.scan_parts},
+        {"cut": _NARROWER * parameters.cut},
+        {"echo_deviation": _WIDER * parameters.echo_deviation},
+        {"weight": _HALF * parameters.weight},
+        {"scans_per_group": parameters.scans_per_group + more},
     )
-    return [replace(parameters, matching=replace(own, **change)) for change in changes]
+    return [replace(parameters, **change) for change in changes]
 
 
 def displaced(state: State, deviations: np.ndarray, most: float) -> State:

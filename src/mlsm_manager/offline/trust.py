@@ -82,7 +82,7 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
     further: what other checks say.
     """
     solver = replayed.solver
-    parts, apart = solver.parameters.matching.scan_parts, solver.islands.apart
+    parts, apart = solver.parameters.parts_per_turn, solver.islands.apart
     turns = Turns.of(solver.estimates, apart, parts)
     heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
     path = replayed.corrected if refined is None else refined.poses
@@ -122,7 +122,7 @@ def _going_on(solver: LiveSolver, state: State, ends: np.ndarray) -> Tuple[Verdi
     """Ask whether scans lie on those before them, where the motion between them is unknown."""
     if not np.isinf(solver.odometry.distance_deviation):
         return ()
-    shares = shares_heard_before(solver.log, solver.odometry, state, solver.parameters.matching, 0)
+    shares = shares_heard_before(solver.log, solver.odometry, state, solver.parameters, 0)
     return (scans_go_on(ends, shares),)
 
 
@@ -140,7 +140,7 @@ def _halves(solver: LiveSolver) -> Optional[Verdict]:
 
     What was known after the first half came from that half alone; the second is fitted anew.
     """
-    parts = solver.parameters.matching.scan_parts
+    parts = solver.parameters.parts_per_turn
     middle = solver.log.scan_count // parts // 2
     if middle < _FEWEST_SCANS:
         return None

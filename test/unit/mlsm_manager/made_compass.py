@@ -2,13 +2,15 @@
 
 from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 
-PARAMETERS = MultiViewParameters(
+PARAMETERS = SolverParameters(
     odometry=HeadingFactors(HeadingOdometry()),
-    matching=SurfaceMatching(block_scans=1, normal_deviation=0.2),
-    window=SolverWindow(free_nodes=12),
+    sonar_delay_deviation=1.0,
+    scans_per_group=1,
+    normal_deviation=0.2,
+    free_scans=12,
 )
 
 

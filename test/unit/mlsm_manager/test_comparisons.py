@@ -25,7 +25,7 @@ from mlsm_manager.joint_solver.motion.odometry_parameters import (
 )
 from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
 from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.joint_solver.parameters import MultiViewParameters, SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import RANGE_SCALE, State
@@ -75,23 +75,23 @@ def by_pose(arms, normals):
     return np.column_stack([normals, arms[:, 0] * normals[:, 1] - arms[:, 1] * normals[:, 0]])
 
 
-def weights(residual, pairs, sources, targets, matching, cut):
+def weights(residual, pairs, sources, targets, parameters, cut):
     slants = sources.slants[pairs.rows] ** 2 + targets.slants[pairs.neighbours] ** 2
-    variance = matching.range_deviation**2 + matching.beam_half_width**2 * slants
-    widening = max(1.0, cut / matching.cut)
-    return matching.weight / variance / (1.0 + residual**2 / variance / widening**2) ** 2 * pairs.importance
+    variance = parameters.echo_deviation**2 + parameters.beam_half_width**2 * slants
+    widening = max(1.0, cut / parameters.cut)
+    return parameters.weight / variance / (1.0 + residual**2 / variance / widening**2) ** 2 * pairs.importance
 
 
 @given(st.integers(0, 10**6), st.integers(1, 200), st.sampled_from([[-2], [0], [3, 4, 9], list(range(40))]))
 @settings(max_examples=50)
 def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
-    rng, matching = np.random.RandomState(seed), SurfaceMatching()
+    rng, parameters = np.random.RandomState(seed), SolverParameters()
     sources, targets = some_points(rng, 30, list(range(50, 60))), some_points(rng, 40, scans)
     pairs = Pairs(np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count), rng.uniform(0.1, 1.0, count))
     residual, jacobian = linearised(pairs, sources, targets)
-    for cut in (matching.cut, matching.wide_cut):
-        weight = weights(residual, pairs, sources, targets, matching, cut)
-        found = list(zip(*summed(pairs, sources, targets, matching, cut)))
+    for cut in (parameters.cut, parameters.wide_cut):
+        weight = weights(residual, pairs, sources, targets, parameters, cut)
+        found = list(zip(*summed(pairs, sources, targets, parameters, cut)))
         for scan, other, information, gradient in found:
             own = (sources.scans[pairs.rows] == scan) & (targets.scans[pairs.neighbours] == other)
             weighted = jacobian[own] * weight[own, np.newaxis]
@@ -154,7 +154,9 @@ def test_no_points_lie_nowhere(log):
 def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
     T_base_sonar = np.eye(4)
     T_base_sonar[:2, 3] = SONAR_IN_BASE
-    solvers = [LiveSolver(MultiViewParameters(), some) for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])]
+    solvers = [
+        LiveSolver(SolverParameters(sonar_delay_deviation=1.0), some) for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])
+    ]
     for scan in tour(2).scans:
         expected, found = (solver.add(scan) for solver in solvers)
     np.testing.assert_array_equal(found.node, expected.node)
@@ -163,12 +165,12 @@ def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
 @given(st.integers(0, 10**6), st.integers(0, 100))
 @settings(max_examples=30)
 def test_comparisons_fade_out_with_distance_and_angle(seed, count):
-    rng, matching = np.random.RandomState(seed), SurfaceMatching()
+    rng, parameters = np.random.RandomState(seed), SolverParameters()
     sources, targets = some_points(rng, 30, [5, 6]), some_points(rng, 40, [0, 1, 2])
     rows, neighbours = np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count)
     distance, shares = rng.uniform(0.0, 3.0, count), rng.uniform(0.1, 1.0, count)
     cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals[neighbours])
-    limits = (matching.cut, FADING * matching.cut, matching.min_cosine, matching.min_cosine + COSINE_FADING)
+    limits = (parameters.cut, FADING * parameters.cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
     expected = shares * ramp(distance, *limits[:2]) * ramp(cosine, *limits[2:])
     expected = expected * sources.qualities[rows] * targets.qualities[neighbours]
     found = weighed_pairs(

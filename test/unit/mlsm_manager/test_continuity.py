@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.self_check.continuity import scans_go_on
 
@@ -36,7 +36,7 @@ def shares_at(log, aside):
     nodes = np.zeros((log.scan_count + 1, odometry.width))
     nodes[:, :2] = true_path(log.node_times)
     nodes[:, 1] = aside * np.arange(len(nodes))
-    return shares_heard_before(log, odometry, State(nodes, np.zeros(2)), SurfaceMatching(), 0)
+    return shares_heard_before(log, odometry, State(nodes, np.zeros(2)), SolverParameters(), 0)
 
 
 def test_scans_at_their_places_lie_on_what_was_heard_before(log):

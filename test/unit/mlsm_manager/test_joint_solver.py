@@ -8,7 +8,7 @@ from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.joint_solver.motion.dvl_factors import DIRECTION, DvlFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.path import solved_path
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
@@ -18,8 +18,8 @@ from node_support.errors import RefusedInput
 from node_support.geometry import composed
 
 DIRECTION_ERROR, LATE = 0.12, 0.6
-DEFAULTS = MultiViewParameters()
-SHORT_WINDOW = MultiViewParameters(window=SolverWindow(free_nodes=6))
+DEFAULTS = SolverParameters(sonar_delay_deviation=1.0)
+SHORT_WINDOW = replace(DEFAULTS, free_scans=6)
 
 
 def followed(scans, parameters=DEFAULTS):
@@ -91,8 +91,8 @@ def test_the_frozen_map_s_own_error_counts_in_the_calibration_too(made):
 
 
 def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(made):
-    wrong = SonarCalibration(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1)
-    solver = followed(made.scans, MultiViewParameters(sonar=wrong, window=SolverWindow(free_nodes=4)))
+    wrong = SolverParameters(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1, free_scans=4)
+    solver = followed(made.scans, wrong)
     assert solver.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.3)
 
 
@@ -159,7 +159,7 @@ def test_scans_without_echoes_are_bridged_by_the_odometry(made):
 
 
 def test_a_run_that_begins_deaf_starts_at_the_odometry(made):
-    solver = LiveSolver(MultiViewParameters(), SONAR_IN_BASE)
+    solver = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
     estimate = solver.add(without_points(made.scans[0]))
     np.testing.assert_allclose(estimate.T_map_base, estimate.T_odom_base, atol=1e-9)
     assert estimate.comparisons == 0

@@ -16,7 +16,7 @@ from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints, poi
 from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
 from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import place
 from mlsm_manager.joint_solver.solve.frozen_map import fading, joint_covariance, nearest_blocks
 from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations, SparseSolution
@@ -42,7 +42,7 @@ def some_state(log):
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
     placed = place(log, DVL, some_state(log), log.rows(0, 3))
-    pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, SurfaceMatching())
+    pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, SolverParameters())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
 
@@ -96,9 +96,7 @@ def test_at_most_so_many_blocks_count(distances, most):
 
 
 def test_a_scan_is_compared_with_the_nearest_blocks_only(log):
-    few = replace(
-        MultiViewParameters(), matching=SurfaceMatching(block_scans=1), window=SolverWindow(max_frozen_blocks=2)
-    )
+    few = replace(SolverParameters(), scans_per_group=1, frozen_scans=2)
     near = nearest_blocks(log, DVL, some_state(log), 3, np.array([12.0, 0.0]), few)
     assert 1 <= len(near.numbers) <= 2
     assert set(near.points.scans) == set(near.numbers)

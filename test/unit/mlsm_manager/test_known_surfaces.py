@@ -8,13 +8,13 @@ from made_harbour import tour
 
 from mlsm_manager.joint_solver.compare.association import Pairs
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.parameters import MultiViewParameters, SolverWindow, SonarCalibration, SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import place
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from node_support.geometry import transformed
 
 HARBOUR = tour(4)
-PARAMETERS = MultiViewParameters(sonar=SonarCalibration(sonar_delay_deviation=0.01))
+PARAMETERS = SolverParameters(sonar_delay_deviation=0.01)
 SONAR = np.array([0.3, 0.0])
 
 
@@ -26,7 +26,7 @@ def pairs_with(known):
     solver = LiveSolver(PARAMETERS, SONAR)
     solver.add(HARBOUR.scans[0])
     sources = place(solver.log, solver.odometry, solver.state, solver.log.rows(0, 1))
-    return known.compared(sources, 2.2, SurfaceMatching()), sources
+    return known.compared(sources, 2.2, SolverParameters()), sources
 
 
 @pytest.mark.parametrize("places", [np.empty((0, 2)), np.array([[1.0, 2.0]])])
@@ -52,7 +52,7 @@ def test_a_run_that_starts_beside_its_map_is_drawn_onto_it():
 
 
 def test_a_run_in_a_known_map_goes_on_when_its_first_scans_are_frozen():
-    parameters = replace(PARAMETERS, window=SolverWindow(free_nodes=2))
+    parameters = replace(PARAMETERS, free_scans=2)
     solver = LiveSolver(parameters, SONAR, start=np.array([1.0, 1.0, 0.05]), known=KnownSurfaces(known_places()))
     estimates = [solver.add(scan) for scan in HARBOUR.scans]
     np.testing.assert_allclose(estimates[-1].T_map_base, estimates[-1].T_odom_base, atol=0.2)
@@ -71,9 +71,9 @@ def test_a_vehicle_that_goes_far_meets_what_is_there():
     known = KnownSurfaces(np.concatenate([known_places(), known_places() + np.array([400.0, -900.0])]))
     _, sources = pairs_with(known)
     there = replace(sources, places=sources.places + np.array([400.0, -900.0]))
-    pairs, _ = known.compared(there, 2.2, SurfaceMatching())
+    pairs, _ = known.compared(there, 2.2, SolverParameters())
     assert len(pairs.rows) > 40
-    again, _ = known.compared(sources, 2.2, SurfaceMatching())
+    again, _ = known.compared(sources, 2.2, SolverParameters())
     np.testing.assert_array_equal(pairs.rows, again.rows)
 
 
@@ -84,7 +84,7 @@ def drawn_to(x):
     """Return the place (2,) that a point at (x, 5.1) is drawn to, beside a wall with a block every half metre."""
     _, sources = pairs_with(KnownSurfaces(known_places()))
     point = replace(sources.selected(np.array([0])), places=np.array([[x, 5.1]]), normals=np.array([[0.0, 1.0]]))
-    pairs, targets = KnownSurfaces(WALL).compared(point, 2.2, SurfaceMatching())
+    pairs, targets = KnownSurfaces(WALL).compared(point, 2.2, SolverParameters())
     return (pairs.importance[:, np.newaxis] * targets.places[pairs.neighbours]).sum(axis=0) / pairs.importance.sum()
 
 

@@ -71,7 +71,7 @@ def values_of(field):
 
 def allowed_together(values):
     """Return values without parts of turns where no heading is known."""
-    return {**values, "scan_parts": 1} if values["odometry"] is OdometryKind.NONE else values
+    return {**values, "parts_per_turn": 1} if values["odometry"] is OdometryKind.NONE else values
 
 
 ANY_PARAMETERS = st.fixed_dictionaries(

@@ -8,7 +8,7 @@ from mlsm_manager.joint_solver.measured.lone_points import crowds, lone_points
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
 from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.joint_solver.parameters import MultiViewParameters, SonarCalibration, SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -88,11 +88,13 @@ def scans():
     return heard(TURNS)
 
 
-def solver_of(scans, lone_quality):
+def solver_of(scans, post_confidence):
     odometry = HeadingFactors(HeadingOdometry())
-    matching = SurfaceMatching(normal_deviation=0.2, block_scans=1, range_deviation=0.2, lone_quality=lone_quality)
-    sonar = SonarCalibration(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
-    solver = LiveSolver(MultiViewParameters(odometry, sonar, matching), AT_BASE)
+    parameters = SolverParameters(
+        odometry=odometry, range_scale_deviation=0.0, normal_deviation=0.2, scans_per_group=1, echo_deviation=0.2,
+        post_confidence=post_confidence,
+    )  # fmt: skip
+    solver = LiveSolver(parameters, AT_BASE)
     for scan in scans:
         solver.add(scan)
     return solver
@@ -105,7 +107,7 @@ def gone(solver, nodes):
 
 
 def test_posts_tell_the_way_along_a_canal(scans):
-    solver = solver_of(scans, lone_quality=1.0)
+    solver = solver_of(scans, post_confidence=1.0)
     for nodes in (solver.state.nodes, solved(solver).state.nodes):
         found, true = gone(solver, nodes)
         assert found == pytest.approx(true, abs=1.5)
@@ -117,15 +119,15 @@ def test_the_told_deviation_is_smaller_where_posts_tell_the_way(scans):
 
 
 def test_speed_is_found_from_posts(scans):
-    assert solver_of(scans, lone_quality=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
+    assert solver_of(scans, post_confidence=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
 
 
 @pytest.mark.newest_only("dear; the tests above follow the same canal")
-@pytest.mark.parametrize("lone_quality", [0.0, 1.0])
-def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(lone_quality):
+@pytest.mark.parametrize("post_confidence", [0.0, 1.0])
+def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(post_confidence):
     """Nothing tells the way along it, so the deviation is that of a speed which nobody knows."""
     bare = heard(TURNS, posts=np.array([[-500.0, 0.0]]))
-    clear, disturbed = (solver_of(scans, lone_quality) for scans in (bare, cluttered(bare)))
+    clear, disturbed = (solver_of(scans, post_confidence) for scans in (bare, cluttered(bare)))
     told = np.sqrt(disturbed.estimates[-1].pose_covariance[0, 0])
     found, true = gone(disturbed, disturbed.state.nodes)
     assert abs(found - true) < 3.0 * told

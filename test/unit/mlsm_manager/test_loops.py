@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
@@ -35,7 +35,7 @@ def _heard_by(scan, number, track):
 
 
 def followed(scans):
-    solver = LiveSolver(MultiViewParameters(), SONAR_IN_BASE)
+    solver = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
     for scan in scans:
         solver.add(scan)
     return solver

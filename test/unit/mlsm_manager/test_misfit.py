@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
 from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry, HeadingOdometry
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import State
 
 TURNS = 4
@@ -29,7 +29,7 @@ def variances_at(log, aside, odometry=None):
     nodes = np.zeros((log.scan_count + 1, odometry.width))
     nodes[:, :2] = true_path(log.node_times)
     nodes[-1, 1] = aside
-    return misfit_variances(log, odometry, State(nodes, np.zeros(2)), SurfaceMatching(), 0)
+    return misfit_variances(log, odometry, State(nodes, np.zeros(2)), SolverParameters(), 0)
 
 
 def test_scans_at_their_places_leave_the_path_as_certain_as_it_is(log):

@@ -25,5 +25,5 @@ def test_map_and_odom_must_be_two_frames():
 
 
 def test_parts_of_turns_without_any_heading_are_refused():
-    with pytest.raises(ParameterError, match=r"scan_parts = 3: must be 1 with odometry = NONE"):
-        MlsmCoreParameters(odometry="NONE", scan_parts=3)
+    with pytest.raises(ParameterError, match=r"parts_per_turn = 3: must be 1 with odometry = NONE"):
+        MlsmCoreParameters(odometry="NONE", parts_per_turn=3)

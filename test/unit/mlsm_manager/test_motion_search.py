@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry, HeadingOdometry, UnaidedOdometry
 from mlsm_manager.joint_solver.motion.transition import Transition
 from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.search.motion_search import searched_node
 from mlsm_manager.joint_solver.unknowns.state import YAW, State
@@ -32,14 +32,14 @@ def state_with(log, model, shift):
 
 def test_a_scan_is_found_metres_from_where_it_was_expected(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
-    found = searched_node(log, HEADING, state_with(log, HEADING, FAR), covariance, SurfaceMatching())
+    found = searched_node(log, HEADING, state_with(log, HEADING, FAR), covariance, SolverParameters())
     assert np.hypot(*found[:2]) < 1.5
     assert np.hypot(*found[3:5]) > 0.05  # a node that is moved has another velocity
 
 
 def test_a_scan_that_is_where_it_was_expected_stays(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
-    found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, SurfaceMatching())
+    found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, SolverParameters())
     assert np.hypot(*found[:2]) < 1.5
 
 
@@ -50,7 +50,7 @@ def test_a_turn_that_nobody_measured_is_found(log, turn):
     state = state_with(log, unaided, np.array([1.0, 1.0]))
     state.nodes[-1, YAW] = turn
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3, 0.05]) ** 2
-    found = searched_node(log, unaided, state, covariance, SurfaceMatching())
+    found = searched_node(log, unaided, state, covariance, SolverParameters())
     assert abs(found[YAW]) < 0.1
     assert np.hypot(*found[:2]) < 1.5
 
@@ -59,8 +59,8 @@ def test_a_motion_that_is_known_is_not_searched(log):
     dvl = DvlFactors(DvlOdometry())
     state = state_with(log, dvl, FAR)
     covariance = np.diag([0.01, 0.01, 0.01, 0.01, 0.01]) ** 2
-    assert searched_node(log, dvl, state, covariance, SurfaceMatching()) is not None
-    np.testing.assert_array_equal(searched_node(log, dvl, state, covariance, SurfaceMatching())[:2], FAR)
+    assert searched_node(log, dvl, state, covariance, SolverParameters()) is not None
+    np.testing.assert_array_equal(searched_node(log, dvl, state, covariance, SolverParameters())[:2], FAR)
 
 
 def test_a_speed_that_is_unknown_makes_a_step_unknown(log):

@@ -14,7 +14,7 @@ from node_support.errors import RefusedInput
 
 pytestmark = pytest.mark.long
 
-PARTS = profile_values(OdometryKind.HOVERING)["scan_parts"]
+PARTS = profile_values(OdometryKind.HOVERING)["parts_per_turn"]
 STOPS = np.array([[0.0, 0.0], [6.0, 7.0], [-8.0, 6.0], [-12.0, -6.0], [2.0, -8.0]])
 GOING, RESTING = 28.0, 10.0  # s
 

@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.compiled.compiled_weights import weighed_pairs
 from mlsm_manager.joint_solver.measured.surface_points import ramp
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
 
 FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
@@ -31,7 +31,7 @@ class Pairs:
 
 
 def pairs_of(
-    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, matching: SurfaceMatching
+    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, parameters: SolverParameters
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets` that count.
 
@@ -42,11 +42,13 @@ def pairs_of(
     return Pairs(
         *weighed_pairs(
             *lists.within(sources, targets, cut), normals, sources.qualities, other_normals, targets.qualities,
-            cut, FADING * cut, matching.min_cosine, matching.min_cosine + COSINE_FADING,
+            cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING,
         )
     )  # fmt: skip
 
 
-def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, matching: SurfaceMatching) -> np.ndarray:
+def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, parameters: SolverParameters) -> np.ndarray:
     """Return factors (m,) of pairs at `distance` (m,) [m] with `cosine` (m,) between normals: 0 where they drop out."""
-    return ramp(distance, cut, FADING * cut) * ramp(cosine, matching.min_cosine, matching.min_cosine + COSINE_FADING)
+    return ramp(distance, cut, FADING * cut) * ramp(
+        cosine, parameters.min_cosine, parameters.min_cosine + COSINE_FADING
+    )

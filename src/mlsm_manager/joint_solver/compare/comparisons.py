@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.joint_solver.compare.association import Pairs
 from mlsm_manager.joint_solver.compare.normal_errors import discounted
 from mlsm_manager.joint_solver.compiled.compiled_sums import POINT_COLUMNS, summed_comparisons
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS, Layout
@@ -21,23 +21,23 @@ def add_comparisons(
     pairs: Pairs,
     sources: PlacedPoints,
     targets: PlacedPoints,
-    matching: SurfaceMatching,
+    parameters: SolverParameters,
     cut: float,
 ) -> int:
     """Add the distances of `sources` from their neighbours' surfaces; return how many there are."""
     if not len(pairs.rows):
         return 0
-    scans, other_scans, information, gradient = summed(pairs, sources, targets, matching, cut)
-    if matching.normal_deviation > 0.0:
+    scans, other_scans, information, gradient = summed(pairs, sources, targets, parameters, cut)
+    if parameters.normal_deviation > 0.0:
         # The parts of a turn together hear walls on all sides, each part alone perhaps one.
-        turns = scans // matching.scan_parts
-        information, gradient = discounted(information, gradient, turns, _PLACES, matching.normal_deviation)
+        turns = scans // parameters.parts_per_turn
+        information, gradient = discounted(information, gradient, turns, _PLACES, parameters.normal_deviation)
     equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
     return len(pairs.rows)
 
 
 def summed(
-    pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, matching: SurfaceMatching, cut: float
+    pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters, cut: float
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return what the comparisons of each of g pairs of scans say, up to `cut` [m].
 
@@ -54,7 +54,7 @@ def summed(
     return summed_comparisons(
         pairs.rows, pairs.neighbours, pairs.importance,
         packed, sources.scans, packed if targets is sources else _packed(targets), targets.scans,
-        matching.range_deviation**2, matching.beam_half_width**2, matching.weight, max(1.0, cut / matching.cut),
+        parameters.echo_deviation**2, parameters.beam_half_width**2, parameters.weight, max(1.0, cut / parameters.cut),
     )  # fmt: skip
 
 
@@ -66,17 +66,12 @@ def _packed(points: PlacedPoints) -> np.ndarray:
     return rows
 
 
-def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, matching: SurfaceMatching) -> float:
+def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters) -> float:
     """Return how much [nats] comparisons speak for the places of points: what the kernel leaves of each at most."""
     i, j = pairs.rows, pairs.neighbours
     residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
-    ratio = residual**2 / variances(sources.slants[i], targets.slants[j], matching)
-    return float(0.5 * matching.weight * (pairs.importance / (1.0 + ratio)).sum())
-
-
-def variances(slant: np.ndarray, other_slant: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
-    """Return the variances (m,) [m^2] of residuals whose points have slants (m,) [m]."""
-    return matching.range_deviation**2 + matching.beam_half_width**2 * (slant**2 + other_slant**2)
+    ratio = residual**2 / parameters.variances(sources.slants[i], targets.slants[j])
+    return float(0.5 * parameters.weight * (pairs.importance / (1.0 + ratio)).sum())
 
 
 def _columns(scans: np.ndarray, other_scans: np.ndarray, layout: Layout) -> np.ndarray:

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from mlsm_manager.joint_solver.compare.association import Pairs, faded
 from mlsm_manager.joint_solver.compare.neighbours import shares_of
 from mlsm_manager.joint_solver.measured.surface_points import LEAST_REACH, surface_normals
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
 from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN
 from mlsm_manager.surface_map.blocks import cells_of
@@ -64,7 +64,7 @@ class KnownSurfaces:
         points = self._points
         return points.selected(((points.places >= low) & (points.places <= high)).all(axis=1))
 
-    def compared(self, sources: PlacedPoints, cut: float, matching: SurfaceMatching) -> tuple:
+    def compared(self, sources: PlacedPoints, cut: float, parameters: SolverParameters) -> tuple:
         """Return m Pairs of `sources` with their nearest blocks within `cut` [m], and these as m PlacedPoints.
 
         Blocks that are as near share the comparison. The blocks' normals point as those of the sources do.
@@ -82,7 +82,7 @@ class KnownSurfaces:
         targets = self._points.selected(index[rows, rank])
         cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals)
         targets = replace(targets, normals=targets.normals * np.where(cosine < 0.0, -1.0, 1.0)[:, np.newaxis])
-        importance = share * faded(distance, np.abs(cosine), cut, matching)
+        importance = share * faded(distance, np.abs(cosine), cut, parameters)
         importance = importance * sources.qualities[rows] * targets.qualities
         kept = importance > 0.0
         return Pairs(rows[kept], np.arange(int(kept.sum())), importance[kept]), targets.selected(kept)

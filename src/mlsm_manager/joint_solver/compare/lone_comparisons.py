@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.surface_points import ramp
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place_lone
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import Layout, State
@@ -25,14 +25,19 @@ class LoneComparisons:
     """Comparisons of lone points of free scans with those of all others in view."""
 
     def __init__(
-        self, log: RunLog, odometry: OdometryModel, matching: SurfaceMatching, scans: np.ndarray, importance: np.ndarray
+        self,
+        log: RunLog,
+        odometry: OdometryModel,
+        parameters: SolverParameters,
+        scans: np.ndarray,
+        importance: np.ndarray,
     ) -> None:
         """scans: (s,) those in view, ascending. importance: (s,) factors of what is compared with them."""
         self._log, self._odometry = log, odometry
         rows = [log.lone.rows(scan, scan + 1) for scan in scans]
         self._rows = np.concatenate([np.empty(0, dtype=np.int64), *rows])
-        self._importance = matching.lone_quality * np.repeat(importance, [len(own) for own in rows])
-        self._matching = replace(matching, normal_deviation=0.0)
+        self._importance = parameters.post_confidence * np.repeat(importance, [len(own) for own in rows])
+        self._parameters = replace(parameters, normal_deviation=0.0)
         self._lists: Optional[Neighbours] = None
 
     def add(self, equations: NormalEquations, layout: Layout, state: State, cut: float) -> int:
@@ -42,12 +47,12 @@ class LoneComparisons:
         points = place_lone(self._log, self._odometry, state, self._rows)
         sources = points.selected(points.scans >= layout.first)
         if self._lists is None:
-            self._lists = Neighbours(points, self._matching.block_scans)
-        near = _NEAR_IN_TIME * self._matching.scan_parts
+            self._lists = Neighbours(points, self._parameters.group_scans)
+        near = _NEAR_IN_TIME * self._parameters.parts_per_turn
         pairs, count = lone_pairs(self._lists, sources, points, cut, near), 0
         pairs = replace(pairs, importance=pairs.importance * self._importance[pairs.neighbours])
         for each, heard, met in along_and_across(pairs, sources, points):
-            count += add_comparisons(equations, layout, each, heard, met, self._matching, cut)
+            count += add_comparisons(equations, layout, each, heard, met, self._parameters, cut)
         return count
 
 

@@ -16,9 +16,9 @@ be decided by the last bit where two are equally near. More would compare each p
 class Neighbours:
     """Finds for each point and each block of scans the nearest points of other scans."""
 
-    def __init__(self, targets: PlacedPoints, block_scans: int) -> None:
-        """targets: ascending by scan; every `block_scans` scans of them are searched together."""
-        _, blocks = np.unique(targets.scans // block_scans, return_inverse=True)
+    def __init__(self, targets: PlacedPoints, group_scans: int) -> None:
+        """targets: ascending by scan; every `group_scans` scans of them are searched together."""
+        _, blocks = np.unique(targets.scans // group_scans, return_inverse=True)
         self._blocks = blocks.astype(np.int64)
         self._count = int(blocks[-1]) + 1 if len(blocks) else 0
 

@@ -10,9 +10,8 @@ from typing import Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compare.comparisons import variances
 from mlsm_manager.joint_solver.measured.surface_points import ramp
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
 from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN
 
@@ -42,18 +41,18 @@ class WeakDirections:
     lost: np.ndarray
 
     @classmethod
-    def of(cls, sets: Sequence[PlacedPoints], matching: SurfaceMatching) -> "WeakDirections":
+    def of(cls, sets: Sequence[PlacedPoints], parameters: SolverParameters) -> "WeakDirections":
         """Return those of scans with points in `sets`; a scan of the run has all of its points in one of them."""
         scans = np.concatenate([points.scans for points in sets])
-        if not len(scans) or matching.normal_deviation == 0.0:
+        if not len(scans) or parameters.normal_deviation == 0.0:
             return cls(0, np.zeros((0, 2)), np.zeros(0))
         first = int(scans.min())
-        told = np.concatenate([_told(points, matching) for points in sets])
-        reach = _SCANS * matching.scan_parts
+        told = np.concatenate([_told(points, parameters) for points in sets])
+        reach = _SCANS * parameters.parts_per_turn
         sums = np.stack([_around(np.bincount(scans - first, part), reach) for part in told.T], axis=1).reshape(-1, 2, 2)
         values, _ = np.linalg.eigh(sums)
         shares = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
-        all_counts, nothing_counts = (factor * matching.normal_deviation**2 for factor in _TOLD)
+        all_counts, nothing_counts = (factor * parameters.normal_deviation**2 for factor in _TOLD)
         lost = ramp(shares, all_counts, nothing_counts)
         directions, heard = np.zeros((len(lost), 2)), np.unique(scans - first)
         directions[heard] = _in_common((sums * lost[:, np.newaxis, np.newaxis])[heard])
@@ -98,9 +97,9 @@ def _weakest(sums: np.ndarray) -> np.ndarray:
     return np.stack([-np.sin(angles), np.cos(angles)], axis=-1)
 
 
-def _told(points: PlacedPoints, matching: SurfaceMatching) -> np.ndarray:
+def _told(points: PlacedPoints, parameters: SolverParameters) -> np.ndarray:
     """Return what each point tells of a translation (n, 4) [1/m^2]: a matrix (2, 2) in one row."""
-    weight = points.qualities / variances(points.slants, points.slants, matching) * (points.scans > BEFORE_THE_RUN)
+    weight = points.qualities / parameters.variances(points.slants, points.slants) * (points.scans > BEFORE_THE_RUN)
     return np.einsum("n,na,nb->nab", weight, points.normals, points.normals).reshape(-1, 4)
 
 

@@ -5,8 +5,7 @@ from typing import Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.compare.association import Pairs
-from mlsm_manager.joint_solver.compare.comparisons import variances
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
 
 _ON_SURFACE = 1.0  # deviations within which a point lies on a surface
@@ -26,7 +25,7 @@ def surfaces_met(met: Met, scan: int) -> np.ndarray:
     return total
 
 
-def agreement(met: Met, scan: int, matching: SurfaceMatching) -> Tuple[float, float]:
+def agreement(met: Met, scan: int, parameters: SolverParameters) -> Tuple[float, float]:
     """Return the share of a scan's comparisons in which its point lies on its neighbour's surface, and the mean
     distance [m] from it; 0 without any.
     """
@@ -35,7 +34,7 @@ def agreement(met: Met, scan: int, matching: SurfaceMatching) -> Tuple[float, fl
         own = sources.scans[pairs.rows] == scan
         i, j = pairs.rows[own], pairs.neighbours[own]
         residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
-        variance = variances(sources.slants[i], targets.slants[j], matching)
+        variance = parameters.variances(sources.slants[i], targets.slants[j])
         distance += float((pairs.importance[own] * np.abs(residual)).sum())
         near += float(pairs.importance[own][residual**2 < _ON_SURFACE**2 * variance].sum())
         weight += float(pairs.importance[own].sum())

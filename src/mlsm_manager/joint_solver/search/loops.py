@@ -11,7 +11,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.search.motion_search import fits
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
@@ -54,12 +54,12 @@ class Loop:
         )
 
 
-def loops_of(log: RunLog, odometry: OdometryModel, state: State, parameters: MultiViewParameters) -> List[Loop]:
+def loops_of(log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters) -> List[Loop]:
     """Return the places visited again that neighbouring scans agree on, in the order of time.
 
     None where turns are cut into parts: a part hears too little to be told from others.
     """
-    if parameters.matching.scan_parts > 1:
+    if parameters.parts_per_turn > 1:
         return []
     points = place(log, odometry, state, log.rows(0, log.scan_count))
     shifts = _shifts()
@@ -100,7 +100,7 @@ def _shifts() -> np.ndarray:
     return np.concatenate([np.zeros((1, 2)), grid[np.hypot(*grid.T) <= _REACH]])
 
 
-def _loop(points: PlacedPoints, scan: int, shifts: np.ndarray, parameters: MultiViewParameters) -> Optional[Loop]:
+def _loop(points: PlacedPoints, scan: int, shifts: np.ndarray, parameters: SolverParameters) -> Optional[Loop]:
     own, older = np.flatnonzero(points.scans == scan), points.scans <= scan - _APART
     if len(own) < _FEWEST_POINTS:
         return None
@@ -110,7 +110,7 @@ def _loop(points: PlacedPoints, scan: int, shifts: np.ndarray, parameters: Multi
     if not len(targets):
         return None
     moved = sources.places + shifts[:, np.newaxis]
-    shares = fits(sources, targets, moved, parameters.matching) / sources.qualities.sum()
+    shares = fits(sources, targets, moved, parameters) / sources.qualities.sum()
     best = int(np.argmax(shares))
     elsewhere = float(shares[np.hypot(*(shifts - shifts[best]).T) > _OTHER].max())
     if shares[best] < max(_FIT, shares[0] + _GAIN, elsewhere + _LEAD):

@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.motion.transition import Transition
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place, place_lone
 from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN, YAW, State
 
@@ -31,7 +31,7 @@ def searched_node(
     odometry: OdometryModel,
     state: State,
     covariance: np.ndarray,
-    matching: SurfaceMatching,
+    parameters: SolverParameters,
     first: int = 0,
 ) -> np.ndarray:
     """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
@@ -42,13 +42,13 @@ def searched_node(
     """
     newest = state.nodes[-1]
     step = step_covariance(log, odometry, state, covariance, 1)
-    if is_known(step, matching):
+    if is_known(step, parameters):
         return newest
     last = log.scan_count
     before, own = log.rows(min(max(first, last - 1 - COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
-    search = _Search(log, odometry, matching, place(log, odometry, state, before), own)
+    search = _Search(log, odometry, parameters, place(log, odometry, state, before), own)
     if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
         state, step = search.turned(state, step)
     return search.beside(state, step, _MOST_POINTS)[1]
@@ -59,7 +59,7 @@ class _Search(NamedTuple):
 
     log: RunLog
     odometry: OdometryModel
-    matching: SurfaceMatching
+    parameters: SolverParameters
     targets: PlacedPoints
     own: np.ndarray
 
@@ -68,12 +68,14 @@ class _Search(NamedTuple):
 
         step: covariance (width, width) of the node. most: points of the scan that are compared.
         """
-        log, odometry, matching = self.log, self.odometry, self.matching
+        log, odometry, parameters = self.log, self.odometry, self.parameters
         sources = place(log, odometry, state, self.own[:: max(1, len(self.own) // most)])
         shifts = cells(step[:2, :2], _MOST_CELLS)
-        found = _NATS * _MOST_POINTS / most * fits(sources, self.targets, _moved(sources, shifts), matching)
-        if matching.lone_quality:
-            found = found + matching.lone_quality * _LONE_NATS * _lone_fits(log, odometry, state, shifts, matching)
+        found = _NATS * _MOST_POINTS / most * fits(sources, self.targets, _moved(sources, shifts), parameters)
+        if parameters.post_confidence:
+            found = found + parameters.post_confidence * _LONE_NATS * _lone_fits(
+                log, odometry, state, shifts, parameters
+            )
         costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
         best = np.argmax(found - costs)
         node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])
@@ -106,9 +108,9 @@ def step_covariance(
     return Transition.of(odometry, state.nodes[ends], log.node_motion(ends)).step_covariance(covariance)
 
 
-def is_known(step: np.ndarray, matching: SurfaceMatching) -> bool:
+def is_known(step: np.ndarray, parameters: SolverParameters) -> bool:
     """Return whether the solver's own steps reach as far as a motion with covariance `step` (width, width) may go."""
-    return _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < matching.cut
+    return _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < parameters.cut
 
 
 def _moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
@@ -117,7 +119,7 @@ def _moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
 
 
 def _lone_fits(
-    log: RunLog, odometry: OdometryModel, state: State, shifts: np.ndarray, matching: SurfaceMatching
+    log: RunLog, odometry: OdometryModel, state: State, shifts: np.ndarray, parameters: SolverParameters
 ) -> np.ndarray:
     """Return how many of the newest scan's lone points (k,) lie on earlier ones at `shifts` (k, 2)."""
     last = log.scan_count
@@ -126,7 +128,7 @@ def _lone_fits(
     if not len(sources) or not len(targets):
         return np.zeros(len(shifts))
     moved = _moved(sources, shifts)
-    distance, _ = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=matching.cut)
+    distance, _ = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=parameters.cut)
     near = np.exp(-0.5 * (distance / _CELL) ** 2).reshape(moved.shape[:2])
     return (near * sources.qualities).sum(axis=1)
 
@@ -144,15 +146,15 @@ def cells(covariance: np.ndarray, most: int) -> np.ndarray:
     return np.concatenate([np.zeros((1, 2)), shifts[distance <= _REACH**2]])
 
 
-def fits(sources: PlacedPoints, targets: PlacedPoints, moved: np.ndarray, matching: SurfaceMatching) -> np.ndarray:
+def fits(sources: PlacedPoints, targets: PlacedPoints, moved: np.ndarray, parameters: SolverParameters) -> np.ndarray:
     """Return how many points (k,) lie on surfaces when they are `moved` to places (k, n, 2); nearly counts in part.
 
     Surfaces from before the run do not say from which side they were heard.
     """
-    distance, index = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=matching.cut)
+    distance, index = cKDTree(targets.places).query(moved.reshape(-1, 2), distance_upper_bound=parameters.cut)
     found = np.isfinite(distance)
     index = np.where(found, index, 0).reshape(moved.shape[:2])
     cosine = np.einsum("na,kna->kn", sources.normals, targets.normals[index])
     cosine = np.where((targets.scans == BEFORE_THE_RUN)[index], np.abs(cosine), cosine)
     near = np.exp(-0.5 * np.where(found, distance / _CELL, np.inf) ** 2).reshape(cosine.shape)
-    return (near * sources.qualities * (cosine > matching.min_cosine)).sum(axis=1)
+    return (near * sources.qualities * (cosine > parameters.min_cosine)).sum(axis=1)

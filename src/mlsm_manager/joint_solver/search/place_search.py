@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.compare.islands import MAP, Islands
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import SurfaceMatching
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.search.motion_search import cells, fits
 from mlsm_manager.joint_solver.search.motion_since import MotionSince, grid
@@ -78,7 +78,7 @@ def whereabouts(
     islands: Islands,
     covariance: np.ndarray,
     silent: int,
-    matching: SurfaceMatching,
+    parameters: SolverParameters,
     known: Optional[KnownSurfaces] = None,
 ) -> Optional[Whereabouts]:
     """Return where the newest scan was taken, after `silent` scans before it that heard nothing.
@@ -89,15 +89,15 @@ def whereabouts(
     last = log.scan_count
     motion = MotionSince(log, odometry, state, covariance, silent)
     own = log.rows(last - 1, last)
-    if motion.reach * _KNOWN < matching.cut or len(own) < FEWEST_POINTS:
+    if motion.reach * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
         return None
     sources = place(log, odometry, state, own[:: max(1, len(own) // _FINE_POINTS)])
-    targets = _map_around(log, odometry, state, islands, sources, _REACH * motion.reach + matching.cut, known)
+    targets = _map_around(log, odometry, state, islands, sources, _REACH * motion.reach + parameters.cut, known)
     if not len(targets):
         return Whereabouts(np.zeros((0, odometry.width)), 0.0, 0.0, 0.0, motion.reach)
     shifts = cells(motion.of_end, _MOST_CELLS)
-    likely = _best_places(sources, targets, shifts, motion.ends(shifts), matching)
-    found = [_refined(motion, sources, targets, shift, matching) for shift in likely]
+    likely = _best_places(sources, targets, shifts, motion.ends(shifts), parameters)
+    found = [_refined(motion, sources, targets, shift, parameters) for shift in likely]
     scores = [_NATS * share * sources.qualities.sum() - motion.cost(ends) for ends, share in found]
     best = int(np.argmax(scores))
     ends, fit = found[best]
@@ -111,7 +111,7 @@ def island_place(
     state: State,
     islands: Islands,
     covariance: np.ndarray,
-    matching: SurfaceMatching,
+    parameters: SolverParameters,
     known: Optional[KnownSurfaces] = None,
 ) -> Whereabouts:
     """Return where the newest scans, which lie apart from the map, are in it; covariance: (2, 2) m^2 of the place.
@@ -123,14 +123,14 @@ def island_place(
     reach = float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
     rows = log.rows(max(first, last - _ISLAND_SCANS), last)
     sources = place(log, odometry, state, rows[:: max(1, len(rows) // _ISLAND_POINTS)])
-    targets = _map_around(log, odometry, state, islands, sources, _REACH * reach + matching.cut, known)
+    targets = _map_around(log, odometry, state, islands, sources, _REACH * reach + parameters.cut, known)
     if not len(sources) or not len(targets):
         return Whereabouts(np.zeros((0, odometry.width)), 0.0, 0.0, 0.0, reach)
     shifts = cells(covariance, _MOST_CELLS)
-    best = np.array(_best_places(sources, targets, shifts, np.tile(shifts, 2), matching))
+    best = np.array(_best_places(sources, targets, shifts, np.tile(shifts, 2), parameters))
     around = best[:, np.newaxis] + grid(_SHIFTS)
     moved = _moved(sources, np.tile(around.reshape(-1, 2), 2))
-    shares = fits(sources, targets, moved, matching).reshape(around.shape[:2]) / sources.qualities.sum()
+    shares = fits(sources, targets, moved, parameters).reshape(around.shape[:2]) / sources.qualities.sum()
     finest = np.argmax(shares, axis=1)
     best, shares = around[np.arange(len(best)), finest], shares.max(axis=1)
     costs = 0.5 * np.einsum("na,nb,ab->n", best, best, np.linalg.inv(covariance))
@@ -177,11 +177,11 @@ def _moved(sources: PlacedPoints, ends: np.ndarray) -> np.ndarray:
 
 
 def _best_places(
-    sources: PlacedPoints, targets: PlacedPoints, shifts: np.ndarray, ends: np.ndarray, matching: SurfaceMatching
+    sources: PlacedPoints, targets: PlacedPoints, shifts: np.ndarray, ends: np.ndarray, parameters: SolverParameters
 ) -> List[np.ndarray]:
     """Return those of `shifts` (k, 2) at which the points fit best, each another place; ends: (k, 4), see _moved."""
     few = sources.selected(np.arange(0, len(sources), max(1, len(sources) // _MOST_POINTS)))
-    shares = fits(few, targets, _moved(few, ends), matching)
+    shares = fits(few, targets, _moved(few, ends), parameters)
     found: List[np.ndarray] = []
     for index in np.argsort(-shares, kind="stable"):
         if all(np.hypot(*(shifts[index] - other)) > _OTHER / 2.0 for other in found):
@@ -192,12 +192,12 @@ def _best_places(
 
 
 def _refined(
-    motion: MotionSince, sources: PlacedPoints, targets: PlacedPoints, shift: np.ndarray, matching: SurfaceMatching
+    motion: MotionSince, sources: PlacedPoints, targets: PlacedPoints, shift: np.ndarray, parameters: SolverParameters
 ) -> Tuple[np.ndarray, float]:
     """Return the best moves (4,) of beginning and end of the scan about a shift (2,) of both, and the share there."""
     shifts, freedom = shift + grid(_SHIFTS), motion.freedom()
     ends = np.repeat(motion.ends(shifts), len(freedom), axis=0)
     ends[:, :2] += np.tile(freedom, (len(shifts), 1))
-    shares = fits(sources, targets, _moved(sources, ends), matching) / sources.qualities.sum()
+    shares = fits(sources, targets, _moved(sources, ends), parameters) / sources.qualities.sum()
     best = int(np.argmax(shares))
     return ends[best], float(shares[best])

@@ -14,10 +14,9 @@ from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
 from mlsm_manager.joint_solver.judge.misfit import misfit_variances
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
-from mlsm_manager.joint_solver.priors import add_belief, add_told_steps, run_deviations, run_mean
 from mlsm_manager.joint_solver.search.loops import Loop, add_loops, loops_of
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations, solution_of
@@ -99,7 +98,7 @@ def closed(live: LiveSolver, batch: BatchResult) -> Closed:
 
 def solved(
     live: LiveSolver,
-    parameters: Optional[MultiViewParameters] = None,
+    parameters: Optional[SolverParameters] = None,
     start: Optional[State] = None,
     told: Optional[State] = None,
 ) -> BatchResult:
@@ -141,9 +140,9 @@ def solved_part(live: LiveSolver, first: int) -> PartResult:
 
 def _misfit(live: LiveSolver, state: State) -> np.ndarray:
     """Return how uncertain scans that fit nowhere make the place of each node (n,) [m^2]."""
-    matching = live.parameters.matching
-    of_turns = misfit_variances(live.log, live.odometry, state, matching, 0)
-    return np.cumsum(np.append(0.0, np.repeat(of_turns / matching.scan_parts, matching.scan_parts)))
+    parts = live.parameters.parts_per_turn
+    of_turns = misfit_variances(live.log, live.odometry, state, live.parameters, 0)
+    return np.cumsum(np.append(0.0, np.repeat(of_turns / parts, parts)))
 
 
 class _Batch:
@@ -152,7 +151,7 @@ class _Batch:
         log: RunLog,
         islands: Islands,
         odometry: OdometryModel,
-        parameters: MultiViewParameters,
+        parameters: SolverParameters,
         state: State,
         loops: Sequence[Loop] = (),
         told: Optional[State] = None,
@@ -166,23 +165,23 @@ class _Batch:
         self._move = np.zeros(self._layout.size)
         self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
-        self._lone = LoneComparisons(log, odometry, parameters.matching, scans, np.ones(len(scans)))
+        self._lone = LoneComparisons(log, odometry, parameters, scans, np.ones(len(scans)))
 
     def converge(self) -> Tuple[int, bool]:
         """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
-        window = self._parameters.window
+        window = self._parameters
         for taken in range(1, window.batch_iterations + 1):
-            if self.step() < window.tolerance or self.step_deviations < window.settled:
+            if self.step() < window.tolerance or self.step_deviations < window.stop_sigma:
                 return taken, True
         return window.batch_iterations, False
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
-        equations, matching = self._expected(), self._parameters.matching
+        equations, parameters = self._expected(), self._parameters
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self._met()
-        add_comparisons(equations, self._layout, pairs, points, points, matching, matching.cut)
-        self._lone.add(equations, self._layout, self.state, matching.cut)
+        add_comparisons(equations, self._layout, pairs, points, points, parameters, parameters.cut)
+        self._lone.add(equations, self._layout, self.state, parameters.cut)
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
         self.state.nodes += self._nodes_of(self._move)
@@ -193,30 +192,32 @@ class _Batch:
     def evidence(self) -> float:
         """Return how much [nats] comparisons and odometry speak for the state: echoes on surfaces less odd motions."""
         points, pairs = self._met()
-        on_surfaces = support(pairs, points, points, self._parameters.matching)
+        on_surfaces = support(pairs, points, points, self._parameters)
         return on_surfaces - 0.5 * self._expected().cost
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
         equations = NormalEquations(self._layout.size)
-        odometry, sonar = self._odometry, self._parameters.sonar
-        add_belief(equations, 0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
-        add_belief(equations, self._layout.run_start, self.state.run, run_mean(sonar), run_deviations(sonar))
+        odometry = self._odometry
+        equations.add_prior(0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
+        equations.add_prior(
+            self._layout.run_start, self.state.run, self._parameters.run_mean, self._parameters.run_deviations
+        )
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
         if self._told is not None:
             now, told = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._told))
-            add_told_steps(equations, self._layout, now, told, _TOLD_STEP)
+            _add_fixed_steps(equations, self._layout, now, told)
         return equations
 
     def _met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
-        matching = self._parameters.matching
+        parameters = self._parameters
         rows = self._log.rows(0, self._layout.last)
         points = place(self._log, self._odometry, self.state, rows)
-        points = WeakDirections.of([points], matching).without(points, points.scans)
+        points = WeakDirections.of([points], parameters).without(points, points.scans)
         if self._lists is None:
-            self._lists = Neighbours(points, matching.block_scans)
-        pairs = pairs_of(self._lists, points, points, matching.cut, matching)
+            self._lists = Neighbours(points, parameters.group_scans)
+        pairs = pairs_of(self._lists, points, points, parameters.cut, parameters)
         return points, self._islands.within(pairs, points, points)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
@@ -233,7 +234,7 @@ class _Batch:
         nodes = np.arange(self._layout.last + 1)
         poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
         places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
-        by_scale = scale_covariance(places, self._parameters.sonar.world_scale_deviation)
+        by_scale = scale_covariance(places, self._parameters.world_scale_deviation)
         return np.concatenate(poses) + by_scale, self._columns_of_inverse(run)[run]
 
     def newest_covariance(self) -> np.ndarray:
@@ -250,3 +251,13 @@ class _Batch:
         unit = np.zeros((self._layout.size, len(columns)))
         unit[columns, np.arange(len(columns))] = 1.0
         return self._solution.solve(unit)
+
+
+def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndarray, told: np.ndarray) -> None:
+    """Add that steps between all nodes, now at `places` (n, 2) [m] in map, are those of the path `told` (n, 2)."""
+    count = len(places) - 1
+    columns = layout.pose_columns(np.column_stack([np.arange(count), np.arange(count) + 1]))
+    errors = np.diff(places - told, axis=0)
+    for axis in (0, 1):
+        jacobian = np.tile([-1.0, 1.0], (count, 1))
+        equations.add(columns[:, :, axis], jacobian, errors[:, axis], np.full(count, _TOLD_STEP**-2.0))

@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, State
 
@@ -40,14 +40,14 @@ def nearest_blocks(
     state: State,
     count: int,
     place_now: np.ndarray,
-    parameters: MultiViewParameters,
+    parameters: SolverParameters,
 ) -> FrozenMap:
     """Return the blocks nearest to `place_now` (2,) among the first `count` blocks of the run."""
-    scans = parameters.matching.block_scans
+    scans = parameters.group_scans
     middles = np.arange(count) * scans + scans // 2
     places = log.node_poses(middles)[:, :2] + state.nodes[middles, :2]
     distances = np.hypot(*(places - place_now).T) + _AGE_DISTANCE * np.arange(count) / max(count, 1)
-    importance = fading(distances, parameters.window.max_frozen_blocks)
+    importance = fading(distances, parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]

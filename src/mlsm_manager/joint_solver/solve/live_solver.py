@@ -11,9 +11,8 @@ from mlsm_manager.joint_solver.judge.misfit import misfit_variances
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.scan_parts import parts_of
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
-from mlsm_manager.joint_solver.priors import run_mean
 from mlsm_manager.joint_solver.search.motion_search import searched_node
 from mlsm_manager.joint_solver.search.place_search import Whereabouts, island_place, silent_scans, whereabouts
 from mlsm_manager.joint_solver.solve.live_window import LiveWindow
@@ -38,7 +37,7 @@ class LiveSolver:
 
     def __init__(
         self,
-        parameters: MultiViewParameters,
+        parameters: SolverParameters,
         sonar_in_base: np.ndarray,
         start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
@@ -51,7 +50,7 @@ class LiveSolver:
         self.log = RunLog(sonar_in_base)
         self.odometry = parameters.odometry
         self.estimates: List[LiveEstimate] = []
-        self._nodes = SolvedNodes(self.odometry.first_node(), run_mean(parameters.sonar))
+        self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean)
         self._start, self._known = start, known
         self.islands = Islands(np.empty(0))
         self.search: Optional[Whereabouts] = None
@@ -72,7 +71,7 @@ class LiveSolver:
     @classmethod
     def resumed(
         cls,
-        parameters: MultiViewParameters,
+        parameters: SolverParameters,
         sonar_in_base: np.ndarray,
         scans: Sequence[Scan],
         stored: Mapping[str, np.ndarray],
@@ -110,7 +109,7 @@ class LiveSolver:
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
 
-        It may be cut into parts (`scan_parts`), each of which then is a scan of the log with an estimate of its own.
+        It may be cut into parts (`parts_per_turn`), each then a scan of the log with an estimate of its own.
 
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
@@ -133,14 +132,14 @@ class LiveSolver:
 
     @property
     def _parts(self) -> int:
-        return self.parameters.matching.scan_parts
+        return self.parameters.parts_per_turn
 
     def _append(self, scan: Scan) -> None:
         """Append the parts of a scan to the log, all or none."""
         scans = self.log.scan_count
         try:
             for part in parts_of(scan, self._parts, self.log.node_times[-1] if scans else None):
-                self.log.append(part, self.parameters.window.lookahead)
+                self.log.append(part, self.parameters.lookahead)
                 self.islands.append()
         except RefusedInput:
             self._shorten(scans)
@@ -170,7 +169,7 @@ class LiveSolver:
     def _misfit_variance(self) -> float:
         """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
         first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
-        newest = misfit_variances(self.log, self.odometry, self.state, self.parameters.matching, first)
+        newest = misfit_variances(self.log, self.odometry, self.state, self.parameters, first)
         self._nodes.misfits.replace_from(first, newest)
         return float(self._nodes.misfits.values.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
 
@@ -180,10 +179,10 @@ class LiveSolver:
             self.log, self.odometry, self.parameters, self.state, self.estimates, self._nodes.covariances.values,
             self._start, self._known, self.islands,
         )  # fmt: skip
-        cut = self.parameters.matching.wide_cut
-        for _ in range(self.parameters.window.live_iterations):
+        cut = self.parameters.wide_cut
+        for _ in range(self.parameters.live_iterations):
             window.step(cut)
-            cut = max(self.parameters.matching.cut, _CUT_FACTOR * cut)
+            cut = max(self.parameters.cut, _CUT_FACTOR * cut)
         return window
 
     @property
@@ -200,14 +199,14 @@ class LiveSolver:
         if len(self.estimates) <= silent:
             return
         covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
-        matching = self.parameters.matching
+        parameters = self.parameters
         if silent:
             self.search = whereabouts(
-                self.log, self.odometry, self.state, self.islands, covariance, silent, matching, self._known
+                self.log, self.odometry, self.state, self.islands, covariance, silent, parameters, self._known
             )
         if self.search is not None and self.search.is_certain and not self.islands.is_apart:
             self._move(self.search.moves)
-        elif self.search is not None and self.search.reach > matching.wide_cut:
+        elif self.search is not None and self.search.reach > parameters.wide_cut:
             self.islands.begin()
         else:
             self._search_beside_scan_before(covariance)
@@ -222,14 +221,14 @@ class LiveSolver:
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
         first = self.islands.start
-        self.state.nodes[-1] = searched_node(
-            self.log, self.odometry, self.state, covariance, self.parameters.matching, first
-        )
+        self.state.nodes[-1] = searched_node(self.log, self.odometry, self.state, covariance, self.parameters, first)
 
     def _join(self, estimate: LiveEstimate) -> bool:
         """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""
-        covariance, matching = estimate.covariance[:2, :2], self.parameters.matching
-        self.search = island_place(self.log, self.odometry, self.state, self.islands, covariance, matching, self._known)
+        covariance, parameters = estimate.covariance[:2, :2], self.parameters
+        self.search = island_place(
+            self.log, self.odometry, self.state, self.islands, covariance, parameters, self._known
+        )
         if self.search.is_certain:
             self._move(self.search.moves)
             self.islands.join()

@@ -14,10 +14,9 @@ from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
 from mlsm_manager.joint_solver.judge.agreement import agreement, surfaces_met
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel, frozen_deviations
-from mlsm_manager.joint_solver.parameters import MultiViewParameters
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
-from mlsm_manager.joint_solver.priors import add_belief, run_deviations, run_mean
 from mlsm_manager.joint_solver.solve.frozen_map import joint_covariance, nearest_blocks
 from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS, Layout, State
@@ -39,15 +38,15 @@ class LiveWindow:
     """
 
     def __init__(
-        self, log: RunLog, odometry: OdometryModel, parameters: MultiViewParameters, state: State,
+        self, log: RunLog, odometry: OdometryModel, parameters: SolverParameters, state: State,
         estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
         known: Optional[KnownSurfaces], islands: Islands,
     ) -> None:  # fmt: skip
         self._islands = islands
         self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
         last = log.scan_count
-        first = max(0, last - parameters.window.free_nodes)
-        self._scans_per_block = parameters.matching.block_scans
+        first = max(0, last - parameters.free_nodes)
+        self._scans_per_block = parameters.group_scans
         self._recent = first // self._scans_per_block * self._scans_per_block
         around = log.node_poses(last)[:2] + state.nodes[last, :2]
         self._frozen = nearest_blocks(log, odometry, state, first // self._scans_per_block, around, parameters)
@@ -70,7 +69,7 @@ class LiveWindow:
         scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
         same = self._islands.numbers[scans] == self._islands.newest
         scans, importance = scans[same], importance[same]
-        return LoneComparisons(self._log, self._odometry, self._parameters.matching, scans, importance)
+        return LoneComparisons(self._log, self._odometry, self._parameters, scans, importance)
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
@@ -99,8 +98,8 @@ class LiveWindow:
 
     def _add_beliefs(self, equations: NormalEquations) -> None:
         mean, deviations, run, of_run = self._beliefs()
-        add_belief(equations, 0, self._state.nodes[self._layout.first], mean, deviations)
-        add_belief(equations, self._layout.run_start, self._state.run, run, of_run)
+        equations.add_prior(0, self._state.nodes[self._layout.first], mean, deviations)
+        equations.add_prior(self._layout.run_start, self._state.run, run, of_run)
         if self._anchor is not None:
             own = np.arange(POSE_COLUMNS)
             held = self._layout.size + len(self._held_covariance) - POSE_COLUMNS + own
@@ -114,12 +113,11 @@ class LiveWindow:
 
         Of a frozen node it is what was known when it was the newest: the window's scans are not in that.
         """
-        sonar = self._parameters.sonar
         if self._anchor is None:
             deviations = self._odometry.first_deviations()
             if self._start is not None:
                 deviations[POSE] = self._start
-            return self._odometry.first_node(), deviations, run_mean(sonar), run_deviations(sonar)
+            return self._odometry.first_node(), deviations, self._parameters.run_mean, self._parameters.run_deviations
         pose = self._state.nodes[self._layout.first, POSE]
         mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
         deviations = frozen_deviations(self._anchor.node_deviations)
@@ -129,34 +127,34 @@ class LiveWindow:
 
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
         """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
-        matching = self._parameters.matching
+        parameters = self._parameters
         rows = self._log.rows(self._recent, self._layout.last)
         recent = place(self._log, self._odometry, self._state, rows)
         frozen = self._frozen.moved_by_run(self._state.run)
-        weak = WeakDirections.of((frozen, recent), matching)
+        weak = WeakDirections.of((frozen, recent), parameters)
         frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         to_frozen, to_recent = self._compared(sources, (frozen, recent), cut)
         met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
         summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
         if self._known is not None:
-            to_known, known = self._known.compared(sources, cut, matching)
+            to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])
             to_known = self._islands.within(to_known, sources, known)
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])
         self._met = tuple(met)
-        return sum(add_comparisons(equations, self._layout, *some, matching, cut) for some in summed)
+        return sum(add_comparisons(equations, self._layout, *some, parameters, cut) for some in summed)
 
     def _compared(
         self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
     ) -> Iterator[Pairs]:
         """Compare `sources` with frozen and recent points, whose neighbours are looked up once for all steps."""
-        matching = self._parameters.matching
+        parameters = self._parameters
         if self._lists is None:
-            self._lists = tuple(Neighbours(targets, matching.block_scans) for targets in surfaces)
+            self._lists = tuple(Neighbours(targets, parameters.group_scans) for targets in surfaces)
         for lists, targets in zip(self._lists, surfaces):
-            pairs = pairs_of(lists, sources, targets, cut, matching)
+            pairs = pairs_of(lists, sources, targets, cut, parameters)
             yield self._islands.within(pairs, sources, targets)
 
     def _move(self, step: np.ndarray) -> None:
@@ -185,13 +183,13 @@ class LiveWindow:
         unknowns = np.append(own, self._layout.run_start + np.arange(RUN_COLUMNS))
         T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
         T_map_base = T_odom_base + node[POSE]
-        share, distance = agreement(self._met, number - 1, self._parameters.matching)
+        share, distance = agreement(self._met, number - 1, self._parameters)
         return LiveEstimate(
             time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
             covariance=self._solution.covariance(unknowns, self._held_covariance),
             own_covariance=self._solution.covariance(unknowns, np.zeros_like(self._held_covariance)),
-            world_scale_deviation=self._parameters.sonar.world_scale_deviation,
+            world_scale_deviation=self._parameters.world_scale_deviation,
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
             agreement=share, distance=distance, surfaces=surfaces_met(self._met, number - 1),
