@@ -20,7 +20,7 @@ from std_msgs.msg import Float32
 
 from mlsm_manager.offline.picture import draw_map
 from mlsm_manager.offline.picture_contents import Path2d
-from mlsm_manager.surface_map.storage import read_ply
+from mlsm_manager.surface_map.ply_file import read_ply
 from node_support.files import write_whole
 from sonar_simulator.world.world_file import load_sdf
 from underwater_map_construction.srv import SaveMap

@@ -10,9 +10,8 @@ from std_msgs.msg import Header
 
 from benchmarks.harness import Row, cpu_seconds, median_seconds
 from mlsm_manager.ros.markers import BlockMarkers
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map, write_map
-from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
-from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.surface_map.free_space import Carver, CarvingParameters, FirstEchoes
+from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map, write_map
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5

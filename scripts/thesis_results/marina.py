@@ -16,7 +16,7 @@ from matplotlib.axes import Axes
 from mlsm_manager.offline.evaluation import aligned_truth, positions_at
 from mlsm_manager.offline.recording import Truth
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.map_file import read_map
+from mlsm_manager.surface_map.map_file import read_map
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import Pictures, draw_from_above, new_figure, to_scale
 

@@ -20,7 +20,7 @@ import rostest
 from geometry_msgs.msg import Point
 from graph import PACKAGE_ROOT, PATIENCE, forget_links, wait_for_publisher_links, wait_until
 
-from mlsm_manager.surface_map.files.map_file import read_map
+from mlsm_manager.surface_map.map_file import read_map
 from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud

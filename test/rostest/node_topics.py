@@ -11,7 +11,7 @@ import rostest
 from graph import Inbox, wait_until
 from sensor_msgs.msg import Image
 
-from mlsm_manager.ros.map_messages import has_octomap_messages
+from mlsm_manager.ros.map_publisher import has_octomap_messages
 from node_support.node_table import NODES, Role
 
 PACKAGE = "underwater_map_construction"

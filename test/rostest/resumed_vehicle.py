@@ -20,7 +20,7 @@ from tf2_msgs.msg import TFMessage
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import cells_of
-from mlsm_manager.surface_map.files.map_file import read_map
+from mlsm_manager.surface_map.map_file import read_map
 from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud

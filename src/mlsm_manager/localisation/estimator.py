@@ -16,9 +16,9 @@ from mlsm_manager.scan_matching.result import Matcher, MatchResult
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
-from mlsm_manager.surface_map.files.map_file import Layer
-from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
+from mlsm_manager.surface_map.free_space import Carver, CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
+from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import transformed
 

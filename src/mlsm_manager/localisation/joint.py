@@ -30,9 +30,9 @@ from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
-from mlsm_manager.surface_map.files.map_file import Layer
-from mlsm_manager.surface_map.free_space.carving import CarveReport
+from mlsm_manager.surface_map.free_space import CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
+from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, transformed
 

@@ -11,7 +11,7 @@ from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.map_file import Layer
 
 _MOST_STORED = 500
 """Scans of a run that are stored with each save: some hours, and some tens of megabytes."""

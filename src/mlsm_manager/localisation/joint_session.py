@@ -14,12 +14,9 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.continuity import scans_go_on
-from mlsm_manager.self_check.map_agreement import recent_agreement
-from mlsm_manager.self_check.observability import surfaces_tell
-from mlsm_manager.self_check.path_spread import told_deviation
+from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.path_checks import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.self_check.wholeness import in_one_map
 from node_support.geometry import composed, transformed
 
 _LONGEST_PAUSE = 2.0

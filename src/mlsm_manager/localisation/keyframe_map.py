@@ -9,7 +9,7 @@ import numpy as np
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
 from mlsm_manager.localisation.placement import Placement
-from mlsm_manager.surface_map.free_space.carving import Carver, CarveReport
+from mlsm_manager.surface_map.free_space import Carver, CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay

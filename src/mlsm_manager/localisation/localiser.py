@@ -17,9 +17,9 @@ from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdat
 from mlsm_manager.scan_matching.result import Matcher
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
-from mlsm_manager.surface_map.running_copy import finished
+from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from node_support.errors import RefusedInput
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.

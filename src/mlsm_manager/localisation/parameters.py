@@ -13,8 +13,8 @@ from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.result import Matcher
-from mlsm_manager.surface_map.export.colors import ColorBy
-from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.surface_map.export.pictures import ColorBy
+from mlsm_manager.surface_map.free_space import Carver, CarvingParameters
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter

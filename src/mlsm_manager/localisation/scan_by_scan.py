@@ -12,10 +12,9 @@ from mlsm_manager.scan_matching.result import MatchResult, corrected_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.map_file import Layer
-from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
-from mlsm_manager.surface_map.free_space.carving import CarveReport
+from mlsm_manager.surface_map.free_space import CarveReport, FirstEchoes
 from mlsm_manager.surface_map.insertion import InsertReport
+from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed
 

@@ -7,7 +7,7 @@ from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.result import MatchResult
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.free_space.carving import CarveReport
+from mlsm_manager.surface_map.free_space import CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
 from node_support.health import Health
 

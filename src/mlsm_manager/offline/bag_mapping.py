@@ -26,7 +26,7 @@ from mlsm_manager.offline.sessions import Session, add_session, executor_for, pr
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.files.map_file import StoredMap
+from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
 

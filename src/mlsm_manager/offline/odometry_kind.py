@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.continuity import scans_go_on
+from mlsm_manager.self_check.map_checks import scans_go_on
 
 _STANDS = 0.05  # m: a position that moves by less never changed, but for rounding and lever arms of a tilting base
 _TURNS = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more

@@ -15,7 +15,7 @@ from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.map_file import Layer
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import POSE, State
-from mlsm_manager.self_check.path_spread import settings_agree, starts_agree
+from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
 
 _NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5

@@ -13,7 +13,7 @@ from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.surface_map.files.map_file import StoredMap
+from mlsm_manager.surface_map.map_file import StoredMap
 from node_support.errors import RefusedInput
 from node_support.geometry import composed
 

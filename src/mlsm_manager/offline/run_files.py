@@ -14,8 +14,8 @@ from mlsm_manager.offline.trust import Trust
 from mlsm_manager.offline.tum_files import tum_files
 from mlsm_manager.report.mission import Path as Way
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.map_file import StoredMap, write_map
-from mlsm_manager.surface_map.storage import write_ply
+from mlsm_manager.surface_map.map_file import StoredMap, write_map
+from mlsm_manager.surface_map.ply_file import write_ply
 from node_support.files import write_whole
 from node_support.geometry import wrapped
 

@@ -15,7 +15,7 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED
 from mlsm_manager.report.mission import Path as Way
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.surface_map.files.map_file import StoredMap
+from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
 

@@ -14,14 +14,9 @@ from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
-from mlsm_manager.self_check.calibration_agreement import as_expected, halves_agree
-from mlsm_manager.self_check.continuity import scans_go_on
-from mlsm_manager.self_check.map_agreement import recent_agreement
-from mlsm_manager.self_check.observability import surfaces_tell
-from mlsm_manager.self_check.odometry_agreement import against_odometry
-from mlsm_manager.self_check.path_spread import per_minute, told_deviation
+from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.path_checks import against_odometry, as_expected, halves_agree, per_minute, told_deviation
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.self_check.wholeness import in_one_map
 
 # A window's worth of scans: fewer say too little of scale and delay.
 _FEWEST_SCANS = 20

@@ -1,10 +1,14 @@
-"""Puts everything into one HTML page."""
+"""The report as one HTML page: figures, a slider over the scans, and the checks of the run with their lights."""
 
+import base64
+import json
+from enum import Enum
 from html import escape
 from pathlib import Path
 from string import Template
-from typing import Iterable, Mapping, Sequence
+from typing import Dict, Iterable, List, Mapping, Sequence
 
+import numpy as np
 from plotly.graph_objects import Figure
 from plotly.offline import get_plotlyjs
 
@@ -16,11 +20,25 @@ from mlsm_manager.report.figures import (
     map_in_3d,
     sensor_health,
 )
-from mlsm_manager.report.lights import Light, light_of, light_of_run, sentence
 from mlsm_manager.report.mission import Mission
 from mlsm_manager.report.page_template import PAGE
-from mlsm_manager.report.slider_data import slider_json
+from mlsm_manager.self_check.verdict import Verdict
 from node_support.files import write_whole
+
+_NEAR = 0.75  # share of a limit from which on a figure is worth a look
+_MOST_POINTS = 800  # of a scan: more cannot be told apart on a screen
+_UNIT = 0.01  # m: points are stored as whole centimetres from the vehicle
+_FARTHEST = np.iinfo(np.int16).max * _UNIT
+
+
+class Light(Enum):
+    """How a check ended."""
+
+    GREEN = "fine"
+    AMBER = "near its limit"
+    RED = "doubtful"
+    GREY = "too little to tell"
+
 
 _LIGHT_COLORS = {Light.GREEN: "#2e8540", Light.AMBER: "#e0a526", Light.RED: "#c0392b", Light.GREY: "#999999"}
 _RUN_WORDS = {
@@ -105,3 +123,57 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>"
+
+
+def light_of(verdict: Verdict) -> Light:
+    """Return the light of a check."""
+    if np.isnan(verdict.value):
+        return Light.GREY
+    if verdict.fires:
+        return Light.RED
+    worse = verdict.limit / verdict.value if verdict.more_is_better else verdict.value / verdict.limit
+    return Light.AMBER if worse > _NEAR else Light.GREEN
+
+
+def light_of_run(lights: "list[Light]") -> Light:
+    """Return the light of the whole run: that of its worst check."""
+    for light in (Light.RED, Light.AMBER, Light.GREEN):
+        if light in lights:
+            return light
+    return Light.GREY
+
+
+def sentence(verdict: Verdict) -> str:
+    """Return what a check found, in words."""
+    if np.isnan(verdict.value):
+        return "The run is too short to tell."
+    bound = "at least" if verdict.more_is_better else "at most"
+    return f"{verdict.value:.2f}, should be {bound} {verdict.limit:g} ({verdict.text})"
+
+
+def slider_json(mission: Mission) -> str:
+    """Return the JSON that the page's script reads: time, vehicle and points of each scan.
+
+    Points are little-endian int16 x y in hundredths of a metre from the vehicle, in base64.
+    """
+    best = mission.best
+    scans: List[Dict[str, object]] = []
+    for scan in mission.scans:
+        vehicle = [float(np.interp(scan.time, best.times, best.poses[:, axis])) for axis in (0, 1)]
+        scans.append(
+            {
+                "time": round(scan.time - mission.start, 1),
+                "vehicle": [round(value, 2) for value in vehicle],
+                "echoes": len(scan.points),
+                "rejection": scan.rejection,
+                "points": _packed(scan.points[:, :2] - vehicle),
+            }
+        )
+    # A page may hold no "</" inside a script.
+    return json.dumps({"unit": _UNIT, "scans": scans}).replace("</", "<\\/")
+
+
+def _packed(points: np.ndarray) -> str:
+    step = max(1, -(-len(points) // _MOST_POINTS))
+    near = np.clip(points[::step], -_FARTHEST, _FARTHEST)
+    return base64.b64encode(np.round(near / _UNIT).astype("<i2").tobytes()).decode("ascii")

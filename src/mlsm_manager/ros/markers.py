@@ -9,15 +9,12 @@ from geometry_msgs.msg import Quaternion, Vector3
 from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from mlsm_manager.surface_map.block_shapes import THINNEST, BoxLists, box_lists, box_size, box_type
-from mlsm_manager.surface_map.blocks import Blocks, BlockType
-from mlsm_manager.surface_map.export.colors import ColorBy, Limits, block_colors, color_limits
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.pictures import TYPE_COLORS, ColorBy, Limits, block_colors, color_limits
+from mlsm_manager.surface_map.tiles import THINNEST, BoxLists, box_lists, box_size, box_type
 
 Tile = Tuple[int, int]
-COLORS: Dict[BlockType, ColorRGBA] = {
-    BlockType.HORIZONTAL: ColorRGBA(r=0.75, g=0.16, b=0.10, a=1.0),
-    BlockType.VERTICAL: ColorRGBA(r=1.0, g=0.87, b=0.40, a=1.0),
-}
+COLORS = {kind: ColorRGBA(*color, 1.0) for kind, color in TYPE_COLORS.items()}
 # Four lengths of 4 bytes and the flag; behind the points follow the other three and the flag.
 _EMPTY_LISTS_BYTES = 17
 _NO_COLORS = struct.pack("<I", 0)

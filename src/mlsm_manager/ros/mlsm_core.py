@@ -1,6 +1,6 @@
 """The ROS side of the map: clouds and echoes in; map, fix, map -> odom and services out (thesis 4.5.1, 6.5.6)."""
 
-from typing import Optional
+from typing import List, Optional
 
 import numpy as np
 import rospy
@@ -17,11 +17,9 @@ from mlsm_manager.localisation.updates import (
     report_turn,
     report_verdicts,
 )
-from mlsm_manager.ros.autosave import Autosave
-from mlsm_manager.ros.fix_publisher import FixPublisher
+from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform
 from mlsm_manager.ros.map_publisher import MapPublisher
-from mlsm_manager.ros.map_services import MapServices
-from mlsm_manager.ros.map_transform import MapTransform
+from mlsm_manager.ros.map_services import Autosave, MapServices
 from mlsm_manager.ros.odometry_track import OdometryTrack
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan
@@ -29,11 +27,14 @@ from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry import matrices
+from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
-from sonar_processing.cloud import Cloud
+from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import subscribe_to_clouds
 from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.ros.pipeline import Pipeline
 
 _Z_DOWN_ADVICE = (
     "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true); "
@@ -235,3 +236,23 @@ class MlsmCore:
     def _after_replacing(self) -> None:
         self._fix.clear()
         self._map.replace()
+
+
+class Mapping:
+    """Everything from beams to map in one process."""
+
+    def __init__(self) -> None:
+        """Raises ParameterError for a bad parameter of any stage."""
+        self._core = MlsmCore(rospy.resolve_name("mlsm_core"))
+        self._pipeline = Pipeline(CloudSink(self._core.insert), CloudSink(self._core.match))
+        self.healths: List[Health] = [*self._pipeline.healths, *self._core.healths]
+
+
+def run_mlsm_core() -> None:
+    """Run the map as a node of its own."""
+    run("mlsm_core", MlsmCore.as_node)
+
+
+def run_mapping() -> None:
+    """Run everything from beams to map in one process."""
+    run("mapping", Mapping)

@@ -1,6 +1,8 @@
 """Where a map keeps its blocks: one float64 row each, found through the first block of their cell and a chain."""
 
-from typing import NamedTuple, Tuple
+import time
+from threading import RLock
+from typing import List, NamedTuple, Tuple
 from weakref import WeakSet
 
 import numpy as np
@@ -8,9 +10,12 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
 from mlsm_manager.surface_map.large_array import LargeArray
-from mlsm_manager.surface_map.running_copy import RunningCopy
 from node_support.numba_cache import compiled
 
+_PIECE = 1 << 15
+"""Rows copied at once: 3 MB, one or two milliseconds."""
+_PAUSE = 0.001
+"""s between two pieces: a lock that is taken again at once is never given to somebody who waits for it."""
 _MIN_ROWS = 1024
 """Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
 
@@ -68,7 +73,7 @@ class BlockStore:
         """Return a copy of the blocks in `rows` (n,)."""
         return Blocks(self._rows[rows], resolution, self._crossed[rows])
 
-    def begin_copy(self, resolution: float) -> RunningCopy:
+    def begin_copy(self, resolution: float) -> "RunningCopy":
         """Return a copy of all blocks as they are now, which is still to be made."""
         copy = RunningCopy(self._row_array, self._crossed_array, self._used, resolution)
         self._copies.add(copy)
@@ -141,3 +146,58 @@ def _unlink_released(store, slots):
             else:
                 store.following[before] = following
             row = following
+
+
+class RunningCopy:
+    """The blocks as they were when it began.
+
+    The map tells which rows it is about to change; those that are not copied yet are put aside as they are.
+    """
+
+    def __init__(self, rows: LargeArray, crossed: LargeArray, used: int, resolution: float) -> None:
+        """`rows`, `crossed`: of the map, whose first `used` elements are copied. resolution: side of a cell, m."""
+        self._rows, self._crossed, self._resolution = rows, crossed, resolution
+        self._copy = np.empty((used, *rows.values.shape[1:])), np.empty(used, dtype=crossed.values.dtype)
+        self._done = 0
+        self._aside: List[Tuple[np.ndarray, np.ndarray, np.ndarray]] = []
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether nothing is left to copy."""
+        return self._done == len(self._copy[1])
+
+    def before_change(self, rows: np.ndarray) -> None:
+        """Learn that the map is about to change `rows` (n,)."""
+        left = rows[(rows >= self._done) & (rows < len(self._copy[1]))]
+        if len(left):
+            self._aside.append((left, self._rows.values[left], self._crossed.values[left]))
+
+    def step(self) -> None:
+        """Copy the next piece; the map must not change meanwhile."""
+        piece = slice(self._done, min(self._done + _PIECE, len(self._copy[1])))
+        for copy, array in zip(self._copy, (self._rows, self._crossed)):
+            copy[piece] = array.values[piece]
+        self._done = piece.stop
+
+    @property
+    def blocks(self) -> Blocks:
+        """All blocks, in no particular order, once the copy is complete."""
+        rows, crossed = self._copy
+        while self._aside:
+            # What was put aside first is the oldest, and counts.
+            places, before, before_crossed = self._aside.pop()
+            rows[places], crossed[places] = before, before_crossed
+        held = np.flatnonzero(rows[:, COUNT])
+        if len(held) == len(rows):
+            return Blocks(rows, self._resolution, crossed)
+        return Blocks(rows[held], self._resolution, crossed[held])
+
+
+def finished(copy: RunningCopy, lock: RLock) -> Blocks:
+    """Complete a copy, holding the lock of its map for one piece at a time, and return the blocks."""
+    while True:
+        with lock:
+            copy.step()
+        if copy.is_complete:
+            return copy.blocks
+        time.sleep(_PAUSE)

@@ -4,12 +4,11 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.block_store import BlockStore
+from mlsm_manager.surface_map.block_store import BlockStore, RunningCopy
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
-from mlsm_manager.surface_map.changed_tiles import TILE_BITS, ChangedTiles
 from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
-from mlsm_manager.surface_map.running_copy import RunningCopy
+from mlsm_manager.surface_map.tiles import TILE_BITS, ChangedTiles
 
 
 class MultiLevelSurfaceMap:

@@ -4,8 +4,8 @@ from typing import List, NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.block_shapes import box_lists, box_size, box_type
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
+from mlsm_manager.surface_map.tiles import box_lists, box_size, box_type
 
 
 class BoxList(NamedTuple):

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 

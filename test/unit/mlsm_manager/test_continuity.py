@@ -12,7 +12,7 @@ from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
 from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import State
-from mlsm_manager.self_check.continuity import scans_go_on
+from mlsm_manager.self_check.map_checks import scans_go_on
 
 SECONDS = 14.0
 

@@ -10,7 +10,7 @@ from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.surface_map.files.map_file import map_bytes, map_of_bytes
+from mlsm_manager.surface_map.map_file import map_bytes, map_of_bytes
 from node_support.geometry import composed, transformed
 
 pytestmark = pytest.mark.long

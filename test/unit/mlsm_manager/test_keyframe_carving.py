@@ -8,8 +8,7 @@ from hypothesis import strategies as st
 
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes
-from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.surface_map.free_space import Carver, CarvingParameters, FirstEchoes
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION, LIMIT, NEVER = 0.5, 1000.0, -np.inf

@@ -8,7 +8,7 @@ import yaml
 from heading_only import reduce_bag
 from map_bag_runs import BASIN, run, summary_of
 
-from mlsm_manager.surface_map.files.map_file import Layer, read_map
+from mlsm_manager.surface_map.map_file import Layer, read_map
 
 pytestmark = pytest.mark.long
 

@@ -10,18 +10,22 @@ import yaml
 from made_maps import random_map
 from PIL import Image
 
-from mlsm_manager.surface_map.export.clouds import write_pcd
-from mlsm_manager.surface_map.export.colors import ColorBy, block_colors
-from mlsm_manager.surface_map.export.errors import ExportError
-from mlsm_manager.surface_map.export.formats import ExportOptions, export
+from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd
 from mlsm_manager.surface_map.export.octomap import block_voxels, octree, write_octree
-from mlsm_manager.surface_map.export.picture import bar_length
-from mlsm_manager.surface_map.export.raster_files import write_ascii_grid, write_geotiff, write_map_server
-from mlsm_manager.surface_map.export.rasters import FREE, OCCUPIED, UNKNOWN, elevation, occupancy
-from mlsm_manager.surface_map.export.window import box_mesh
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.export.pictures import ColorBy, bar_length, block_colors, box_mesh
+from mlsm_manager.surface_map.export.rasters import (
+    FREE,
+    OCCUPIED,
+    UNKNOWN,
+    elevation,
+    occupancy,
+    write_ascii_grid,
+    write_geotiff,
+    write_map_server,
+)
+from mlsm_manager.surface_map.map_file import ExportError, Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.storage import write_ply
+from mlsm_manager.surface_map.ply_file import write_ply
 
 RESOLUTION = 0.5
 

@@ -7,10 +7,17 @@ from hypothesis import strategies as st
 from made_maps import content, random_map, random_points, stored_map
 from map_comparison import in_order, partition
 
+from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.files.array_file import ArrayFileError, decoded, encoded
-from mlsm_manager.surface_map.files.errors import MapFileError
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes, map_of_bytes, read_map, write_map
+from mlsm_manager.surface_map.map_file import (
+    Layer,
+    MapFileError,
+    StoredMap,
+    map_bytes,
+    map_of_bytes,
+    read_map,
+    write_map,
+)
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 MUTATIONS = 1000

@@ -8,8 +8,7 @@ from made_maps import content, stored_map
 
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
 from mlsm_manager.surface_map.export.map_folder import MapFolder
-from mlsm_manager.surface_map.files.errors import MapFileError
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes
+from mlsm_manager.surface_map.map_file import Layer, MapFileError, StoredMap, map_bytes
 
 
 @pytest.fixture

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.surface_map.free_space.beam_paths import FirstEchoes, beam_paths
-from mlsm_manager.surface_map.free_space.carving import Carver, CarvingParameters
+from mlsm_manager.surface_map.free_space import Carver, CarvingParameters, FirstEchoes, beam_paths
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5

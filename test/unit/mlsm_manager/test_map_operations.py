@@ -7,11 +7,9 @@ from hypothesis import strategies as st
 from made_maps import random_points
 from map_comparison import in_order, partition
 
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.operations.compare import cropped, difference
-from mlsm_manager.surface_map.operations.merge import merged, merged_blocks
-from mlsm_manager.surface_map.operations.move import LevelTransform, moved
+from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged, merged_blocks, moved
 
 RESOLUTION = 0.5
 seeds = st.integers(0, 2**31)

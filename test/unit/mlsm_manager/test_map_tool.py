@@ -8,9 +8,9 @@ import pytest
 from made_maps import random_map, stored_map
 from programs import ROOT
 
-from mlsm_manager.map_tool.commands import run_map_tool
-from mlsm_manager.surface_map.files.map_file import read_map, write_map
-from mlsm_manager.surface_map.storage import write_ply
+from mlsm_manager.map_tool import run_map_tool
+from mlsm_manager.surface_map.map_file import read_map, write_map
+from mlsm_manager.surface_map.ply_file import write_ply
 
 
 @pytest.fixture

@@ -10,7 +10,7 @@ from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.surface_map.files.map_file import Layer
+from mlsm_manager.surface_map.map_file import Layer
 
 SONAR_IN_BASE = (5.0, 0.0)
 GHOST = np.array([[2.1, 5.1]])

@@ -7,9 +7,8 @@ from hypothesis import strategies as st
 from made_blocks import blocks_of
 from made_boxes import boxes_by_list
 
-from mlsm_manager.surface_map.block_shapes import THINNEST, box_lists
 from mlsm_manager.surface_map.blocks import BlockType
-from mlsm_manager.surface_map.changed_tiles import TILE_BITS
+from mlsm_manager.surface_map.tiles import THINNEST, TILE_BITS, box_lists
 
 BOTTOMS = st.floats(-50.0, 50.0)
 DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))

@@ -13,8 +13,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
 from mlsm_manager.surface_map.blocks import BlockType
-from mlsm_manager.surface_map.changed_tiles import TILE_BITS
-from mlsm_manager.surface_map.export.colors import ColorBy, block_colors
+from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
+from mlsm_manager.surface_map.tiles import TILE_BITS
 
 HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
 MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.9), (5.0, 5.01)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.storage import read_ply, write_ply
+from mlsm_manager.surface_map.ply_file import read_ply, write_ply
 
 _NUMPY_TYPES = {"double": "<f8", "uint": "<u4", "uchar": "u1"}
 

@@ -14,7 +14,7 @@ import pytest
 from made_maps import random_map
 from std_msgs.msg import Header
 
-from mlsm_manager.ros.map_messages import has_octomap_messages, octomap_message
+from mlsm_manager.ros.map_publisher import has_octomap_messages, octomap_message
 from mlsm_manager.surface_map.export.octomap import block_voxels, octree
 
 pyoctomap = pytest.importorskip("pyoctomap")

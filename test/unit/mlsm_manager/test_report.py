@@ -11,8 +11,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from made_missions import START, blocks, mission, verdict
 
-from mlsm_manager.report.lights import Light, light_of, light_of_run
-from mlsm_manager.report.slider_data import slider_json
+from mlsm_manager.report.page import Light, light_of, light_of_run, slider_json
 
 MOST_BYTES = 15e6
 

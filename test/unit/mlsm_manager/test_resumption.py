@@ -8,7 +8,7 @@ from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.scan_matching.result import MatchStatus
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, map_bytes, map_of_bytes
+from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 
 pytestmark = pytest.mark.long
 

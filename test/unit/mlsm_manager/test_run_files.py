@@ -11,8 +11,8 @@ from made_blocks import blocks_of
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, Run, errors_of, trajectory_csv, write_run, write_summary
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap
-from mlsm_manager.surface_map.storage import read_ply
+from mlsm_manager.surface_map.map_file import Layer, StoredMap
+from mlsm_manager.surface_map.ply_file import read_ply
 
 TIMES = np.arange(4.0)
 ODOMETRY_POSES = np.column_stack([TIMES, np.zeros(4), np.full(4, 4.0)])

@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mlsm_manager.surface_map import running_copy
+from mlsm_manager.surface_map import block_store
+from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.running_copy import finished
 
 
 @pytest.fixture(autouse=True)
 def small_pieces(monkeypatch):
-    monkeypatch.setattr(running_copy, "_PIECE", 7)
+    monkeypatch.setattr(block_store, "_PIECE", 7)
 
 
 def map_of(seed, count=60):

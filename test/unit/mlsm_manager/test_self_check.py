@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.self_check.calibration_agreement import as_expected, halves_agree
-from mlsm_manager.self_check.map_agreement import recent_agreement
-from mlsm_manager.self_check.observability import surfaces_tell
-from mlsm_manager.self_check.odometry_agreement import against_odometry
-from mlsm_manager.self_check.path_spread import per_minute, settings_agree, starts_agree, told_deviation
+from mlsm_manager.self_check.map_checks import recent_agreement, surfaces_tell
+from mlsm_manager.self_check.path_checks import (
+    against_odometry,
+    as_expected,
+    halves_agree,
+    per_minute,
+    settings_agree,
+    starts_agree,
+    told_deviation,
+)
 from mlsm_manager.self_check.verdict import Verdict, merged
 
 TIMES = np.arange(0.0, 2000.0, 1.0)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.self_check.wholeness import in_one_map
+from mlsm_manager.self_check.map_checks import in_one_map
 
 TIMES = np.arange(10) * 14.0
 

@@ -1,1 +1,1 @@
-"""Maps in the formats of other programs."""
+"""Maps in the formats of other programs, and the folder that holds them."""

@@ -1,4 +1,4 @@
-"""Which format the ending of a file's name asks for."""
+"""Maps in the formats of other programs: the ending of a file's name says which."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -7,14 +7,49 @@ from typing import Callable, Dict
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
-from mlsm_manager.surface_map.export.clouds import write_pcd
-from mlsm_manager.surface_map.export.colors import ColorBy
-from mlsm_manager.surface_map.export.errors import ExportError
 from mlsm_manager.surface_map.export.octomap import write_octree
-from mlsm_manager.surface_map.export.raster_files import write_ascii_grid, write_geotiff, write_map_server
-from mlsm_manager.surface_map.export.rasters import elevation, occupancy
-from mlsm_manager.surface_map.files.map_file import ENDING, Layer, StoredMap, write_map
-from mlsm_manager.surface_map.storage import write_ply
+from mlsm_manager.surface_map.export.pictures import ColorBy, write_picture
+from mlsm_manager.surface_map.export.rasters import (
+    elevation,
+    occupancy,
+    write_ascii_grid,
+    write_geotiff,
+    write_map_server,
+)
+from mlsm_manager.surface_map.map_file import ENDING, ExportError, Layer, StoredMap, write_map
+from mlsm_manager.surface_map.ply_file import write_ply
+from node_support.files import whole_file
+
+
+def write_pcd(path: Path, blocks: Blocks) -> None:
+    """Write a binary PCD, float32: x y z of each block's mean, intensity, variances, bottom, height, count and type.
+
+    Raises ExportError without Open3D, and OSError.
+    """
+    try:
+        import open3d
+    except ImportError:
+        raise ExportError("needs Open3D; install it with: apt install python3-open3d") from None
+    fields = {"intensity": blocks.mean[:, 3], "bottom": blocks.bottom, "height": blocks.height}
+    fields.update(
+        {f"variance_{axis}": blocks.variance[:, index] for index, axis in enumerate(("x", "y", "z", "intensity"))}
+    )
+    columns = {name: column.astype(np.float32) for name, column in fields.items()}
+    columns.update(count=blocks.count.astype(np.uint32), type=blocks.type.astype(np.uint8))
+    cloud = open3d.t.geometry.PointCloud()
+    cloud.point["positions"] = open3d.core.Tensor(blocks.mean[:, :3].astype(np.float32))
+    for name, column in columns.items():
+        cloud.point[name] = open3d.core.Tensor(np.ascontiguousarray(column[:, np.newaxis]))
+    # Open3D tells the format by the ending, which the temporary file does not have.
+    with whole_file(path) as temporary:
+        named = temporary.with_name(temporary.name + path.suffix)
+        try:
+            if not open3d.t.io.write_point_cloud(str(named), cloud, write_ascii=False):
+                raise ExportError(f"{path}: Open3D could not write it")
+            named.replace(temporary)
+        finally:
+            if named.exists():
+                named.unlink()
 
 
 @dataclass(frozen=True)
@@ -24,13 +59,6 @@ class ExportOptions:
     low: float = -np.inf
     high: float = np.inf
     color_by: ColorBy = ColorBy.HEIGHT
-
-
-def _write_png(path: Path, blocks: Blocks, free: Blocks, options: ExportOptions) -> None:
-    # matplotlib takes half a second and 40 MB: only who draws a picture shall pay for it.
-    from mlsm_manager.surface_map.export.picture import write_picture
-
-    write_picture(path, blocks, free, options.color_by)
 
 
 _Writer = Callable[[Path, Blocks, Blocks, ExportOptions], None]
@@ -44,7 +72,7 @@ _WRITERS: Dict[str, _Writer] = {
     ),
     ".tif": lambda path, blocks, free, options: write_geotiff(path, elevation(blocks)),
     ".asc": lambda path, blocks, free, options: write_ascii_grid(path, elevation(blocks)),
-    ".png": _write_png,
+    ".png": lambda path, blocks, free, options: write_picture(path, blocks, free, options.color_by),
 }
 ENDINGS = (*_WRITERS, ENDING)
 

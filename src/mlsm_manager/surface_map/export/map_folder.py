@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Optional
 
 from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
-from mlsm_manager.surface_map.files.errors import MapFileError
-from mlsm_manager.surface_map.files.map_file import ENDING, StoredMap, read_map
+from mlsm_manager.surface_map.map_file import ENDING, MapFileError, StoredMap, read_map
 from node_support.files import ros_path
 
 

@@ -6,7 +6,7 @@ from typing import Any, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.export.errors import ExportError
+from mlsm_manager.surface_map.map_file import ExportError
 from node_support.files import whole_file
 
 _HIT, _MISS = 0.85, -0.4

@@ -1,15 +1,28 @@
-"""Maps as rasters: one value for each cell of the box around them."""
+"""Maps as rasters, one value for each cell of the box around them, and the files that hold rasters."""
 
 from dataclasses import dataclass
+from io import BytesIO
+from pathlib import Path
+from typing import Any
 
 import numpy as np
+import yaml
 
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.export.errors import ExportError
+from mlsm_manager.surface_map.map_file import ExportError
+from node_support.files import write_whole
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
 _MOST_CELLS = 400_000_000
 """A raster of more would take gigabytes: one point far off, at 0.01 m, asks for that; `map_tool crop` helps."""
+_GREY = {FREE: 254, UNKNOWN: 205, OCCUPIED: 0}
+"""What map_server (trinary mode) takes for free, unknown and occupied given `_THRESHOLDS`."""
+_THRESHOLDS = {"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196}
+_NO_DATA = -9999.0
+_PIXEL_SCALE, _TIE_POINT, _GEO_KEYS, _GDAL_NO_DATA = 33550, 33922, 34735, 42113
+_DOUBLE, _SHORT, _ASCII = 12, 3, 2
+_LOCAL_GRID = (1, 1, 0, 2, 1024, 0, 1, 32767, 1025, 0, 1, 1)
+"""GeoTIFF 1.0: version; model type user-defined, for the map's frame is tied to no place; a pixel is an area."""
 
 
 @dataclass(frozen=True)
@@ -68,3 +81,53 @@ class _Box:
     def places(self, blocks: Blocks) -> tuple:
         cells = blocks.cells - self.low
         return cells[:, 1], cells[:, 0]
+
+
+def write_map_server(path: Path, grid: Raster) -> None:
+    """Write an occupancy raster as PATH.pgm and PATH.yaml, which map_server loads; raises OSError."""
+    grey = np.full(grid.values.shape, _GREY[UNKNOWN], dtype=np.uint8)
+    for value, shade in _GREY.items():
+        grey[grid.values == value] = shade
+    rows, columns = grey.shape
+    write_whole(path, f"P5\n{columns} {rows}\n255\n".encode("ascii") + grey[::-1].tobytes())
+    origin = [float(grid.origin[0]), float(grid.origin[1]), 0.0]
+    words = {"image": path.name, "resolution": float(grid.resolution), "origin": origin, **_THRESHOLDS}
+    write_whole(path.with_suffix(".yaml"), yaml.safe_dump(words, sort_keys=False).encode())
+
+
+def write_ascii_grid(path: Path, raster: Raster) -> None:
+    """Write a raster as an ESRI ASCII grid; NaN becomes its NODATA_value. Raises OSError."""
+    rows, columns = raster.values.shape
+    lines = [
+        f"ncols {columns}",
+        f"nrows {rows}",
+        f"xllcorner {raster.origin[0]:.10g}",
+        f"yllcorner {raster.origin[1]:.10g}",
+        f"cellsize {raster.resolution:.10g}",
+        f"NODATA_value {_NO_DATA:g}",
+    ]
+    text = BytesIO()
+    np.savetxt(text, np.where(np.isnan(raster.values), _NO_DATA, raster.values)[::-1], fmt="%.4f")
+    write_whole(path, "\n".join(lines).encode("ascii") + b"\n" + text.getvalue())
+
+
+def write_geotiff(path: Path, raster: Raster) -> None:
+    """Write a raster as a GeoTIFF of float32 in a local grid, metres, with NaN for no data; raises OSError."""
+    # Pillow is for this format only: a mapping node shall not wait for it.
+    from PIL import Image
+    from PIL.TiffImagePlugin import ImageFileDirectory_v2
+
+    tags = ImageFileDirectory_v2()
+    upper = raster.origin[1] + raster.values.shape[0] * raster.resolution
+    _set(tags, _PIXEL_SCALE, _DOUBLE, (raster.resolution, raster.resolution, 0.0))
+    _set(tags, _TIE_POINT, _DOUBLE, (0.0, 0.0, 0.0, float(raster.origin[0]), float(upper), 0.0))
+    _set(tags, _GEO_KEYS, _SHORT, _LOCAL_GRID)
+    _set(tags, _GDAL_NO_DATA, _ASCII, "nan")
+    data = BytesIO()
+    Image.fromarray(raster.values[::-1].astype(np.float32)).save(data, format="TIFF", tiffinfo=tags)
+    write_whole(path, data.getvalue())
+
+
+def _set(tags: Any, tag: int, kind: int, value: object) -> None:
+    tags[tag] = value
+    tags.tagtype[tag] = kind

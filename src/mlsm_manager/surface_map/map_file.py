@@ -13,11 +13,19 @@ from typing import Any, Dict, Mapping
 
 import numpy as np
 
+from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.cell_index import cell_keys
-from mlsm_manager.surface_map.files.array_file import ArrayFileError, decoded, encoded
-from mlsm_manager.surface_map.files.errors import MapFileError
 from node_support.files import write_whole
+
+
+class MapFileError(ValueError):
+    """A file is no map that can be read, or must not be written; the text is one line and names the path."""
+
+
+class ExportError(ValueError):
+    """The map cannot be written in that format; the text is one line and says what to do."""
+
 
 ENDING = ".mlsm"
 _STEPS = 65535

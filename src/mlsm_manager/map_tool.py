@@ -1,5 +1,6 @@
-"""What the commands of map_tool do."""
+"""map_tool: looks at, exports, crops, merges and compares maps."""
 
+import argparse
 import os
 import sys
 import time
@@ -9,16 +10,16 @@ from typing import Callable, Dict, List
 
 import numpy as np
 
-from mlsm_manager.map_tool.arguments import map_tool_arguments
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.export.colors import ColorBy
-from mlsm_manager.surface_map.export.formats import ExportOptions, export
-from mlsm_manager.surface_map.export.window import has_screen, show
-from mlsm_manager.surface_map.files.map_file import Layer, StoredMap, read_map
-from mlsm_manager.surface_map.operations.compare import cropped, difference
-from mlsm_manager.surface_map.operations.merge import merged
-from mlsm_manager.surface_map.operations.move import LevelTransform
-from mlsm_manager.surface_map.storage import read_ply
+from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
+from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
+from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
+from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged
+from mlsm_manager.surface_map.ply_file import read_ply
+from node_support.help import CommandLine
+
+_MAPS = "a map (.mlsm, or a .ply of this package)"
+_OUT = f"file to write, ending with one of {' '.join(ENDINGS)}"
 
 
 def run_map_tool() -> None:
@@ -126,3 +127,63 @@ def _diff(options: Namespace) -> List[str]:
 _COMMANDS: Dict[str, Callable[[Namespace], List[str]]] = {
     "info": _info, "view": _view, "export": _export, "crop": _crop, "merge": _merge, "diff": _diff
 }  # fmt: skip
+
+
+def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
+    """Return `command` and what it needs; exits on a bad command line."""
+    parser = CommandLine("map_tool", description="Look at, export, crop, merge and compare maps.")
+    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands.required = True
+    info = commands.add_parser("info", help="say what maps hold")
+    info.add_argument("maps", type=Path, nargs="+", metavar="FILE", help=_MAPS)
+    view = commands.add_parser("view", help="show a map in a window; without a screen write a picture")
+    _add_map(view)
+    _add_colors(view)
+    _add_export(commands.add_parser("export", help="write a map in another format"))
+    _add_crop(commands.add_parser("crop", help="keep what lies in a box"))
+    _add_merge(commands.add_parser("merge", help="make one map of two"))
+    _add_two_maps(commands.add_parser("diff", help="say what only one of two maps has"))
+    return parser.parse_args(arguments)
+
+
+def _add_export(parser: argparse.ArgumentParser) -> None:
+    _add_map(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    parser.add_argument(
+        "--slice", type=float, nargs=2, default=(float("-inf"), float("inf")), metavar=("LOW", "HIGH"),
+        help="heights between which a .pgm shows what is occupied [m] (default: all)",
+    )  # fmt: skip
+    _add_colors(parser)
+
+
+def _add_crop(parser: argparse.ArgumentParser) -> None:
+    _add_map(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    for option, corner in (("--low", "lower"), ("--high", "upper")):
+        parser.add_argument(
+            option, type=float, nargs="+", required=True, metavar=("X", "Y"),
+            help=f"the box's {corner} corner, X Y or X Y Z [m]",
+        )  # fmt: skip
+
+
+def _add_merge(parser: argparse.ArgumentParser) -> None:
+    _add_two_maps(parser)
+    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    parser.add_argument(
+        "--transform", type=float, nargs=4, default=(0.0, 0.0, 0.0, 0.0), metavar=("X", "Y", "Z", "YAW"),
+        help="where the second map's origin lies in the first [m, deg] (default: at its origin)",
+    )  # fmt: skip
+
+
+def _add_map(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("map", type=Path, metavar="MAP", help=_MAPS)
+
+
+def _add_two_maps(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("first", type=Path, metavar="FIRST", help=_MAPS)
+    parser.add_argument("second", type=Path, metavar="SECOND", help=_MAPS)
+
+
+def _add_colors(parser: argparse.ArgumentParser) -> None:
+    names = [by.value.lower() for by in ColorBy]
+    parser.add_argument("--color", choices=names, default="height", help="what blocks are coloured by")

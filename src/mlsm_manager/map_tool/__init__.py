@@ -1,1 +1,0 @@
-"""map_tool: looks at, exports, crops, merges and compares maps."""

@@ -1,1 +1,0 @@
-"""What is done with whole maps: moving, merging, cropping, comparing."""
