@@ -32,8 +32,7 @@ from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
 from sonar_processing.cloud import Cloud, CloudSink
-from sonar_processing.ros.cloud_topics import subscribe_to_clouds
-from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.ros.cloud_topics import report_broken, subscribe_to_clouds
 from sonar_processing.ros.pipeline import Pipeline
 
 _Z_DOWN_ADVICE = (
@@ -73,20 +72,9 @@ class MlsmCore:
     def as_node(cls) -> "MlsmCore":
         """Return the map as a node of its own, which takes clouds and echoes from their topics."""
         core = cls()
-        core.subscribe()
+        subscribe_to_clouds(topics.CLEANED, core.insert, core.health)
+        subscribe_to_clouds(topics.ECHOES, core.match, core.health)
         return core
-
-    def subscribe(self) -> None:
-        """Take clouds from sonar/scan/cleaned and scans of echoes from sonar/scan/echoes."""
-
-        def take(message: StampedIntensityCloudArrays) -> None:
-            self.insert(cloud_from_message(message))
-
-        def take_echoes(message: StampedIntensityCloudArrays) -> None:
-            self.match(cloud_from_message(message))
-
-        subscribe_to_clouds(topics.CLEANED, guarded(self.health, take))
-        subscribe_to_clouds(topics.ECHOES, guarded(self.health, take_echoes))
 
     def insert(self, cloud: Cloud) -> None:
         """Insert a cloud; one that cannot be placed in the map is counted and left out."""
@@ -109,9 +97,7 @@ class MlsmCore:
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
         self._check_header(cloud)
-        if cloud.broken:
-            kind, detail = "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud"
-            self.health.problem(kind, detail, cloud.broken)
+        report_broken(cloud, self.health)
         if parameters.match_input is MatchInput.CLEANED and cloud.frame_id != parameters.map_frame:
             guarded(self.health, self._match)(cloud)
         if parameters.map_input is MapInput.CLEANED:

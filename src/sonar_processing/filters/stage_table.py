@@ -26,7 +26,6 @@ class StageType:
 
     parameters: Type[ParameterSet]
     build: Callable[[ParameterSet], Stage]
-    config_name: str
     input_topic: str
     output_topic: str
     when_empty: str
@@ -42,24 +41,22 @@ STAGES: Dict[str, StageType] = {
     "thresholder": StageType(
         ThresholderParameters,
         Thresholder,
-        "Thresholder",
         topics.SCANS,
         topics.THRESHOLDED,
-        "lower what makes its mode's threshold (otsu_multiplier in OTSU+PROPORTIONAL), or raise the sonar's gain",
+        "lower otsu_multiplier (mode OTSU+PROPORTIONAL), fixed_threshold (FIXED) or max_proportion (PROPORTIONAL), or "
+        "raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),
     "outlier_remover": StageType(
         OutlierRemoverParameters,
         OutlierRemover,
-        "OutlierRemover",
         topics.THRESHOLDED,
         topics.CLEANED,
-        "lower min_neighbors in RADIUS, raise stddev_multiplier in STATISTICAL, or set mode to NONE",
+        "raise stddev_multiplier (mode STATISTICAL), lower min_neighbors (RADIUS), or set mode to NONE",
     ),
     "echo_extractor": StageType(
         EchoExtractorParameters,
         EchoExtractor,
-        "EchoExtractor",
         topics.POLAR_SCANS,
         topics.ECHOES,
         "lower min_contrast or min_height, or raise the sonar's gain",
@@ -74,12 +71,12 @@ class EmptiedScans:
     def __init__(self) -> None:
         self._in_a_row = 0
 
-    def take(self, points_in: int, points_out: int) -> Optional[int]:
-        """Note a scan; return how many in a row lost all their points at every tenth of them, None otherwise.
+    def take(self, points_in: int, points_out: int) -> bool:
+        """Note a scan; return whether it is the last of `SCANS_IN_A_ROW` in a row that lost all their points.
 
         A scan that comes without points says nothing about the stage and is not counted.
         """
-        if points_in == 0:
-            return None
+        if not points_in:
+            return False
         self._in_a_row = 0 if points_out else self._in_a_row + 1
-        return self._in_a_row if self._in_a_row and self._in_a_row % SCANS_IN_A_ROW == 0 else None
+        return self._in_a_row > 0 and self._in_a_row % SCANS_IN_A_ROW == 0

@@ -29,34 +29,17 @@ class ThresholderParameters(ParameterSet):
 
     mode: ThresholdMode = parameter(ThresholdMode.OTSU_PROPORTIONAL, "how the threshold is chosen", thesis_name="mode")
     fixed_threshold: float = parameter(
-        66.0,
-        "threshold of mode FIXED",
-        unit="echo strength",
-        low=0.0,
-        high=255.0,
-        thesis_name="fixedThresholdValue",
+        66.0, "threshold of mode FIXED", unit="echo strength", low=0.0, high=255.0, thesis_name="fixedThresholdValue"
     )
     otsu_multiplier: float = parameter(
-        1.4,
-        "factor on Otsu's threshold in OTSU+PROPORTIONAL",
-        low=0.0,
-        high=10.0,
-        thesis_name="OTSUMultiplier",
+        1.4, "factor on Otsu's threshold in OTSU+PROPORTIONAL", low=0.0, high=10.0, thesis_name="OTSUMultiplier"
     )
     otsu_nonzero: bool = parameter(True, "give Otsu only the strengths above zero")
     max_proportion: float = parameter(
-        0.5,
-        "share of the strongest echo in PROPORTIONAL",
-        low=0.0,
-        high=1.0,
-        thesis_name="maxThresholdProportion",
+        0.5, "share of the strongest echo in PROPORTIONAL", low=0.0, high=1.0, thesis_name="maxThresholdProportion"
     )
     min_proportion: float = parameter(
-        0.5,
-        "share of the weakest echo in PROPORTIONAL",
-        low=0.0,
-        high=1.0,
-        thesis_name="minThresholdProportion",
+        0.5, "share of the weakest echo in PROPORTIONAL", low=0.0, high=1.0, thesis_name="minThresholdProportion"
     )
     min_threshold: float = parameter(
         0.0,

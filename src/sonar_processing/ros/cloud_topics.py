@@ -7,8 +7,14 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float32
 
 from node_support.health import Health
+from node_support.ros.callbacks import guarded
 from sonar_processing.cloud import Cloud
-from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_to_message, points_to_message
+from sonar_processing.ros.conversions import (
+    StampedIntensityCloudArrays,
+    cloud_from_message,
+    cloud_to_message,
+    points_to_message,
+)
 
 QUEUE_SIZE = 10  # a reader that is ten scans late should not get them all
 _CLOUD_BUFFER_BYTES = 2**24  # a cloud of a million points; rospy reads one that is larger in pieces, slowly
@@ -74,13 +80,20 @@ class FigurePublisher:
             self._publisher.publish(Float32(data=value))
 
 
-def subscribe_to_clouds(topic: str, callback: Callable[[StampedIntensityCloudArrays], None]) -> rospy.Subscriber:
-    """Subscribe to StampedIntensityCloud, with a buffer that holds whole clouds."""
+def subscribe_to_clouds(topic: str, take: Callable[[Cloud], None], health: Health) -> rospy.Subscriber:
+    """Call back with every StampedIntensityCloud on `topic` that can be used; others are counted in `health`."""
     return rospy.Subscriber(
         topic,
         StampedIntensityCloudArrays,
-        callback,
+        guarded(health, lambda message: take(cloud_from_message(message))),
         queue_size=QUEUE_SIZE,
         buff_size=_CLOUD_BUFFER_BYTES,
         tcp_nodelay=True,
     )
+
+
+def report_broken(cloud: Cloud, health: Health) -> None:
+    """Count the points of a cloud that are not finite although no stage removed them."""
+    if cloud.broken:
+        detail = f"{cloud.broken} of {len(cloud)} in a cloud; check the publisher"
+        health.problem("points that are not finite", detail, cloud.broken)

@@ -73,12 +73,7 @@ def points_from_message(message: PointCloud2) -> np.ndarray:
     if [offsets[name] for name in POINT_FIELDS] == [0, 4, 8, 12] and step == 16:
         return np.frombuffer(message.data, dtype=np.float32).reshape(-1, 4)
     row = np.dtype(
-        {
-            "names": POINT_FIELDS,
-            "formats": ["<f4"] * 4,
-            "offsets": [offsets[n] for n in POINT_FIELDS],
-            "itemsize": step,
-        }
+        {"names": POINT_FIELDS, "formats": ["<f4"] * 4, "offsets": [offsets[n] for n in POINT_FIELDS], "itemsize": step}
     )
     rows = np.frombuffer(message.data, dtype=row)
     return np.column_stack([rows[name] for name in POINT_FIELDS])

@@ -17,8 +17,7 @@ from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import TfBuffer, stamp_of
 from sonar_processing.cloud import Cloud
-from sonar_processing.ros.cloud_topics import PointsPublisher, subscribe_to_clouds
-from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.ros.cloud_topics import PointsPublisher, report_broken, subscribe_to_clouds
 from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
@@ -92,11 +91,7 @@ class ShapeDetectorNode(ABC):
     def as_node(cls) -> "ShapeDetectorNode":
         """Return the detector as a node of its own, which takes clouds from its input topic."""
         detector = cls()
-
-        def take(message: StampedIntensityCloudArrays) -> None:
-            detector.process(cloud_from_message(message))
-
-        subscribe_to_clouds(cls.input_topic, guarded(detector.health, take))
+        subscribe_to_clouds(cls.input_topic, detector.process, detector.health)
         return detector
 
     @property
@@ -117,10 +112,7 @@ class ShapeDetectorNode(ABC):
         """Detect the shapes of a scan and publish them. Raises RefusedInput for a scan that cannot be used."""
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
-        if cloud.broken:
-            self.health.problem(
-                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
-            )
+        report_broken(cloud, self.health)
         self._places.check_stamp(cloud.stamp_ns)
         with self.health.timed():
             shapes, coefficients, markers = self._detect(cloud)

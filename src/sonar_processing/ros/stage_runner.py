@@ -7,13 +7,12 @@ import numpy as np
 from node_support.errors import RefusedInput
 from node_support.help import answer_help
 from node_support.parameters import ParameterSet
-from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.stage_table import STAGES, EmptiedScans
-from sonar_processing.ros.cloud_topics import CloudPublisher, FigurePublisher, subscribe_to_clouds
-from sonar_processing.ros.conversions import StampedIntensityCloudArrays, cloud_from_message
+from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
+from sonar_processing.ros.cloud_topics import CloudPublisher, FigurePublisher, report_broken, subscribe_to_clouds
 
 
 class StageRunner:
@@ -26,7 +25,7 @@ class StageRunner:
         self._type = STAGES[name]
         self._emptied = EmptiedScans()
         self._live = ReconfigurableParameters(
-            self._type.parameters, namespace, self._type.config_name, self.health, self._use_parameters
+            self._type.parameters, namespace, name.title().replace("_", ""), self.health, self._use_parameters
         )
         self._publisher = CloudPublisher(self._type.output_topic)
         self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self._type.figures]
@@ -53,11 +52,7 @@ class StageRunner:
     def as_node(cls, name: str) -> "StageRunner":
         """Return the stage `name` as a node of its own, which takes clouds from its input topic."""
         runner = cls(name, "~")
-
-        def take(message: StampedIntensityCloudArrays) -> None:
-            runner.process(cloud_from_message(message))
-
-        subscribe_to_clouds(runner._type.input_topic, guarded(runner.health, take))
+        subscribe_to_clouds(runner._type.input_topic, runner.process, runner.health)
         return runner
 
     def process(self, cloud: Cloud) -> Optional[Cloud]:
@@ -71,10 +66,7 @@ class StageRunner:
         except RefusedInput as refused:
             self.health.problem(refused.kind, str(refused))
             return None
-        if cloud.broken:
-            self.health.problem(
-                "points that are not finite", f"{cloud.broken} of {len(cloud)} in a cloud", cloud.broken
-            )
+        report_broken(cloud, self.health)
         self._count_out(cloud, result)
         self._publisher.publish(result)
         for figure in self._figures:
@@ -85,11 +77,8 @@ class StageRunner:
         points = int(np.count_nonzero(result.valid))
         self.health.count("clouds out")
         self.health.count("points out", points)
-        emptied = self._emptied.take(int(np.count_nonzero(cloud.valid)), points)
-        if emptied:
-            self.health.problem(
-                "rows of scans left without a point", f"{emptied} scans in a row; {self._type.when_empty}"
-            )
+        if self._emptied.take(int(np.count_nonzero(cloud.valid)), points):
+            self.health.problem("scans in a row lost all points", self._type.when_empty, SCANS_IN_A_ROW)
 
 
 def run_stage(name: str) -> None:

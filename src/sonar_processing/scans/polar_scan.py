@@ -67,6 +67,12 @@ class PolarScan:
         heights = self.origins[:, 2:] + self.directions[:, 2:] * self.ranges
         return kept_bins(self.ranges, heights, parameters.min_range, parameters.height_limit)
 
+    def from_newest(self, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
+        """Return (n, 3) m: the bins `bins` (n,) of `beams` (n,), seen from the sonar's pose at its newest beam."""
+        points = np.ones((beams.size, 4))
+        points[:, :3] = self.origins[beams] + self.directions[beams] * self.ranges[bins, np.newaxis]
+        return (points @ np.linalg.inv(self.T_target_sonar[-1]).T)[:, :3]
+
     def cloud(self, parameters: SonarToCloudParameters) -> Cloud:
         """Return the organised cloud of all bins in the target frame: rows are beams, removed bins are NaN."""
         beams, bins = self.strengths.shape
@@ -126,7 +132,9 @@ def planar_laser_scan(scan: PolarScan, parameters: SonarToCloudParameters) -> Pl
     A turn takes seconds and the vehicle moves meanwhile. Each beam's echo is therefore placed by the beam's own pose,
     and seen from the newest one; of several echoes in one ray the nearest stays. Beams may come in any direction.
     """
-    echoes, strengths = _echoes_from_newest_pose(scan, parameters)
+    picked, found = picked_bins(scan.strengths, scan.kept(parameters), parameters)
+    beams = np.flatnonzero(found)
+    echoes, strengths = scan.from_newest(beams, picked[beams]), scan.strengths[beams, picked[beams]]
     rays = parameters.laser_scan_rays or usual_rays(scan.angles)
     ranges = np.hypot(echoes[:, 0], echoes[:, 1])
     range_max = scan.strengths.shape[1] * scan.range_resolution
@@ -147,16 +155,6 @@ def usual_rays(angles: np.ndarray) -> int:
     return round(FULL_TURN / float(np.median(steps))) if steps.size else 1
 
 
-def _echoes_from_newest_pose(scan: PolarScan, parameters: SonarToCloudParameters) -> Tuple[np.ndarray, np.ndarray]:
-    bins, found = picked_bins(scan.strengths, scan.kept(parameters), parameters)
-    beams = np.flatnonzero(found)
-    bins = bins[beams]
-    points = np.ones((beams.size, 4))
-    points[:, :3] = scan.origins[beams] + scan.directions[beams] * scan.ranges[bins, np.newaxis]
-    T_newest_target = np.linalg.inv(scan.T_target_sonar[-1])
-    return (points @ T_newest_target.T)[:, :3], scan.strengths[beams, bins].astype(np.float32)
-
-
 def turn_cloud(scan: PolarScan, parameters: SonarToCloudParameters) -> np.ndarray:
     """Return (n, 5) float32, the columns `TURN_FIELDS`: all kept bins, seen from the newest beam's pose.
 
@@ -164,9 +162,6 @@ def turn_cloud(scan: PolarScan, parameters: SonarToCloudParameters) -> np.ndarra
     s after the newest beam, and so never above 0.
     """
     beams, bins = np.nonzero(scan.kept(parameters))
-    points = np.ones((beams.size, 4))
-    points[:, :3] = scan.origins[beams] + scan.directions[beams] * scan.ranges[bins, np.newaxis]
-    T_newest_target = np.linalg.inv(scan.T_target_sonar[-1])
     seconds = np.abs(scan.time_stamps)
-    columns = [(points @ T_newest_target.T)[:, :3], scan.strengths[beams, bins], (seconds - seconds[-1])[beams]]
+    columns = [scan.from_newest(beams, bins), scan.strengths[beams, bins], (seconds - seconds[-1])[beams]]
     return np.column_stack(columns).astype(np.float32)

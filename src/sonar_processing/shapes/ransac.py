@@ -20,12 +20,7 @@ class RansacParameters(StampParameters):
     """What the searches for lines and for circles share."""
 
     distance: float = parameter(
-        0.5,
-        "an echo this near to a shape belongs to it",
-        unit="m",
-        low=0.001,
-        high=100.0,
-        thesis_name="RANSACDistance",
+        0.5, "an echo this near to a shape belongs to it", unit="m", low=0.001, high=100.0, thesis_name="RANSACDistance"
     )
     probability: float = parameter(
         0.999,
