@@ -8,26 +8,13 @@ from imagenex_852_driver.protocol.command import SwitchCommand
 from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 from imagenex_852_driver.protocol.reply_parser import ParsedReply, ParserCounts, ReplyParser
 from sonar_driver.line.device import LineDevice
-from sonar_driver.line.driver_health import LineStats, Problem
+from sonar_driver.line.driver_health import LineStats
 
 _SURELY_TOO_EARLY = 0.9  # share of the expected time: too early for any realistic speed of sound
 _QUIET = 0.02  # s: a busy line counts as quiet after that; USB adapters pass bytes on in pieces up to 16 ms apart
 _LONGEST_DRAIN = 0.2  # s: the longest wait for that
 _UNEXPECTED = "a reply came late or twice"
 _EARLY = "a reply came before the sound can have returned"
-PROBLEMS = {
-    "timeouts": Problem("timeouts", "no reply; check the head's power, the cable, baud_rate and head_id"),
-    "bad_frames": Problem("bad frames", "a broken reply; check the cable"),
-    "unexpected_replies": Problem("unexpected replies", "a reply came late or twice and was dropped"),
-    "early_replies": Problem(
-        "early replies",
-        "a reply came before the sound can have returned and was dropped; check speed_of_sound, baud_rate and whether "
-        "another head is on the line",
-    ),
-    "overruns": Problem("overruns", "the head lost characters of a command"),
-    "rejected_switches": Problem("rejected switches", "the head did not accept the switches of a command"),
-}
-"""Counts that should stay zero."""
 
 
 @dataclass(frozen=True)
@@ -43,6 +30,15 @@ class DeviceStats(LineStats):
     overruns: int = 0
     rejected_switches: int = 0
     parser: ParserCounts = field(default_factory=ParserCounts)
+    problems = {  # noqa: RUF012
+        "timeouts": "no reply; check the head's power, the cable, baud_rate and head_id",
+        "bad_frames": "a broken reply; check the cable",
+        "unexpected_replies": "a reply came late or twice and was dropped",
+        "early_replies": "a reply came before the sound can have returned and was dropped; check speed_of_sound, "
+        "baud_rate and whether another head is on the line",
+        "overruns": "the head lost characters of a command; check the cable",
+        "rejected_switches": "the head did not accept the switches of a command",
+    }
 
 
 class ReplyWait:
@@ -155,19 +151,19 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         self._drain()
         stamp = self._clock() + self._timing.ping_leaves()
         wait = ReplyWait(command, self.connection, self.elapsed())
-        self._recorder.count("pings")
+        self._count("pings")
         try:
             self._port.write(command.encode())
             self._collect(wait)
         except BaseException:
-            self._recorder.count("interrupted")
+            self._count("interrupted")
             raise
         finally:
-            self._recorder.note(parser=self._parser.counts)
+            self._note(parser=self._parser.counts)
         if wait.early_replies:
-            self._recorder.count("early_replies", _EARLY, wait.early_replies)
+            self._count("early_replies", _EARLY, wait.early_replies)
         if wait.unexpected_replies:
-            self._recorder.count("unexpected_replies", _UNEXPECTED, wait.unexpected_replies)
+            self._count("unexpected_replies", _UNEXPECTED, wait.unexpected_replies)
         return self._judge(wait, stamp)
 
     def _collect(self, wait: ReplyWait) -> None:
@@ -189,11 +185,11 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         if wait.reply is not None:
             return self._accept(wait, stamp)
         if self.stop.is_set():
-            self._recorder.count("interrupted")
+            self._count("interrupted")
         elif wait.answered:
-            self._recorder.count("bad_frames", f"bad reply: {wait.answer_bytes} bytes, no whole reply")
+            self._count("bad_frames", f"bad reply: {wait.answer_bytes} bytes, no whole reply")
         else:
-            self._recorder.count("timeouts", f"no reply within {wait.patience:.2f} s")
+            self._count("timeouts", f"no reply within {wait.patience:.2f} s")
             self._await_late_reply()
         return None
 
@@ -201,13 +197,13 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         reply = wait.reply
         mismatch = wait.mismatch()
         if mismatch:
-            self._recorder.count("bad_frames", mismatch)
+            self._count("bad_frames", mismatch)
             return None
-        self._recorder.count("replies")
+        self._count("replies")
         if reply.overrun:
-            self._recorder.count("overruns", "the head lost characters of a command")
+            self._count("overruns", "the head lost characters of a command")
         if not reply.switches_accepted:
-            self._recorder.count("rejected_switches", "the head did not accept the switches of a command")
+            self._count("rejected_switches", "the head did not accept the switches of a command")
         return Ping(stamp, wait.command, reply)
 
     def _await_late_reply(self) -> None:
@@ -232,7 +228,7 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
     def _unexpected(self, data: bytes) -> int:
         found = len(self._parser.feed(data))
         if found:
-            self._recorder.count("unexpected_replies", _UNEXPECTED, found)
+            self._count("unexpected_replies", _UNEXPECTED, found)
         return found
 
     def _waiting(self) -> Iterator[bytes]:

@@ -3,7 +3,7 @@
 from typing import Optional
 
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
-from imagenex_852_driver.line.device import PROBLEMS, Ping, SonarDevice
+from imagenex_852_driver.line.device import Ping, SonarDevice
 from imagenex_852_driver.line.parameters import DriverParameters
 from imagenex_852_driver.protocol.reply import Reply, head_angle
 from node_support.ros.node import run
@@ -17,7 +17,7 @@ from underwater_map_construction.msg import SonarScanLine
 
 def run_driver() -> None:
     """Run the driver."""
-    model = SonarModel("imagenex_852_driver", "Imagenex852", DriverParameters, PROBLEMS, SonarDevice, _ping_message)
+    model = SonarModel("imagenex_852_driver", "Imagenex852", DriverParameters, SonarDevice, _ping_message)
     run(model.name, lambda: DriverNode(model))
 
 

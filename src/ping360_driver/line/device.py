@@ -17,18 +17,10 @@ from ping360_driver.protocol.scan_command import (
     motor_off,
 )
 from sonar_driver.line.device import LineDevice
-from sonar_driver.line.driver_health import LineStats, Problem
+from sonar_driver.line.driver_health import LineStats
 from sonar_driver.line.parameters import LineParameters
 from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port
 
-PROBLEMS = {
-    "timeouts": Problem("timeouts", "no reply; check the head's power and the cable"),
-    "bad_frames": Problem("bad frames", "a broken message; check the cable, lower baud_rate"),
-    "unexpected_replies": Problem("unexpected replies", "a reply came late or twice and was dropped"),
-    "refusals": Problem("refusals", "the head did not accept a command"),
-    "missing_beams": Problem("missing beams", "the head scanned on, but not every beam arrived"),
-}
-"""Counts that should stay zero."""
 _GREETINGS = 3
 _ANSWER_TIME = 0.3  # s: a head at rest answers within a few milliseconds; one that scans, between two beams
 
@@ -46,6 +38,13 @@ class Ping360Stats(LineStats):
     firmware: str = ""
     mode: str = ScanMode.AUTO_TRANSMIT.value
     pulse: PulseSettings = field(default_factory=PulseSettings)
+    problems = {  # noqa: RUF012
+        "timeouts": "no reply; check the head's power and the cable",
+        "bad_frames": "a broken message; check the cable, lower baud_rate",
+        "unexpected_replies": "a reply came late or twice and was dropped",
+        "refusals": "the head did not accept a command",
+        "missing_beams": "the head scanned on, but not every beam arrived; check the cable, lower baud_rate",
+    }
 
     def details(self) -> Dict[str, str]:
         """Return what else /diagnostics shows: firmware, who turns the head, and the pulse as the head reports it."""
@@ -91,7 +90,7 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         has_scanned = self._auto is not None and self._auto.has_scanned
         self._auto = AutoScan(self._line, self.connection, self._baud_rate, self._is_serial, has_scanned)
         self._requests = RequestScan(self._line, self.connection, self._baud_rate)
-        self._recorder.note(firmware=".".join(str(number) for number in self._information.firmware))
+        self._note(firmware=".".join(str(number) for number in self._information.firmware))
 
     def _who_is_there(self) -> DeviceInformation:
         for _ in range(_GREETINGS):
@@ -128,10 +127,12 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
             outcome.interrupt()
             raise
         finally:
-            self._count(outcome)
+            for name, number in outcome.counts().items():
+                if number:
+                    self._count(name, outcome.error, number)
         if outcome.beam is None:
             return None
-        self._recorder.note(pulse=outcome.beam.pulse)
+        self._note(pulse=outcome.beam.pulse)
         return Ping(self._clock() - (self.elapsed() - outcome.pinged), outcome.beam)
 
     def _scan(self, command: ScanCommand) -> Union[AutoScan, RequestScan]:
@@ -140,10 +141,5 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
             self._auto.end()
         mode = ScanMode.AUTO_TRANSMIT if by_itself else ScanMode.REQUEST
         if mode.value != self.stats.mode:
-            self._recorder.note(mode=mode.value)
+            self._note(mode=mode.value)
         return self._auto if by_itself else self._requests
-
-    def _count(self, outcome: Outcome) -> None:
-        for name, number in outcome.counts().items():
-            if number:
-                self._recorder.count(name, outcome.error, number)

@@ -4,7 +4,7 @@ from typing import Optional
 
 from node_support.ros.node import run
 from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
-from ping360_driver.line.device import PROBLEMS, Ping, Ping360Device
+from ping360_driver.line.device import Ping, Ping360Device
 from ping360_driver.line.parameters import DriverParameters
 from ping360_driver.protocol.scan_command import bin_length, head_angle
 from sonar_driver.emulator.emulated_head import EchoSource
@@ -18,7 +18,7 @@ from underwater_map_construction.msg import SonarScanLine
 
 def run_driver() -> None:
     """Run the driver."""
-    model = SonarModel("ping360_driver", "Ping360", DriverParameters, PROBLEMS, Ping360Device, _message)
+    model = SonarModel("ping360_driver", "Ping360", DriverParameters, Ping360Device, _message)
     run(model.name, lambda: DriverNode(model))
 
 

@@ -4,9 +4,10 @@ import contextlib
 import threading
 import time
 from abc import ABC, abstractmethod
+from dataclasses import replace
 from typing import Callable, Generic, Optional, TypeVar
 
-from sonar_driver.line.driver_health import LineStats, StatsRecorder
+from sonar_driver.line.driver_health import LineStats
 from sonar_driver.line.parameters import LineParameters
 from sonar_driver.line.port import Port, PortError, PortUnavailableError, open_port, port_losses
 
@@ -17,7 +18,7 @@ Ping = TypeVar("Ping")
 class LineDevice(ABC, Generic[Command, Ping]):
     """Gets one ping after the other from a head; `stop` interrupts every wait within a twentieth of a second.
 
-    One thread uses it; `stats` may be read from any.
+    One thread uses it; `stats`, the counts up to the last ping, may be read from any.
     """
 
     zero = LineStats()
@@ -37,13 +38,8 @@ class LineDevice(ABC, Generic[Command, Ping]):
         self.elapsed = elapsed
         self._clock = clock
         self._opener = opener
-        self._recorder = StatsRecorder(self.zero)
+        self.stats = self.zero
         self._port: Optional[Port] = None
-
-    @property
-    def stats(self) -> LineStats:
-        """The counts up to the last ping."""
-        return self._recorder.current
 
     def open(self) -> None:
         """Open the port and greet the head; raises a PortError and remembers its text."""
@@ -53,23 +49,23 @@ class LineDevice(ABC, Generic[Command, Ping]):
             with port_losses(self.connection.port):
                 self._greet()
         except PortError as error:
-            self._recorder.note(last_error=str(error))
+            self._note(last_error=str(error))
             self.close()
             raise
-        self._recorder.count("connections")
-        self._recorder.note(connected=True)
+        self._count("connections")
+        self._note(connected=True)
 
     def close(self) -> None:
         """Take leave of the head and close the port, if it is open."""
         port, self._port = self._port, None
-        self._recorder.note(connected=False)
+        self._note(connected=False)
         if port is not None:
             for farewell in (self._take_leave, _close):
                 try:
                     with port_losses(self.connection.port):
                         farewell(port)
                 except PortUnavailableError as error:
-                    self._recorder.note(last_error=str(error))
+                    self._note(last_error=str(error))
 
     def ping(self, command: Command) -> Optional[Ping]:
         """Wait for the next ping of a head that does what `command` says.
@@ -83,13 +79,21 @@ class LineDevice(ABC, Generic[Command, Ping]):
             with port_losses(self.connection.port):
                 return self._ping(command)
         except PortUnavailableError as error:
-            self._recorder.note(last_error=str(error))
+            self._note(last_error=str(error))
             self.close()
             raise
 
     @abstractmethod
     def _ping(self, command: Command) -> Optional[Ping]:
         """Do what `ping` does, on a port that is open."""
+
+    def _count(self, name: str, error: str = "", number: int = 1) -> None:
+        """Increase a count of `stats`, and store the error if there is one."""
+        changes = {"last_error": error} if error else {}
+        self._note(**{name: getattr(self.stats, name) + number}, **changes)
+
+    def _note(self, **values: object) -> None:
+        self.stats = replace(self.stats, **values)
 
     def _greet(self) -> None:
         """Find out who is at the other end of the open port; raise a PortError if nobody is."""

@@ -2,7 +2,7 @@
 
 import time
 from dataclasses import dataclass, replace
-from typing import Callable, Dict, Generic, Mapping, NamedTuple, TypeVar
+from typing import Callable, ClassVar, Dict, Mapping
 
 from node_support.health import Health, HealthReport, Level
 
@@ -31,37 +31,12 @@ class LineStats:
         """How often a port that had been open was lost."""
         return max(0, self.connections - int(self.connected))
 
+    problems: ClassVar[Mapping[str, str]] = {}
+    """What the user should check when a count that should stay zero does not, by fields."""
+
     def details(self) -> Dict[str, str]:
         """Return what else /diagnostics shows of this sonar."""
         return {}
-
-
-Stats = TypeVar("Stats", bound=LineStats)
-
-
-class StatsRecorder(Generic[Stats]):
-    """Collects the counts; one thread writes, any thread reads `current`."""
-
-    def __init__(self, zero: Stats) -> None:
-        self.current = zero
-
-    def count(self, name: str, error: str = "", number: int = 1) -> None:
-        """Increase the count `name`, and store the error if there is one."""
-        changes = {name: getattr(self.current, name) + number}
-        if error:
-            changes["last_error"] = error
-        self.current = replace(self.current, **changes)
-
-    def note(self, **values: object) -> None:
-        """Set values as they are."""
-        self.current = replace(self.current, **values)
-
-
-class Problem(NamedTuple):
-    """A count that should stay zero: its name, and what the user should check when it does not."""
-
-    name: str
-    hint: str
 
 
 class DriverHealth(Health):
@@ -70,14 +45,12 @@ class DriverHealth(Health):
     def __init__(
         self,
         name: str,
-        problems: Mapping[str, Problem],
         warn: Callable[[str], None],
         read_stats: Callable[[], LineStats],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`problems` are those of the counts of `read_stats` that should stay zero, by their fields."""
+        """`read_stats` returns the newest counts."""
         super().__init__(name, warn, clock)
-        self._problem_table = problems
         self._read_stats = read_stats
         self._seen: Dict[str, int] = {}
 
@@ -98,8 +71,8 @@ class DriverHealth(Health):
         self.total("replies", stats.replies)
         for name, value in stats.details().items():
             self.show(name, value)
-        for field, (kind, hint) in self._problem_table.items():
-            self._note_problem(kind, hint, getattr(stats, field))
+        for field, hint in stats.problems.items():
+            self._note_problem(field.replace("_", " "), hint, getattr(stats, field))
         self._note_problem("losses of the port", stats.last_error, stats.losses)
 
     def _note_problem(self, kind: str, detail: str, total: int) -> None:

@@ -2,7 +2,7 @@
 
 import threading
 from dataclasses import dataclass
-from typing import Any, Callable, Mapping, Optional, Type
+from typing import Any, Callable, Optional, Type
 
 import rospy
 
@@ -14,7 +14,7 @@ from node_support.ros.node import StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import JointAngle
 from sonar_driver.line.device import LineDevice, Scanner
-from sonar_driver.line.driver_health import DriverHealth, LineStats, Problem
+from sonar_driver.line.driver_health import DriverHealth, LineStats
 from sonar_driver.line.port import PortError
 from underwater_map_construction.msg import SonarScanLine
 
@@ -27,15 +27,13 @@ class SonarModel:
     """What the node needs to know of one kind of sonar.
 
     name: the node's. config_name: of the .cfg file. parameters: those of line, mounting and head, with a `command`;
-    `LineParameters` and `MountingParameters` are among their bases. problems: the counts of the device that should stay
-    zero, by their fields. device: takes parameters, a stop event and a clock. message: makes the message of a ping, but
-    for its header and the angle of the servo; None if the ping holds no echoes.
+    `LineParameters` and `MountingParameters` are among their bases. device: takes parameters, a stop event and a clock.
+    message: makes the message of a ping, but for its header and the angle of the servo; None if it holds no echoes.
     """
 
     name: str
     config_name: str
     parameters: Type[ParameterSet]
-    problems: Mapping[str, Problem]
     device: Callable[[Any, threading.Event, Callable[[], float]], LineDevice]
     message: Callable[[Any, Any], Optional[SonarScanLine]]
 
@@ -50,7 +48,7 @@ class DriverNode:
         self._scanner: Optional[Scanner] = None
         self._stop = threading.Event()
         self._last_stats = LineStats()
-        self.health = DriverHealth(model.name, model.problems, lambda line: rospy.logwarn("%s", line), self._stats)
+        self.health = DriverHealth(model.name, lambda line: rospy.logwarn("%s", line), self._stats)
         self.healths = [self.health]
         self._live = ReconfigurableParameters(
             model.parameters, namespace, model.config_name, self.health, self._use_parameters

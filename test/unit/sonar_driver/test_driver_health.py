@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import pytest
 
-from imagenex_852_driver.line.device import PROBLEMS, DeviceStats
+from imagenex_852_driver.line.device import DeviceStats
 from node_support.health import Level
 from sonar_driver.line.driver_health import DriverHealth
 
@@ -14,7 +14,7 @@ class Line:
         self.stats = DeviceStats(connected=True, connections=1)
         self.warnings = []
         self.now = 100.0
-        self.health = DriverHealth("driver", PROBLEMS, self.warnings.append, lambda: self.stats, clock=lambda: self.now)
+        self.health = DriverHealth("driver", self.warnings.append, lambda: self.stats, clock=lambda: self.now)
 
     def report(self, **changes):
         """Return the report one second later, with the stats changed."""
