@@ -8,6 +8,7 @@ from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
+from mlsm_manager.joint_solver.search.places import PlaceCandidate
 from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -102,7 +103,8 @@ def test_a_canal_makes_no_loops():
 
 def test_a_loop_that_other_scans_do_not_confirm_is_none():
     def loop(scan, x):
-        return Loop(scan, 1, np.array([x, 0.0]), 0.9, 0.1, 0.5)
+        place = PlaceCandidate(np.zeros((1, 2)), np.array([x, 0.0]), fit=0.9, fit_before=0.1, elsewhere=0.5, reach=5.0)
+        return Loop(scan, 1, place)
 
     alike = [loop(30, 8.0), loop(31, 9.0), loop(33, 8.0)]
     assert agreed([*alike, loop(32, -8.0), loop(50, 8.0)]) == alike

@@ -14,7 +14,8 @@ from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.search.motion_search import searched_node
-from mlsm_manager.joint_solver.search.place_search import Whereabouts, island_place, silent_scans, whereabouts
+from mlsm_manager.joint_solver.search.place_search import island_place, place_after_silence, silent_scans
+from mlsm_manager.joint_solver.search.places import PlaceCandidate
 from mlsm_manager.joint_solver.solve.live_window import LiveWindow
 from mlsm_manager.joint_solver.solve.solved_nodes import SolvedNodes
 from mlsm_manager.joint_solver.solve.stacking import stacked, unstacked
@@ -53,7 +54,7 @@ class LiveSolver:
         self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean)
         self._start, self._known = start, known
         self.islands = Islands(np.empty(0))
-        self.search: Optional[Whereabouts] = None
+        self.search: Optional[PlaceCandidate] = None
         self._by_parts = parameters.node_search
 
     def stored(self) -> Dict[str, np.ndarray]:
@@ -201,7 +202,7 @@ class LiveSolver:
         covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         parameters = self.parameters
         if silent:
-            self.search = whereabouts(
+            self.search = place_after_silence(
                 self.log, self.odometry, self.state, self.islands, covariance, silent, parameters, self._known
             )
         if self.search is not None and self.search.is_certain and not self.islands.is_apart:
