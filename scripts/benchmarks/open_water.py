@@ -53,11 +53,7 @@ def bubbles(rng: np.random.Generator) -> np.ndarray:
     return strengths
 
 
-WATERS: Dict[str, Turn] = {
-    "silence": silence,
-    "receiver noise": speckle,
-    "noise and bubbles": bubbles,
-}
+WATERS: Dict[str, Turn] = {"silence": silence, "receiver noise": speckle, "noise and bubbles": bubbles}
 
 
 def recording(turn: Turn, scans: int, seed: int) -> Recording:

@@ -18,11 +18,7 @@ def _directions(bearings, elevations):
     return np.stack([level * np.cos(bearings), level * np.sin(bearings), np.sin(elevations)], axis=-1)
 
 
-@given(
-    st.tuples(*(st.floats(-0.9, 0.9) for _ in range(3))),
-    st.floats(-np.pi, np.pi),
-    st.floats(-1.5, 1.5),
-)
+@given(st.tuples(*(st.floats(-0.9, 0.9) for _ in range(3))), st.floats(-np.pi, np.pi), st.floats(-1.5, 1.5))
 def test_from_inside_a_room_every_ray_meets_the_wall_that_geometry_gives(place, bearing, elevation):
     origin = np.array(place) * HALF
     direction = _directions(bearing, elevation)

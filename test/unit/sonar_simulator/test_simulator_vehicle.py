@@ -72,12 +72,7 @@ def test_a_tilt_is_commanded_when_the_entries_before_it_are_done_and_takes_no_ti
 
 def test_a_vehicle_is_still_while_it_waits_and_outside_the_script_only():
     assert [SCRIPT.is_still(time) for time in (-1.0, 0.0, 1.9, 2.0, 2.5)] == [True, True, True, False, False]
-    assert [SCRIPT.is_still(SCRIPT.duration + late) for late in (-1.5, -0.5, 0.0, 9.0)] == [
-        False,
-        True,
-        True,
-        True,
-    ]
+    assert [SCRIPT.is_still(SCRIPT.duration + late) for late in (-1.5, -0.5, 0.0, 9.0)] == [False, True, True, True]
 
 
 @pytest.mark.parametrize(

@@ -38,11 +38,7 @@ def test_joined_faces_point_to_the_vertices_of_their_own_shape():
 
 @pytest.mark.parametrize(
     ("kind", "size", "volume"),
-    [
-        ("box", (2.0, 3.0, 4.0), 24.0),
-        ("cylinder", (0.5, 4.0), np.pi),
-        ("sphere", (1.0,), 4.0 * np.pi / 3.0),
-    ],
+    [("box", (2.0, 3.0, 4.0), 24.0), ("cylinder", (0.5, 4.0), np.pi), ("sphere", (1.0,), 4.0 * np.pi / 3.0)],
 )
 def test_a_primitive_is_closed_and_holds_its_volume(kind, size, volume):
     vertices, faces = Shape("s", kind, pose_matrix((1, 2, 3), (0.1, 0.2, 0.3)), size).triangles()
