@@ -14,7 +14,6 @@ from benchmarks import (
     map_bag_figures,
     map_figures,
     matching_figures,
-    processing_figures,
     shape_figures,
     simulation_figures,
 )
@@ -27,7 +26,6 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map-bag": map_bag_figures.rows,
     "matching": matching_figures.rows,
     "chain": chain_figures.rows,
-    "processing": processing_figures.rows,
     "simulation": simulation_figures.rows,
     "shapes": shape_figures.rows,
 }

@@ -1,12 +1,106 @@
-"""The matchers that figures compare, with default parameters."""
+"""The matchers that figures compare, with default parameters: ours, the thesis's, and Open3D's generalised ICP."""
 
+import time
 from enum import Enum
-from typing import Callable, Dict
+from importlib import import_module
+from typing import Any, Callable, Dict
 
-from benchmarks.gicp_matcher import GicpMatcher, GicpMatcherParameters
+import numpy as np
+
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
-from mlsm_manager.scan_matching.result import Matcher
+from mlsm_manager.scan_matching.distributions import LocalDistributions
+from mlsm_manager.scan_matching.result import Matcher, MatchResult, MatchStatus, Prior
+from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan_path import POSE
+from mlsm_manager.surface_map.blocks import BlockSource, all_of
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
+from node_support.geometry import composed, inverse, transformed, wrapped
+
+_FEWEST, _REACH, _MOST_ITERATIONS = 15, 2.0, 50  # points; m; steps, which end one that swings between two poses
+_MOST_DEVIATION, _MOST_JUMP = 0.5, 4.0  # m; standard deviations: as the other matchers reject
+_ECHO_VARIANCE = 0.1**2  # m^2, as the range resolution of 50 m in 500 bins; keeps points in their plane too
+_PLANAR = np.array([3, 4, 2])  # Of Open3D's [rotation, translation]: x, y and yaw
+_LEAST_ERROR = 1e-3  # m, of an echo that meets its block exactly, so that the covariance can be inverted
+
+
+class GicpMatcher:
+    """Generalised ICP (Segal et al. 2009) of echoes with the local distributions of the map.
+
+    It starts from the prior's pose and finds a rigid planar pose only: it neither searches nor estimates velocity.
+    """
+
+    def __init__(self) -> None:
+        """Raises ImportError without Open3D."""
+        self._open3d = import_module("open3d")
+
+    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
+        """Return where the scan was taken; see Matcher."""
+        blocks, expected = all_of(target), prior.pose(scan)
+        status, correction, covariance = MatchStatus.TOO_FEW_POINTS, prior.correction, prior.covariance[POSE, POSE]
+        start, used, error = time.perf_counter(), 0, np.inf
+        if min(len(scan), len(blocks)) >= _FEWEST:
+            # About the vehicle: turns and moves are independent there, and a map may lie far from its origin.
+            origin = np.append(expected[:2], 0.0)
+            points = transformed(composed(inverse(origin), prior.correction), scan.points)[:, :2]
+            shapes = LocalDistributions(blocks)
+            found, information = self._register(points, shapes.mean - origin[:2], shapes.covariance)
+            used, error = len(found.correspondence_set), float(found.inlier_rmse)
+        if used >= _FEWEST:
+            matrix = found.transformation
+            moved = np.array([matrix[0, 3], matrix[1, 3], np.arctan2(matrix[1, 0], matrix[0, 0])])
+            T_map_expected = composed(composed(origin, moved), inverse(origin))
+            correction = composed(T_map_expected, prior.correction)
+            covariance = np.linalg.inv(information) * max(error, _LEAST_ERROR) ** 2
+            status = _judged(composed(T_map_expected, expected) - expected, covariance, prior)
+        numbers = {"points_used": used, "error": error, "seconds": time.perf_counter() - start}
+        return _result(scan, prior, status, correction, covariance, numbers)
+
+    def _register(self, points: np.ndarray, means: np.ndarray, covariances: np.ndarray) -> tuple:
+        """Return Open3D's result and the (3, 3) information of x, y, yaw for echoes that err by 1 m."""
+        registration = self._open3d.pipelines.registration
+        source = self._cloud(points, np.tile(np.eye(2) * _ECHO_VARIANCE, (len(points), 1, 1)))
+        target = self._cloud(means, covariances)
+        limit = registration.ICPConvergenceCriteria(max_iteration=_MOST_ITERATIONS)
+        estimation = registration.TransformationEstimationForGeneralizedICP()
+        found = registration.registration_generalized_icp(source, target, _REACH, np.eye(4), estimation, limit)
+        full = registration.get_information_matrix_from_point_clouds(source, target, _REACH, found.transformation)
+        return found, np.asarray(full)[np.ix_(_PLANAR, _PLANAR)]
+
+    def _cloud(self, points: np.ndarray, covariances: np.ndarray) -> Any:
+        """Return Open3D's cloud of points (n, 2) with covariances (n, 2, 2), in the plane z = 0."""
+        utility, spatial = self._open3d.utility, np.zeros((len(points), 3, 3))
+        spatial[:, :2, :2] = covariances
+        spatial[:, 2, 2] = _ECHO_VARIANCE
+        level = np.column_stack([points, np.zeros(len(points))])
+        cloud = self._open3d.geometry.PointCloud(utility.Vector3dVector(level))
+        cloud.covariances = utility.Matrix3dVector(spatial)
+        return cloud
+
+
+def _judged(difference: np.ndarray, covariance: np.ndarray, prior: Prior) -> MatchStatus:
+    difference = np.append(difference[:2], wrapped(difference[2]))
+    jump = np.sqrt(difference @ np.linalg.solve(prior.covariance[POSE, POSE] + covariance, difference))
+    if jump > _MOST_JUMP:
+        return MatchStatus.REJECTED_JUMP
+    deviation = np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1])
+    return MatchStatus.AMBIGUOUS if deviation > _MOST_DEVIATION else MatchStatus.CONVERGED
+
+
+def _result(
+    scan: Scan, prior: Prior, status: MatchStatus, correction: np.ndarray, covariance: np.ndarray, numbers: dict
+) -> MatchResult:
+    """Return the result; besides the pose the state stays the prior's. Open3D does not tell its iterations: 0."""
+    pose, state = composed(correction, scan.reference_pose), prior.covariance.copy()
+    pose[2] = wrapped(pose[2])
+    if status is MatchStatus.CONVERGED:
+        state[POSE, :] = state[:, POSE] = 0.0
+        state[POSE, POSE] = covariance
+    beam_times = np.unique(np.append(scan.times, scan.reference_time))
+    return MatchResult(
+        status=status, pose=pose, velocity=scan.track.velocity_at(scan.reference_time) + prior.rate,
+        covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state, iterations=0,
+        beam_times=beam_times, beam_poses=composed(correction, scan.track.at(beam_times)), reason="", **numbers,
+    )  # fmt: skip
 
 
 class MatcherName(Enum):
@@ -20,5 +114,5 @@ class MatcherName(Enum):
 MATCHERS: Dict[MatcherName, Callable[[], Matcher]] = {
     MatcherName.DISTRIBUTIONS: lambda: DistributionMatcher(DistributionMatcherParameters()),
     MatcherName.THESIS: lambda: ThesisMatcher(ThesisMatcherParameters()),
-    MatcherName.GICP: lambda: GicpMatcher(GicpMatcherParameters()),
+    MatcherName.GICP: GicpMatcher,
 }

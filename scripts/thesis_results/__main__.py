@@ -24,7 +24,6 @@ SECTIONS: Tuple[Section, ...] = (
     Section("marina", "7.4", "A real marina", marina.make, marina.RECORDINGS),
     Section("compass", "7.4", "The marina with the compass alone", marina.make_compass_alone, marina.RECORDINGS),
     Section("convergence", "beyond", "From how far off a scan finds its place", accuracy.make_convergence),
-    Section("sensitivity", "beyond", "The error of a fix against rays, pulse and noise", accuracy.make_sensitivity),
     Section("consistency", "beyond", "Are the stated deviations true?", accuracy.make_consistency),
 )
 """All sections of the page, in its order; a new one is one line here."""

@@ -1,15 +1,13 @@
-"""Beyond the thesis: from how far off a scan finds its place, how the error of a fix depends on the sonar, and whether
-the stated deviations are true."""
+"""Beyond the thesis: from how far off a scan finds its place, and whether the stated deviations are true."""
 
-from dataclasses import dataclass, replace
 from itertools import product
-from typing import Dict, List, Mapping, Sequence
+from typing import Dict, List, Mapping
 
 import numpy as np
 from benchmarks.heads import mean_figures
 from benchmarks.matchers import MATCHERS, MatcherName
-from benchmarks.matching_figures import NEAR, NEAR_YAW, WIDE, Start, started, tour_map
-from benchmarks.scans import KINDS, RAYS, ScanMaker, SonarKind
+from benchmarks.matching_figures import NEAR, NEAR_YAW, WIDE, started, tour_map
+from benchmarks.scans import KINDS, ScanMaker, SonarKind
 from benchmarks.tours import simulated
 from matplotlib.axes import Axes
 from matplotlib.image import AxesImage
@@ -25,11 +23,6 @@ _BASE = KINDS[0]
 _DISTANCES = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 8.0)  # m
 _ANGLES = (2.0, 10.0, 20.0, 30.0, 45.0, 60.0)  # deg
 _STARTS = 10
-_SCANS = 30
-_OFF, _TURNED = 1.0, np.radians(5.0)
-"""How far the expectation is off, m and rad."""
-_SPREADS = (0.05, 0.15, 0.4, 1.0)  # m; 0.15 is a real pulse, 1 the thesis's model
-_NOISE = (0, 15, 30, 60, 120)  # echoes in each beam; 15 is the thesis's model
 _JOINT_KINDS = (KINDS[0], KINDS[2])
 _DRAWS = 6
 _FEWEST = 10  # runs: fewer make no distribution
@@ -91,94 +84,6 @@ def _draw_shares(axes: Axes, title: str, found: np.ndarray) -> AxesImage:
     axes.set_yticklabels([f"{angle:g}" for angle in _ANGLES])
     axes.set(xlabel="distance of the expectation, m", ylabel="angle, deg", title=title.replace("`", ""))
     return image
-
-
-@dataclass(frozen=True)
-class Found:
-    """Errors (n,) m of accepted fixes, and how many of all scans they are."""
-
-    errors: np.ndarray
-    accepted: float
-
-    @classmethod
-    def of(cls, starts: Sequence[Start]) -> "Found":
-        """Return what matches make."""
-        errors = [one.error for one in starts if one.result.accepted]
-        return cls(np.array(errors), len(errors) / len(starts))
-
-    def quantile(self, share: float) -> float:
-        """Return the error that this share of the fixes stay below, m; NaN without a fix."""
-        return float(np.quantile(self.errors, share)) if len(self.errors) else np.nan
-
-    @property
-    def cell(self) -> str:
-        """Cell of a table."""
-        if not len(self.errors):
-            return "none"
-        return f"{self.quantile(0.5):.2f} m, {self.quantile(0.95):.2f} m, {100.0 * self.accepted:.0f} %"
-
-
-def make_sensitivity(pictures: Pictures) -> str:
-    """Return the section of errors against rays, pulse and noise."""
-    by_pulse = {spread: {rays: _fixes(_kind(rays, spread)) for rays in RAYS} for spread in _SPREADS}
-    by_noise = {
-        rays: {noise: _fixes(replace(_kind(rays, _BASE.spread), noise_echoes=noise)) for noise in _NOISE}
-        for rays in (45, 500)
-    }
-    figure, (axes,) = new_figure(13.0, 4.8, 1, 2)
-    _draw_errors(axes[0], {f"pulse {spread:g} m": found for spread, found in by_pulse.items()}, "rays per beam")
-    axes[0].set(xscale="log")
-    axes[0].set_xticks(list(RAYS))
-    axes[0].set_xticklabels([str(rays) for rays in RAYS])
-    _draw_errors(axes[1], {f"{rays} rays": found for rays, found in by_noise.items()}, "noise echoes in each beam")
-    axes[1].axvline(_BASE.noise_echoes, color="#999999", linewidth=0.8)
-    return joined(
-        prose(f"""One match each of {_SCANS} scans of the basin with a map made with the same sonar (`laser_cone`),
-        from an expectation that is {_OFF:g} m and {np.degrees(_TURNED):.0f} degrees off. More rays describe a beam
-        more completely, so that small things are hit; the pulse is the standard deviation of an echo along range."""),
-        pictures.save(
-            "sensitivity",
-            figure,
-            """Error of the accepted fixes: median (points) and 95 % (upper ends). Where fewer than half of the
-            scans were accepted, the point is hollow. The grey line marks the noise of the thesis's model.""",
-        ),
-        "Median, 95 % and share of the accepted fixes:",
-        table(
-            ["rays", *(f"pulse {spread:g} m" for spread in _SPREADS)],
-            [[str(rays), *(by_pulse[spread][rays].cell for spread in _SPREADS)] for rays in RAYS],
-        ),
-        table(
-            ["noise echoes", *(f"{rays} rays" for rays in by_noise)],
-            [[str(noise), *(found[noise].cell for found in by_noise.values())] for noise in _NOISE],
-        ),
-    )
-
-
-def _kind(rays: int, spread: float) -> SonarKind:
-    """Return a sonar whose echoes the extractor is set for, as the kinds of the benchmarks are."""
-    return SonarKind(rays, spread, min(2.0 * spread, 1.0))
-
-
-def _fixes(kind: SonarKind) -> Found:
-    maker = ScanMaker("basin", kind)
-    target = tour_map(maker)
-    matcher = MATCHERS[MatcherName.DISTRIBUTIONS]()
-    return Found.of([started(maker, target, matcher, _OFF, _TURNED, seed) for seed in range(_SCANS)])
-
-
-def _draw_errors(axes: Axes, lines: Dict[str, Dict[float, Found]], what: str) -> None:
-    for name, found in lines.items():
-        places: List[float] = list(found)
-        medians, most = (np.array([one.quantile(share) for one in found.values()]) for share in (0.5, 0.95))
-        spread = np.array([np.zeros(len(medians)), most - medians])
-        bars = axes.errorbar(places, medians, spread, capsize=3.0, label=name, linewidth=1.2)
-        for place, median, one in zip(places, medians, found.values()):
-            filled = bars[0].get_color() if one.accepted >= 0.5 else "white"
-            axes.plot(place, median, "o", color=bars[0].get_color(), markerfacecolor=filled)
-    axes.set(xlabel=what, ylabel="error of the position, m")
-    axes.set_ylim(bottom=0.0)
-    axes.legend()
-    axes.grid(True, linewidth=0.4)
 
 
 def make_consistency(pictures: Pictures) -> str:

@@ -1,22 +1,19 @@
 """Open3D's generalised ICP, with which the figures of docs/results.md compare."""
 
-import sys
-
 import numpy as np
 import pytest
-from benchmarks.gicp_matcher import GicpMatcher, GicpMatcherParameters
+from benchmarks.matchers import GicpMatcher
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_scans import harbour, map_of, prior_of_pose, scan_of, still
 
 from mlsm_manager.scan_matching.result import MatchStatus
 from node_support.geometry import composed
-from node_support.parameters import ParameterError
 
 
 def match(scan, target, expected):
     pytest.importorskip("open3d")
-    return GicpMatcher(GicpMatcherParameters()).match(scan, target, prior_of_pose(scan, expected))
+    return GicpMatcher().match(scan, target, prior_of_pose(scan, expected))
 
 
 @settings(max_examples=25)
@@ -39,9 +36,3 @@ def test_too_few_points_or_a_map_out_of_reach_leave_the_prior(points, aside):
     result = match(scan_of(harbour()[:points], still()), map_of(harbour() + aside), [0.3, 0.2, 0.0])
     assert result.status is MatchStatus.TOO_FEW_POINTS
     np.testing.assert_allclose(result.pose, [0.3, 0.2, 0.0], atol=1e-9)
-
-
-def test_without_open3d_it_is_refused_with_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "open3d", None)
-    with pytest.raises(ParameterError, match="apt install python3-open3d"):
-        GicpMatcher(GicpMatcherParameters())
