@@ -5,16 +5,18 @@ import dataclasses
 import sys
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Dict, Type
+from typing import Dict, List, Type
+
+import yaml
 
 from dead_reckoning.parameters import DeadReckoningParameters
 from imagenex_852_driver.emulated_852 import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
-from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_yaml
+from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, PROFILES, OdometryKind, Setting, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table, start_up_yaml
-from node_support.parameters import ParameterSet, describe
+from node_support.parameters import EXPERT, ParameterSet, describe
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters
@@ -95,6 +97,27 @@ def generated() -> Dict[Path, str]:
     return texts
 
 
+def profile_yaml(kind: OdometryKind) -> str:
+    """Return the text of a profile's yaml file, for the launch files' argument `odometry`.
+
+    Where the odometry is made from the solver's velocities, it also says how dead_reckoning lets them fade.
+    """
+    experts = MlsmCoreParameters.expert_names()
+    lines = [f"# Written by scripts/document. The launch files load it with odometry:={kind.value.lower()}."]
+    lines += ["mlsm_core:", f"  odometry: {kind.value}"]
+    lines += [line for one in PROFILES[kind] if one.key not in experts for line in _setting(one, "  ")]
+    lines += [f"  {EXPERT}:"]
+    lines += [line for one in PROFILES[kind] if one.key in experts for line in _setting(one, "    ")]
+    if kind in COMPASS_ONLY:
+        fading = Setting("velocity_fading", profile_values(kind)["rate_time"], "s: rate_time above")
+        lines += ["dead_reckoning:", *_setting(fading, "  ")]
+    return "\n".join(lines) + "\n"
+
+
+def _setting(setting: Setting, indent: str) -> List[str]:
+    return [f"{indent}# {setting.reason}", f"{indent}{setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
+
+
 def thesis_names() -> str:
     """Return the table that pairs the parameter names of the thesis with ours."""
     lines = [
@@ -107,9 +130,10 @@ def thesis_names() -> str:
     ]
     for name, node in LIVE_NODES.items():
         for field in dataclasses.fields(node.parameters):
-            thesis_name = describe(field).thesis_name
-            if thesis_name:
-                lines.append(f"| {name} | {thesis_name} | `{field.name}` |")
+            described = describe(field)
+            here = f"{EXPERT}/{field.name}" if described.expert else field.name
+            if described.thesis_name:
+                lines.append(f"| {name} | {described.thesis_name} | `{here}` |")
     return "\n".join(lines) + "\n"
 
 

@@ -2,10 +2,11 @@
 
 import dataclasses
 from enum import Enum
-from typing import List, Mapping, Type
+from typing import List, Mapping, Tuple, Type
 
-from node_support.parameters import ParameterSet, describe
+from node_support.parameters import EXPERT, ParameterSet, describe
 
+_FOR_EXPERTS = "hardly ever changed: each with the reason for its default"
 _YAML_TYPES = {float: "float", int: "int", bool: "bool", str: "string"}
 
 
@@ -25,28 +26,44 @@ def start_up_yaml(node: str, parameters: Type[ParameterSet], groups: Mapping[str
 
 
 def yaml_keys(parameters: Type[ParameterSet], live: bool) -> List[str]:
-    """Return the lines of all keys; `live` marks those that dynamic_reconfigure may change."""
-    lines: List[str] = []
-    for field in dataclasses.fields(parameters):
-        described = describe(field)
-        mark = " *" if described.tunable and live else ""
-        thesis = f"; thesis: {described.thesis_name}" if described.thesis_name else ""
-        lines += ["", f"# {described.text}{mark}", f"#   {described.allowed(field.type)}{thesis}"]
-        lines.append(f"{field.name}: {_yaml_value(field.default)}")
+    """Return the lines of all keys, those for experts last; `live` marks those that dynamic_reconfigure may change."""
+    plain, experts = _by_audience(parameters)
+    lines = [line for field in plain for line in _yaml_key(field, live)]
+    if experts:
+        lines += ["", f"# {_FOR_EXPERTS}", f"{EXPERT}:"]
+        lines += [f"  {line}" if line else "" for field in experts for line in _yaml_key(field, live)]
     return lines
+
+
+def _yaml_key(field: dataclasses.Field, live: bool) -> List[str]:
+    described = describe(field)
+    mark = " *" if described.tunable and live else ""
+    thesis = f"; thesis: {described.thesis_name}" if described.thesis_name else ""
+    reason = [f"#   default: {described.expert}"] if described.expert else []
+    lines = ["", f"# {described.text}{mark}", f"#   {described.allowed(field.type)}{thesis}", *reason]
+    return [*lines, f"{field.name}: {_yaml_value(field.default)}"]
+
+
+def _by_audience(parameters: Type[ParameterSet]) -> Tuple[List[dataclasses.Field], List[dataclasses.Field]]:
+    """Return the fields that a user meets, and those for experts."""
+    fields = dataclasses.fields(parameters)
+    return [one for one in fields if not describe(one).expert], [one for one in fields if describe(one).expert]
 
 
 def markdown_table(parameters: Type[ParameterSet], live: bool = True) -> str:
     """Return the parameter table of a node: name, type, default, what is allowed, unit, thesis name, meaning.
 
-    `live` marks those that dynamic_reconfigure may change.
+    `live` marks those that dynamic_reconfigure may change. Those for experts come last, with a reason for the default.
     """
     rows = [
         "| parameter | type | default | allowed | unit | thesis | meaning |",
         "| --- | --- | --- | --- | --- | --- | --- |",
     ]
-    for field in dataclasses.fields(parameters):
+    plain, experts = _by_audience(parameters)
+    for field in plain + experts:
         described = describe(field)
+        name = f"{EXPERT}/{field.name}" if described.expert else field.name
+        meaning = f"{described.text}. Default: {described.expert}" if described.expert else described.text
         kind = "string" if issubclass(field.type, Enum) else _YAML_TYPES[field.type]
         allowed = described.allowed(field.type)
         unit = described.unit
@@ -54,8 +71,7 @@ def markdown_table(parameters: Type[ParameterSet], live: bool = True) -> str:
             allowed = allowed[: -len(unit) - 1]
         star = " *" if described.tunable and live else ""
         cells: List[str] = [
-            f"`{field.name}`{star}", kind, f"`{_yaml_value(field.default)}`", allowed, unit, described.thesis_name,
-            described.text,
+            f"`{name}`{star}", kind, f"`{_yaml_value(field.default)}`", allowed, unit, described.thesis_name, meaning,
         ]  # fmt: skip
         rows.append("| " + " | ".join(cells) + " |")
     return "\n".join(rows) + "\n"

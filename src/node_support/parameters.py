@@ -7,14 +7,23 @@ A stage declares its parameters once::
         radius: float = parameter(1.0, "neighbourhood of a point", unit="m", low=0.0, high=100.0)
 
 From that declaration come the start-up check, the refusal at run time and the dynamic_reconfigure description.
+
+A parameter that hardly anybody needs to change gives the reason for its default as `expert`. Yaml files and the
+parameter server hold such parameters in a mapping of their own, under the key `expert`.
 """
 
 import dataclasses
 import math
 from difflib import get_close_matches
 from enum import Enum
-from typing import Any, Callable, Dict, Mapping, Optional, Sequence, Tuple, Type, TypeVar
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar
 
+from node_support.old_keys import GONE, RENAMED
+
+EXPERT = "expert"
+"""The key under which yaml files and the parameter server hold the parameters for experts."""
+OLD_KEYS = "parameters of an older version"
+"""Begins the warning that names them."""
 _METADATA_KEY = "parameter"
 Self = TypeVar("Self", bound="ParameterSet")
 Part = TypeVar("Part", bound="ParameterSet")
@@ -35,6 +44,7 @@ class Description:
     thesis_name: str = ""
     tunable: bool = True
     may_be_empty: bool = False
+    expert: str = ""
 
     def allowed(self, kind: type) -> str:
         """Return in words which values a parameter of type `kind` takes."""
@@ -62,14 +72,15 @@ def parameter(
     thesis_name: str = "",
     tunable: bool = True,
     may_be_empty: bool = False,
+    expert: str = "",
 ) -> Any:
     """Declare one field of a `ParameterSet`.
 
     `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
     the others only at start-up; `may_be_empty` allows an empty string; `thesis_name` is the parameter's name in the
-    2015 package.
+    2015 package; `expert` is the reason for the default of a parameter that hardly anybody needs to change.
     """
-    description = Description(text, unit, low, high, thesis_name, tunable, may_be_empty)
+    description = Description(text, unit, low, high, thesis_name, tunable, may_be_empty, expert)
     return dataclasses.field(default=default, metadata={_METADATA_KEY: description})
 
 
@@ -98,11 +109,44 @@ class ParameterSet:
 
         Raises ParameterError for an unknown key or a value that is not allowed.
         """
+        return cls(**cls.by_name(values)[0])
+
+    @classmethod
+    def by_name(cls, values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
+        """Return plain values by the names of the parameters, and a remark on each key of an older version.
+
+        A key beside `expert` goes before the same one under it, and an older name before the newer one: whoever gives
+        them wants something else than the default files, which hold the others. Raises ParameterError for a key that
+        never was a parameter.
+        """
         known = [field.name for field in dataclasses.fields(cls)]
-        for key in values:
-            if key not in known:
-                raise ParameterError(f"{key} = {values[key]!r}: no such parameter; {_names_like(key, known)}")
-        return cls(**values)
+        experts = values.get(EXPERT, {})
+        if not isinstance(experts, Mapping):
+            raise ParameterError(f"{EXPERT} = {experts!r}: must be keys and values")
+        given = {**experts, **{key: value for key, value in values.items() if key != EXPERT}}
+        found, remarks = {key: value for key, value in given.items() if key in known}, []
+        for key in [key for key in given if key not in known]:
+            if RENAMED.get(key) in known:
+                found[RENAMED[key]] = given[key]
+                remarks.append(f"{key} is taken as {RENAMED[key]}")
+            elif key in GONE:
+                remarks.append(f"{key} has no effect ({GONE[key]})")
+            else:
+                raise ParameterError(f"{key} = {given[key]!r}: no such parameter; {_names_like(key, known)}")
+        return found, remarks
+
+    @classmethod
+    def nested(cls, values: Mapping[str, Any]) -> Dict[str, Any]:
+        """Return values by the names of parameters as yaml files hold them: those for experts under `expert`."""
+        names = cls.expert_names()
+        plain = {key: value for key, value in values.items() if key not in names}
+        experts = {key: value for key, value in values.items() if key in names}
+        return {**plain, EXPERT: experts} if experts else plain
+
+    @classmethod
+    def expert_names(cls) -> List[str]:
+        """Return the names of the parameters for experts."""
+        return [field.name for field in dataclasses.fields(cls) if describe(field).expert]
 
     @classmethod
     def from_group(cls: Type[Self], name: str, values: Any) -> Self:

@@ -31,22 +31,26 @@ class JointSolverParameters(ParameterSet):
         0.5, "standard deviation of a point square-on to its surface: half an echo's length",
         unit="m", low=0.01, high=10.0, tunable=False,
     )  # fmt: skip
-    free_scans: int = parameter(40, "newest scans whose poses may still change", low=2, high=200, tunable=False)
+    free_scans: int = parameter(
+        40, "newest scans whose poses may still change", low=2, high=200, tunable=False,
+        expert="about ten minutes, in which most places are seen from all sides",
+    )  # fmt: skip
     normal_deviation: float = parameter(
         0.0, "standard deviation of surface normals; above 0, a straight wall gives no information about motion along "
         "it", unit="rad", low=0.0, high=1.0, tunable=False,
+        expert="0 where the odometry reports distances along walls too",
     )  # fmt: skip
     post_confidence: float = parameter(
-        0.0, "confidence that an isolated strong echo is a fixed object such as a post; 0: ignore such echoes",
-        low=0.0, high=1.0, tunable=False,
+        0.0, "confidence that an isolated strong echo is a fixed object such as a post; 0: ignore such echoes", low=0.0,
+        high=1.0, tunable=False, expert="0 where the odometry reports distances along walls too",
     )  # fmt: skip
     parts_per_turn: int = parameter(
         1, "parts into which each turn of the head is cut, each with its own speed: more where speeds change within a "
-        "turn", low=1, high=12, tunable=False,
+        "turn", low=1, high=12, tunable=False, expert="a vehicle with a known odometry needs no speeds within a turn",
     )  # fmt: skip
     scans_per_group: int = parameter(
-        5, "scans that are searched together: about as far as they see the same", low=1, high=50, tunable=False
-    )
+        5, "scans that are searched together", low=1, high=50, tunable=False, expert="about as many as see the same",
+    )  # fmt: skip
 
 
 class NodeSearch(Protocol):
@@ -89,11 +93,9 @@ class SolverParameters(JointSolverParameters):
     cut: float = parameter(2.2, "points farther apart are not compared", unit="m", low=0.1, high=50.0)
     wide_cut: float = parameter(4.0, "the cut that a new scan starts with", unit="m", low=0.1, high=50.0)
     weight: float = parameter(
-        0.1,
-        "weight of the comparison of two echoes: neighbours share errors, and an echo meets many scans",
-        low=1e-4,
+        0.1, "weight of the comparison of two echoes: neighbours share errors, and an echo meets many scans", low=1e-4,
         high=1.0,
-    )
+    )  # fmt: skip
     min_cosine: float = parameter(
         0.75, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99
     )

@@ -27,8 +27,7 @@ class JointParameters(OdometryChoice, JointSolverParameters):
         EstimatorName.SCAN_BY_SCAN,
         "JOINT: the newest scans find their poses together, none is rejected; `odometry` says what "
         "the motion is known from. SCAN_BY_SCAN: each alone, against the map of those before. THESIS: the same by the "
-        "matcher of the thesis, to compare with",
-        tunable=False,
+        "matcher of the thesis, to compare with", tunable=False,
     )  # fmt: skip
 
     def check(self) -> None:

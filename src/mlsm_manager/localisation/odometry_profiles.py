@@ -2,10 +2,9 @@
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence
+from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence
 
 import numpy as np
-import yaml
 
 from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
 from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
@@ -41,7 +40,7 @@ class OdometryKind(Enum):
     NONE = "NONE"
 
 
-_COMPASS_ONLY = (OdometryKind.HEADING, OdometryKind.HOVERING)
+COMPASS_ONLY = (OdometryKind.HEADING, OdometryKind.HOVERING)
 """Kinds whose velocities are estimated from echoes, and taken by dead_reckoning."""
 
 
@@ -53,8 +52,7 @@ class OdometryChoice(ParameterSet):
         OdometryKind.DVL,
         "what the joint solver takes from the odometry. DVL: positions that are right to some percent. THRUSTERS: "
         "positions whose scale is unknown and walks, in a current. HEADING: the heading alone; HOVERING: "
-        "also, of a vehicle that stops and strafes. NONE: nothing",
-        tunable=False,
+        "also, of a vehicle that stops and strafes. NONE: nothing", tunable=False,
     )  # fmt: skip
     odometry_scale: float = parameter(
         0.0, "true distance over reported distance, minus 1, as known beforehand", low=-0.9, high=9.0, tunable=False
@@ -63,34 +61,37 @@ class OdometryChoice(ParameterSet):
         0.0, "angle from reported to true motion, as known beforehand", unit="rad", low=-3.2, high=3.2, tunable=False
     )
     heading_time: float = parameter(
-        300.0, "how long an error of the compass lasts", unit="s", low=1.0, high=1e6, tunable=False
-    )
+        300.0, "how long an error of the compass lasts", unit="s", low=1.0, high=1e6, tunable=False,
+        expert="five minutes: iron and tilt change a compass's error that slowly",
+    )  # fmt: skip
     current_deviation: float = parameter(
         0.05, "THRUSTERS: standard deviation of the current in each direction", unit="m/s", low=0.0, high=5.0,
-        tunable=False,
+        tunable=False, expert="a current in sheltered water",
     )  # fmt: skip
     current_walk: float = parameter(
-        0.002, "THRUSTERS: random walk of the current", unit="m/s/sqrt(s)", low=0.0, high=1.0, tunable=False
-    )
+        0.002, "THRUSTERS: random walk of the current", unit="m/s/sqrt(s)", low=0.0, high=1.0, tunable=False,
+        expert="the current may change by 0.05 m/s in ten minutes",
+    )  # fmt: skip
     start_speed_deviation: float = parameter(
-        0.3,
-        "HEADING, HOVERING, NONE: standard deviation of the speed ahead when matching begins; 0.02 for a standing "
+        0.3, "HEADING, HOVERING, NONE: standard deviation of the speed ahead when matching begins; 0.02 for a standing "
         "start", unit="m/s", low=0.0, high=5.0, tunable=False,
     )  # fmt: skip
     travel_walk: float = parameter(
         0.005, "HEADING, HOVERING, NONE: random walk of the speed of travel, around which the speed ahead changes",
         unit="m/s/sqrt(s)", low=0.0, high=1.0, tunable=False,
+        expert="the speed of travel may change by 0.1 m/s in seven minutes",
     )  # fmt: skip
     slip_deviation: float = parameter(
-        0.07, "HEADING, HOVERING, NONE: standard deviation of the speed sideways",
-        unit="m/s", low=0.001, high=5.0, tunable=False,
+        0.07, "HEADING, HOVERING, NONE: standard deviation of the speed sideways", unit="m/s", low=0.001, high=5.0,
+        tunable=False, expert="vehicles go ahead; they slip in turns and in a slow current",
     )  # fmt: skip
     slip_time: float = parameter(
-        20.0, "HEADING, HOVERING, NONE: how long a speed sideways lasts", unit="s", low=1.0, high=1e5, tunable=False
-    )
+        20.0, "HEADING, HOVERING, NONE: how long a speed sideways lasts", unit="s", low=1.0, high=1e5, tunable=False,
+        expert="a turn",
+    )  # fmt: skip
     turn_rate_time: float = parameter(
-        10.0, "NONE: how long a turn rate lasts", unit="s", low=1.0, high=1e5, tunable=False
-    )
+        10.0, "NONE: how long a turn rate lasts", unit="s", low=1.0, high=1e5, tunable=False, expert="a turn",
+    )  # fmt: skip
 
     def odometry_model(self, errors: OdometryErrors) -> OdometryModel:
         """Return the model of the motion."""
@@ -98,7 +99,7 @@ class OdometryChoice(ParameterSet):
 
     def node_search(self, parts_per_turn: int) -> Optional[NodeSearch]:
         """Return what finds the nodes of parts of a turn, of which echoes alone tell; None where it is not needed."""
-        if parts_per_turn == 1 or self.odometry not in _COMPASS_ONLY:
+        if parts_per_turn == 1 or self.odometry not in COMPASS_ONLY:
             return None
         # Loaded only for vehicles that need it, because of its compiled loops.
         from mlsm_manager.hovering.particle_filter import ParticleFilter
@@ -275,25 +276,3 @@ def strafes(ahead: LiveSolver, hovering: LiveSolver) -> bool:
 def profile_values(kind: OdometryKind) -> Dict[str, Any]:
     """Return the parameters of mlsm_core that a profile sets."""
     return {"odometry": kind.value, **{setting.key: setting.value for setting in PROFILES[kind]}}
-
-
-def profile_yaml(kind: OdometryKind) -> str:
-    """Return the text of a profile's yaml file, for the launch files' argument `odometry`.
-
-    Where the odometry is made from the solver's velocities, it also says how dead_reckoning lets them fade.
-    """
-    lines = [
-        f"# Written by scripts/document. The launch files load it with odometry:={kind.value.lower()}.",
-        "mlsm_core:",
-    ]
-    lines.append(f"  odometry: {kind.value}")
-    for setting in PROFILES[kind]:
-        lines += _lines_of(setting)
-    if kind in _COMPASS_ONLY:
-        fading = Setting("velocity_fading", profile_values(kind)["rate_time"], "s: rate_time above")
-        lines += ["dead_reckoning:", *_lines_of(fading)]
-    return "\n".join(lines) + "\n"
-
-
-def _lines_of(setting: Setting) -> List[str]:
-    return [f"  # {setting.reason}", f"  {setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]

@@ -43,7 +43,7 @@ class MapParameters(ParameterSet):
     )
     map_limit: float = parameter(
         10000.0, "points farther than this from the map's origin are left out", unit="m", low=1.0, high=1e6,
-        tunable=False,
+        tunable=False, expert="farther away only a wrong tf puts points",
     )  # fmt: skip
     blend_time: float = parameter(1.0, "map -> odom moves to a new fix within this time", unit="s", low=0.0, high=60.0)
 
@@ -125,10 +125,12 @@ class MlsmNodeParameters(ParameterSet):
     size_x_meters: float = parameter(
         120.0, "extent to reserve memory for; the map grows beyond it when it must", unit="m", low=0.0, high=100000.0,
         tunable=False, thesis_name="sizeXMeters",
+        expert="the thesis's basin; reserving memory saves a pause when the map grows",
     )  # fmt: skip
     size_y_meters: float = parameter(
         50.0, "extent to reserve memory for; the map grows beyond it when it must", unit="m", low=0.0, high=100000.0,
         tunable=False, thesis_name="sizeYMeters",
+        expert="the thesis's basin; reserving memory saves a pause when the map grows",
     )  # fmt: skip
     map_frame: str = parameter("map", "frame of the map", tunable=False)
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields
 from pathlib import Path
-from typing import Any, Dict, Mapping, Type
+from typing import Any, Dict, List, Mapping, Tuple, Type
 
 import yaml
 
@@ -50,20 +50,24 @@ def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) 
         map_input=MapInput.MATCHED.value,
         start_matching=True,
     )
-    return values
+    return {name: NODES[name].nested(own) for name, own in values.items()}
 
 
-def replay_values(values: Mapping[str, Any]) -> Dict[str, Any]:
-    """Return plain keys of ReplayParameters of a mapping that may hold some of them by node, as live.yaml does.
+def replay_values(values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
+    """Return values by the names of ReplayParameters, and a remark on each key of an older version.
 
-    Keys of the live nodes that a replay does not know are left out. Raises ParameterError for what a node would refuse.
+    values: may hold some of them by node, as live.yaml does. Keys of the live nodes that a replay does not know are
+    left out. Raises ParameterError for what a node would refuse.
     """
     plain = {key: value for key, value in values.items() if key not in {*NODES, *_ONLY_LIVE}}
+    found, remarks = ReplayParameters.by_name(plain)
     for name in NODES:
         if name in values:
             NODES[name].from_group(name, values[name])
-            plain.update(_common(values[name], name))
-    return plain
+            own, told = NODES[name].by_name(values[name])
+            found.update(_common(own, name))
+            remarks += told
+    return found, remarks
 
 
 def write_live(path: Path, parameters: ReplayParameters, odom_frame: str, base_frame: str) -> None:

@@ -1,6 +1,7 @@
 """Command line of map_bag."""
 
 import argparse
+import sys
 from pathlib import Path
 from typing import Any, Dict, List
 
@@ -10,7 +11,7 @@ from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
-from node_support.parameters import ParameterError
+from node_support.parameters import OLD_KEYS, ParameterError
 from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import ReadingParameters, add_reading_arguments, request_of
 
@@ -103,9 +104,12 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
 
 
 def _values(options: argparse.Namespace) -> Dict[str, Any]:
-    """Return the parameters that were set, by their keys."""
-    values = replay_values(read_values(options.parameters)) if options.parameters else {}
-    values.update(assigned_values(options.set))
+    """Return the parameters that were set, by their names; one line on stderr names keys of an older version."""
+    values, remarks = replay_values(read_values(options.parameters) if options.parameters else {})
+    assigned, told = ReplayParameters.by_name(assigned_values(options.set))
+    values.update(assigned)
+    if remarks + told:
+        print(f"map_bag: {OLD_KEYS}: {'; '.join(remarks + told)}", file=sys.stderr)
     if options.matcher:
         values.update(estimator=_ESTIMATORS[options.matcher].value)
     if not options.calibrate:

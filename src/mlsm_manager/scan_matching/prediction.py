@@ -57,20 +57,14 @@ class OdometryErrors(ParameterSet):
     """Errors of the odometry: standard deviations and correlation times."""
 
     scale_deviation: float = parameter(
-        0.2,
-        "standard deviation of the relative error of the distances that the odometry reports",
-        low=0.0,
-        high=2.0,
+        0.2, "standard deviation of the relative error of the distances that the odometry reports", low=0.0, high=2.0,
         tunable=False,
-    )
+    )  # fmt: skip
     direction_deviation: float = parameter(
         0.05,
         "standard deviation of the error of the direction of the reported motion, as from a sensor's mounting angle",
-        unit="rad",
-        low=0.0,
-        high=1.0,
-        tunable=False,
-    )
+        unit="rad", low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
     speed_deviation: float = parameter(
         0.02, "standard deviation of an error of the speed that does not grow with it, as from a current",
         unit="m/s", low=0.0, high=5.0, tunable=False,
@@ -79,11 +73,13 @@ class OdometryErrors(ParameterSet):
         0.001, "standard deviation of the error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
     )
     rate_time: float = parameter(
-        60.0, "correlation time of the errors of speed and turn rate", unit="s", low=0.1, high=1e6, tunable=False
-    )
+        60.0, "correlation time of the errors of speed and turn rate", unit="s", low=0.1, high=1e6, tunable=False,
+        expert="a minute: a current, or the trim of a thruster, changes that slowly",
+    )  # fmt: skip
     motion_time: float = parameter(
-        3600.0, "correlation time of the errors of scale and direction", unit="s", low=0.1, high=1e9, tunable=False
-    )
+        3600.0, "correlation time of the errors of scale and direction", unit="s", low=0.1, high=1e9, tunable=False,
+        expert="an hour: a mounting angle hardly changes during a dive",
+    )  # fmt: skip
     heading_deviation: float = parameter(
         0.0, "standard deviation of a heading that comes from a compass; 0: no compass, the heading drifts",
         unit="rad", low=0.0, high=1.0, tunable=False,

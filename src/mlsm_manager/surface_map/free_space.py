@@ -141,18 +141,16 @@ class CarvingParameters(ParameterSet):
     )
     fan_core: float = parameter(
         0.19, "vertical angle of the inner part of the fan, in which a beam surely hears what is there", unit="rad",
-        low=0.0, high=3.0, tunable=False,
+        low=0.0, high=3.0, tunable=False, expert="11 deg: half of a usual fan's 22 deg, in which the beam is loud",
     )  # fmt: skip
     crossings_least: int = parameter(
-        10, "a block is removed once so many beams in a row have crossed it", low=1, high=10000
-    )
+        10, "a block is removed once so many beams in a row have crossed it", low=1, high=10000,
+        expert="one beam or two may miss a block by chance; what ten in a row cross is gone",
+    )  # fmt: skip
     crossings_per_point: float = parameter(
-        2.0,
-        f"added to crossings_least for each point of the block, at most {_MOST_POINTS} points",
-        low=0.0,
-        high=1000.0,
-        tunable=False,
-    )
+        2.0, f"added to crossings_least for each point of the block, at most {_MOST_POINTS} points", low=0.0,
+        high=1000.0, tunable=False, expert="what was heard often must be missed more often",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)

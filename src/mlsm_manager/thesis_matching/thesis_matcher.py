@@ -28,17 +28,21 @@ _FARTHEST = 1e-4  # m: an iteration that lowers the error by less is the last on
 class ThesisMatcherParameters(ParameterSet):
     """Parameters of the thesis's matcher."""
 
-    max_iterations: int = parameter(20, "THESIS: iterations at most", low=1, high=1000, thesis_name="maxIterations")
+    max_iterations: int = parameter(
+        20, "THESIS: iterations at most", low=1, high=1000, thesis_name="maxIterations",
+        expert="as in the thesis, section 6.5.6",
+    )  # fmt: skip
     error_threshold: float = parameter(
         0.3, "THESIS: greatest error of a match that is accepted", unit="m", low=0.0, high=100.0,
-        thesis_name="errorThreshold",
+        thesis_name="errorThreshold", expert="as in the thesis, section 6.5.6",
     )  # fmt: skip
     n_samples: int = parameter(
-        5, "THESIS: places searched in the direction of movement", low=0, high=100, thesis_name="nSamples"
-    )
+        5, "THESIS: places searched in the direction of movement", low=0, high=100, thesis_name="nSamples",
+        expert="as in the thesis, section 6.5.6",
+    )  # fmt: skip
     sample_step: float = parameter(
         0.1, "THESIS: distance of these places, as a share of the estimated movement", low=0.0, high=10.0,
-        thesis_name="sampleStep",
+        thesis_name="sampleStep", expert="as in the thesis, section 6.5.6",
     )  # fmt: skip
 
 

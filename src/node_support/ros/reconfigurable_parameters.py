@@ -1,30 +1,57 @@
 """Parameters of a running stage: read and validated at start-up, changed through dynamic_reconfigure."""
 
 import importlib
+from types import ModuleType
 from typing import Any, Callable, Mapping, Type, TypeVar
 
 import rospy
 from dynamic_reconfigure.server import Server
 
 from node_support.health import Health
-from node_support.parameters import ParameterError, ParameterSet
+from node_support.parameters import EXPERT, OLD_KEYS, ParameterError, ParameterSet, describe
 
 Parameters = TypeVar("Parameters", bound=ParameterSet)
 
 
-class _RefusingServer(Server):
-    """Leaves values as they were sent, so that a value out of range is refused and not bent into it."""
+class _Server(Server):
+    """Leaves values as they were sent, so that a value out of range is refused and not bent into it.
+
+    On the parameter server the values stand where a `ParameterSet` reads them: those for experts under `expert`.
+    """
+
+    def __init__(self, module: ModuleType, parameters: ParameterSet, namespace: str, request: Callable) -> None:
+        self._parameters = parameters
+        super().__init__(module, request, "" if namespace == "~" else namespace)
 
     def _clamp(self, config: dict) -> None:
         pass
+
+    def _copy_from_parameter_server(self) -> None:
+        values = self._parameters.to_mapping()
+        self.config.update({field.name: values[field.name] for field in self._parameters.tunable_fields()})
+
+    def _copy_to_parameter_server(self) -> None:
+        for field in self._parameters.tunable_fields():
+            place = f"{EXPERT}/{field.name}" if describe(field).expert else field.name
+            rospy.set_param(self.ns + place, self.config[field.name])
 
 
 def read_parameters(parameters: Type[Parameters], namespace: str) -> Parameters:
     """Return what the parameter server holds in `namespace` ("~", or a resolved name).
 
-    Raises ParameterError for an unknown key or a value that is not allowed.
+    One warning names keys of older versions and those outside of `expert` that belong there. The parameter server then
+    holds them where they belong. Raises ParameterError for an unknown key or a value that is not allowed.
     """
-    return parameters.from_mapping(rospy.get_param(namespace, {}) or {})
+    given = rospy.get_param(namespace, {}) or {}
+    values, remarks = parameters.by_name(given)
+    outside = [key for key in parameters.expert_names() if key in given]
+    if outside:
+        remarks.append(f"under {EXPERT} belong {', '.join(outside)}, whose values go before those that stand there")
+    found = parameters(**values)
+    if remarks:
+        rospy.logwarn("%s: %s: %s", rospy.resolve_name(namespace), OLD_KEYS, "; ".join(remarks))
+        rospy.set_param(namespace, parameters.nested(values))
+    return found
 
 
 class ReconfigurableParameters:
@@ -48,7 +75,7 @@ class ReconfigurableParameters:
         self._health = health
         on_change(self.current)
         module = importlib.import_module(f"underwater_map_construction.cfg.{config_name}Config")
-        self._server = _RefusingServer(module, self._request, "" if namespace == "~" else namespace)
+        self._server = _Server(module, self.current, namespace, self._request)
 
     def change(self, changes: Mapping[str, Any]) -> None:
         """Change tunable parameters as dynamic_reconfigure would; raises ParameterError for what is not allowed."""

@@ -91,20 +91,30 @@ def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     parameters = ReplayParameters(**values)
     live = yaml.safe_load(live_text(parameters, odom_frame, base_frame))
     for name, own in live.items():
-        NODES[name].from_mapping({**default_values(name), **own})
-    assert ReplayParameters.from_mapping(replay_values(live)) == parameters
+        both = {**default_values(name), **own}
+        NODES[name].from_mapping(
+            {**both, "expert": {**default_values(name).get("expert", {}), **own.get("expert", {})}}
+        )
+    assert ReplayParameters.from_mapping(replay_values(live)[0]) == parameters
 
 
 def test_map_bag_takes_it_back(written):
-    assert ReplayParameters.from_mapping(replay_values(yaml.safe_load(written.read_text()))) == USED
+    assert ReplayParameters.from_mapping(replay_values(yaml.safe_load(written.read_text()))[0]) == USED
 
 
-def test_plain_keys_stay_as_they_are():
-    assert replay_values({"min_points": 20, "no_such": 1}) == {"min_points": 20, "no_such": 1}
+def test_plain_keys_stay_as_they_are_and_those_for_experts_may_stand_under_a_key_of_their_own():
+    assert replay_values({"min_points": 20, "expert": {"free_scans": 30}}) == ({"min_points": 20, "free_scans": 30}, [])
+
+
+def test_a_file_of_an_older_version_is_taken_and_its_keys_are_named():
+    old = {"mlsm_core": {"solver_kernel": "NUMPY", "matcher": "DISTRIBUTIONS", "free_scans": 30, "min_points": 20}}
+    values, remarks = replay_values(old)
+    assert values == {"free_scans": 30, "min_points": 20}
+    assert [remark.split(" (")[0] for remark in remarks] == ["solver_kernel has no effect", "matcher has no effect"]
 
 
 def test_what_only_the_live_node_knows_is_left_out():
-    assert replay_values({"sonar_to_cloud": {"scan_size": 200, "beam_width": 0.1}}) == {}
+    assert replay_values({"sonar_to_cloud": {"scan_size": 200, "beam_width": 0.1}}) == ({}, [])
 
 
 @pytest.mark.parametrize("group", [{"sonar_delay": 99.0}, {"no_such": 1}, [1]])
@@ -132,7 +142,9 @@ LAUNCHES = [
 def test_launch_files_load_it_over_the_nodes_own(launch, written):
     found = launched(*launch, f"parameters:={written}")
     for node, values in live_values(USED, "dead_reckoning", "hull").items():
-        assert {key: found[f"/{node}/{key}"] for key in values} == values
+        plain = {key: value for key, value in values.items() if key != "expert"}
+        given = {**plain, **{f"expert/{key}": value for key, value in values.get("expert", {}).items()}}
+        assert {key: found[f"/{node}/{key}"] for key in given} == given
     assert found["/sonar_to_cloud/scan_size"] == 120
 
 

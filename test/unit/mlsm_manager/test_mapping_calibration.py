@@ -21,7 +21,7 @@ def test_it_is_told_by_name_with_its_deviation():
 def test_live_yaml_holds_it_on_top_of_what_was_set_before():
     before = ReplayParameters(range_scale=0.9, sonar_delay=0.25)
     text = live_text(FOUND.applied(before), "odom", "base_link")
-    after = ReplayParameters.from_mapping(replay_values(yaml.safe_load(text)))
+    after = ReplayParameters.from_mapping(replay_values(yaml.safe_load(text))[0])
     assert (after.range_scale, after.sonar_delay) == (pytest.approx(0.918), pytest.approx(0.75))
     assert (after.range_scale_deviation, after.sonar_delay_deviation) == (0.008, 0.05)
     assert (after.odometry_scale, after.odometry_direction) == (0.01, -0.07)

@@ -1,9 +1,15 @@
 """What mlsm_core's parameters allow together."""
 
+from dataclasses import fields
+
 import pytest
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.parameters import ParameterError
+
+
+def test_a_user_meets_no_more_parameters_than_fit_on_a_page():
+    assert len(fields(MlsmCoreParameters)) - len(MlsmCoreParameters.expert_names()) <= 40
 
 
 def test_the_default_reserves_the_thesis_basin():

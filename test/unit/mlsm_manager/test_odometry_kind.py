@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 import yaml
+from document import profile_yaml
 
 from dead_reckoning.parameters import DeadReckoningParameters
-from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, profile_values, profile_yaml
+from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.live_file import replay_values
@@ -40,7 +41,7 @@ def test_what_changes_tells_the_odometry(reported, kind):
 def test_every_profile_is_allowed_live_and_on_recordings(kind):
     live = yaml.safe_load(profile_yaml(kind))
     assert MlsmCoreParameters.from_mapping(live["mlsm_core"]).odometry is kind
-    assert with_odometry(ReplayParameters(), kind, ()) == ReplayParameters.from_mapping(replay_values(live))
+    assert with_odometry(ReplayParameters(), kind, ()) == ReplayParameters.from_mapping(replay_values(live)[0])
 
 
 @pytest.mark.parametrize("kind", list(OdometryKind))

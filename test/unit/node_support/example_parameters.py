@@ -22,6 +22,7 @@ class ExampleParameters(ParameterSet):
     fast: bool = parameter(False, "whether fast")
     frame: str = parameter("odom", "which frame", tunable=False)
     color: Color = parameter(Color.RED, "which color")
+    step: float = parameter(0.1, "how fine", low=0.0, expert="a tenth is fine enough")
     inner: float = parameter(0.5, "not more than radius", unit="m", low=0.0)
 
     def check(self):

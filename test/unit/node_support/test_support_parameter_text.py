@@ -13,7 +13,7 @@ def text():
 
 
 def test_the_default_yaml_is_yaml_that_makes_the_defaults(text):
-    assert yaml.safe_load(text) == ExampleParameters().to_mapping()
+    assert yaml.safe_load(text) == ExampleParameters.nested(ExampleParameters().to_mapping())
     assert ExampleParameters.from_mapping(yaml.safe_load(text)) == ExampleParameters()
 
 
@@ -23,6 +23,19 @@ def test_every_key_comes_after_its_meaning_what_is_allowed_and_its_thesis_name(t
 
 def test_keys_that_only_the_start_can_set_have_no_star(text):
     assert '# which frame\n#   a non-empty string\nframe: "odom"\n' in text
+
+
+def test_what_is_for_experts_stands_under_a_key_of_its_own_with_the_reason_for_its_default(text):
+    assert text.endswith(
+        "expert:\n\n  # how fine *\n  #   a number from 0\n  #   default: a tenth is fine enough\n  step: 0.1\n"
+    )
+
+
+def test_the_table_names_what_is_for_experts_last():
+    row = markdown_table(ExampleParameters).splitlines()[-1]
+    assert row == (
+        "| `expert/step` * | float | `0.1` | a number from 0 |  |  | how fine. Default: a tenth is fine enough |"
+    )
 
 
 def test_choices_are_named(text):

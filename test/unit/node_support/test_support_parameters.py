@@ -8,6 +8,7 @@ from example_parameters import Color, ExampleParameters
 from hypothesis import given
 from hypothesis import strategies as st
 
+from node_support import parameters as parameters_module
 from node_support.parameters import ParameterError, describe, with_defaults
 
 RADIUS = "must be a number from 0 to 10 m"
@@ -49,8 +50,37 @@ def test_a_bad_value_is_refused_with_key_value_and_what_is_allowed(values, text)
 def test_an_unknown_key_is_refused_with_the_one_it_resembles_and_all_there_are():
     with pytest.raises(ParameterError) as refused:
         ExampleParameters.from_mapping({"raduis": 2.0})
-    text = "raduis = 2.0: no such parameter; did you mean radius? there are radius, count, fast, frame, color, inner"
+    text = (
+        "raduis = 2.0: no such parameter; did you mean radius? there are radius, count, fast, frame, color, step, inner"
+    )
     assert str(refused.value) == text
+
+
+def test_what_is_for_experts_is_taken_from_its_own_key_and_beside_it_which_goes_before():
+    assert ExampleParameters.from_mapping({"expert": {"step": 0.2}}).step == 0.2
+    assert ExampleParameters.from_mapping({"step": 0.3, "expert": {"step": 0.2}}).step == 0.3
+
+
+@pytest.mark.parametrize(
+    ("experts", "text"), [({"raduis": 2.0}, "did you mean radius?"), (1, "must be keys and values")]
+)
+def test_a_wrong_key_for_experts_is_refused(experts, text):
+    with pytest.raises(ParameterError, match=text):
+        ExampleParameters.from_mapping({"expert": experts})
+
+
+def test_plain_values_are_nested_as_they_are_taken():
+    nested = ExampleParameters.nested({"step": 0.2, "count": 7})
+    assert nested == {"count": 7, "expert": {"step": 0.2}}
+    assert ExampleParameters.by_name(nested) == ({"step": 0.2, "count": 7}, [])
+
+
+def test_keys_of_older_versions_are_taken_over_or_left_out_and_named(monkeypatch):
+    monkeypatch.setitem(parameters_module.RENAMED, "reach", "radius")
+    monkeypatch.setitem(parameters_module.GONE, "engine", "there is one engine")
+    values, remarks = ExampleParameters.by_name({"radius": 1.0, "reach": 2.0, "engine": "steam"})
+    assert values == {"radius": 2.0}
+    assert remarks == ["reach is taken as radius", "engine has no effect (there is one engine)"]
 
 
 def test_values_that_do_not_fit_together_are_refused():
@@ -112,7 +142,7 @@ def test_plain_values_make_the_same_set_again(radius, count, fast, frame, color)
 
 def test_tunable_fields_leave_out_what_only_the_start_can_set():
     names = [field.name for field in ExampleParameters.tunable_fields()]
-    assert names == ["radius", "count", "fast", "color", "inner"]
+    assert names == ["radius", "count", "fast", "color", "step", "inner"]
 
 
 @dataclasses.dataclass(frozen=True)

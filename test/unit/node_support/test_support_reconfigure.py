@@ -17,7 +17,7 @@ def described(monkeypatch):
 
 
 def test_every_tunable_field_is_there_and_no_other(described):
-    assert list(described) == ["radius", "count", "fast", "color", "inner"]
+    assert list(described) == ["radius", "count", "fast", "color", "step", "inner"]
 
 
 @pytest.mark.parametrize(
