@@ -42,23 +42,28 @@ class DeadReckoningParameters(StampParameters):
         tunable=False,
     )
     velocity_timeout: float = parameter(
-        120.0, "the vehicle counts as still when its velocity is older: an estimate is of little use after some scans",
-        unit="s", low=0.1, high=3600.0,
-    )  # fmt: skip
+        120.0, "the vehicle is taken as still when its estimate is older", unit="s", low=0.1, high=3600.0
+    )
     velocity_fading: float = parameter(
-        40.0, "an estimate that is not followed by another one in time falls to a third within this time, as long as "
-        "the profile `heading` lets a change of speed last",
-        unit="s", low=0.1, high=3600.0,
-    )  # fmt: skip
+        40.0,
+        "an estimate falls to a third within this time once the next one is overdue; as long as the profile `heading` "
+        "takes a change of speed to last",
+        unit="s",
+        low=0.1,
+        high=3600.0,
+    )
     command_timeout: float = parameter(
-        1.0, "the same for commands, which drivers of thrusters repeat several times a second",
-        unit="s", low=0.05, high=3600.0,
-    )  # fmt: skip
+        1.0,
+        "the vehicle is taken as still when its command is older; drivers repeat commands several times a second",
+        unit="s",
+        low=0.05,
+        high=3600.0,
+    )
     heading_type: HeadingType = parameter(
         HeadingType.IMU,
         "messages on the topic imu: IMU (sensor_msgs/Imu with an orientation), COMPASS_DEGREES or COMPASS_RADIANS "
-        "(std_msgs/Float64, clockwise from north, as MAVROS's compass_hdg); the latter have no stamp, no tilt and no "
-        "frame: the vehicle counts as level, the compass as aligned with it",
+        "(std_msgs/Float64, clockwise from north, as MAVROS's compass_hdg); with a compass the vehicle "
+        "counts as level and the compass as aligned with it",
         tunable=False,
     )
     longest_gap: float = parameter(2.0, "warn when no heading comes for longer", unit="s", low=0.01, high=3600.0)

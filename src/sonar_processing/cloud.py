@@ -35,7 +35,7 @@ class Cloud:
         if points != stamps:
             raise RefusedInput("clouds refused", f"{points} points but {stamps} time stamps; check the publisher")
         if self.height < 1 or points % self.height:
-            raise RefusedInput("clouds refused", f"{points} points do not fill {self.height} rows")
+            raise RefusedInput("clouds refused", f"{points} points do not fill {self.height} rows; check the publisher")
 
     def __len__(self) -> int:
         return len(self.points)

@@ -40,13 +40,15 @@ class Beam:
         if not 1 <= bins <= MAX_BINS:
             raise RefusedInput("beams refused", f"{bins} bins, must be 1 to {MAX_BINS}; check the driver")
         if not (math.isfinite(self.range_resolution) and self.range_resolution > 0.0):
-            raise RefusedInput("beams refused", f"range_resolution {self.range_resolution}, must be above 0 m")
+            raise RefusedInput(
+                "beams refused", f"range_resolution {self.range_resolution}, must be above 0 m; check the driver"
+            )
         if bins * self.range_resolution > FARTHEST_RANGE:
             reach = f"{bins} bins of {self.range_resolution:g} m reach {bins * self.range_resolution:g} m"
             raise RefusedInput("beams refused", f"{reach}, must be at most {FARTHEST_RANGE:g} m; check the driver")
         if not (math.isfinite(self.angle) and math.isfinite(self.sensor_angle)):
             angles = f"head at {self.angle} rad, servo at {self.sensor_angle} rad"
-            raise RefusedInput("beams refused", f"{angles}, must be finite")
+            raise RefusedInput("beams refused", f"{angles}, must be finite; check the driver")
         if not self.frame_id:
             raise RefusedInput("beams refused", "frame_id is empty; set the driver's frame")
 

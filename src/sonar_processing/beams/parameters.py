@@ -25,22 +25,27 @@ class MountingParameters(ParameterSet):
     """The sonar's pose in a frame of the vehicle, used where tf does not know the frame of the beams."""
 
     mounted_in: str = parameter(
-        "", "frame of the vehicle in which mount_* place the sonar where tf does not know it; empty: tf must know it",
+        "", "frame of the vehicle that mount_* refer to, used where tf does not know the sonar; empty: tf must know it",
         tunable=False, may_be_empty=True,
     )  # fmt: skip
     mount_x: float = parameter(
-        0.0, "sonar ahead of that frame's origin", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False
+        0.0,
+        "how far the sonar is ahead of the origin of mounted_in",
+        unit="m",
+        low=-_FARTHEST,
+        high=_FARTHEST,
+        tunable=False,
     )
     mount_y: float = parameter(
-        0.0, "sonar to the left of it", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False
+        0.0, "how far it is to the left", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False
     )  # fmt: skip
-    mount_z: float = parameter(0.0, "sonar above it", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False)
+    mount_z: float = parameter(0.0, "how far it is above", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False)
     mount_yaw: float = parameter(
-        0.0, "where +x of the sonar points, counter-clockwise from the vehicle's bow", unit="rad",
+        0.0, "direction of the sonar's +x, counter-clockwise from the bow", unit="rad",
         low=-2.0 * math.pi, high=2.0 * math.pi, tunable=False,
     )  # fmt: skip
     upside_down: bool = parameter(
-        False, "the head hangs the other way up, so that it turns the other way round", tunable=False
+        False, "the sonar hangs upside down, so that its head turns the other way round", tunable=False
     )
 
     def matrix(self) -> np.ndarray:

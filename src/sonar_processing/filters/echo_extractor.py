@@ -50,11 +50,12 @@ class EchoExtractorParameters(ParameterSet):
         high=10.0,
     )
     ring_quantile: float = parameter(
-        0.4, "share of directions weaker than the ring: 0.3 among walls, 0.5 in open water; 0 for sectors",
+        0.4, "quantile over the directions that makes the ring of floor echoes: 0.3 among walls, 0.5 in open water; "
+        "0: no ring, for sectors",
         low=0.0, high=0.9,
     )  # fmt: skip
     min_contrast: float = parameter(
-        8.0, "least height of an echo above the ring, in spreads of the ring; 15 in open water",
+        8.0, "least height of an echo above the ring, as a multiple of the ring's spread; 15 in open water",
         low=0.0, high=100.0,
     )  # fmt: skip
     min_height: float = parameter(

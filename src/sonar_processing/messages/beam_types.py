@@ -88,7 +88,9 @@ class BeamFields:
 def sonar_scan_line(message: Any) -> List[BeamFields]:
     """Read a SonarScanLine; raises RefusedInput when its range is not positive."""
     if not message.maxrange_meters > 0.0:
-        raise RefusedInput("beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m")
+        raise RefusedInput(
+            "beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m; check the driver"
+        )
     return [
         BeamFields(
             stamp_ns(message.header),
@@ -137,9 +139,8 @@ def laser_scan(message: Any) -> List[BeamFields]:
     Rays are timed as `time_increment` says. A ray without a range becomes a beam without echoes.
     """
     if not (message.range_max > 0.0 and np.isfinite([message.range_max, message.time_increment]).all()):
-        raise RefusedInput(
-            "beams refused", f"range_max {message.range_max} m, time_increment {message.time_increment} s"
-        )
+        given = f"range_max {message.range_max} m, time_increment {message.time_increment} s"
+        raise RefusedInput("beams refused", f"{given}; must be finite, range_max above 0")
     ranges = np.asarray(message.ranges, dtype=np.float64)
     if ranges.size > _MOST_RAYS:
         raise RefusedInput("beams refused", f"{ranges.size} rays, must be at most {_MOST_RAYS}; check the driver")

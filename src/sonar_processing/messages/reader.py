@@ -44,12 +44,12 @@ class BeamMessageParameters(ParameterSet):
 
     angle_unit: AngleUnitChoice = parameter(
         AngleUnitChoice.TYPE,
-        "unit of the head's angle; TYPE: as documented for the type of the messages, gradians told by their values",
+        "unit of the head's angle; TYPE: as documented for the message type, or gradians where the values show them",
         tunable=False,
     )
     head_turns: HeadTurns = parameter(
         HeadTurns.TYPE,
-        "which way the head's angle grows, seen from the tip of +z; TYPE: as documented for the type of the messages",
+        "which way the head's angle grows, seen from the tip of +z; TYPE: as documented for the message type",
         tunable=False,
     )
 

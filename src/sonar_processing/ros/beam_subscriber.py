@@ -107,7 +107,9 @@ class BeamSubscriber:
         if kind == LASER_SCAN and reading.notes:
             rospy.logwarn("%s: %s", self._health.name, _topics_instead())
         if reading.refused:
-            self._health.problem("beams refused", f"{reading.refused} rays of a {kind}", reading.refused)
+            self._health.problem(
+                "beams refused", f"rays of a {kind} that make no beam; check the driver", reading.refused
+            )
         if reading.unit_changed:
             self._health.problem("changes of the unit of angles", "the unfinished scan is forgotten; set angle_unit")
             self._on_new_unit()

@@ -60,14 +60,16 @@ def points_from_message(message: PointCloud2) -> np.ndarray:
     offsets = {f.name: f.offset for f in message.fields if f.datatype == PointField.FLOAT32 and f.count <= 1}
     missing = [name for name in POINT_FIELDS if name not in offsets]
     if missing:
-        raise RefusedInput("clouds refused", f"no float32 field {', '.join(missing)}")
+        raise RefusedInput("clouds refused", f"no float32 field {', '.join(missing)}; check the publisher")
     count, step = message.width * message.height, message.point_step
     if (
         message.is_bigendian
         or step < max(offsets[name] for name in POINT_FIELDS) + 4
         or len(message.data) != count * step
     ):
-        raise RefusedInput("clouds refused", f"{len(message.data)} bytes for {count} points of {step} bytes")
+        raise RefusedInput(
+            "clouds refused", f"{len(message.data)} bytes for {count} points of {step} bytes; check the publisher"
+        )
     if count == 0:
         return np.zeros((0, len(POINT_FIELDS)), dtype=np.float32)
     if [offsets[name] for name in POINT_FIELDS] == [0, 4, 8, 12] and step == 16:

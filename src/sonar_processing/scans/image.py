@@ -25,7 +25,9 @@ class SonarImageParameters(BeamMessageParameters):
     metres_per_pixel: float = parameter(
         0.0, f"size of a pixel; 0: the range fits into {_USUAL_PIXELS} pixels", unit="m", low=0.0, high=10.0
     )
-    beam_width: float = beam_width_parameter("least width at which a beam is drawn; wider where the head's steps are")
+    beam_width: float = beam_width_parameter(
+        "least width at which a beam is drawn; where the head's steps are wider, theirs"
+    )
     max_rate: float = parameter(20.0, "most images per second", unit="1/s", low=0.1, high=1000.0)
 
 
@@ -95,7 +97,8 @@ def _canvas(bins: int, range_resolution: float, metres_per_pixel: float) -> _Can
     side = 2 * half + 1
     if side > MOST_PIXELS:
         raise RefusedInput(
-            "images refused", f"{side} pixels in a row at metres_per_pixel {size:g} and a range of {reach:g} m"
+            "images refused",
+            f"{side} pixels in a row, must be at most {MOST_PIXELS}; raise metres_per_pixel, {size:g} at {reach:g} m",
         )
     up, left = np.mgrid[half : -half - 1 : -1, half : -half - 1 : -1]
     bin_shown = (np.hypot(up, left) * (size / range_resolution)).astype(np.int64).ravel()

@@ -24,7 +24,7 @@ class MovingState:
         """Take a velocity, m/s and rad/s. Raises RefusedInput when it is not finite; then the last one stays."""
         speed, turn_rate = _length(linear), _length(angular)
         if not (math.isfinite(speed) and math.isfinite(turn_rate)):
-            raise RefusedInput("velocities refused", f"{tuple(linear)} m/s, {tuple(angular)} rad/s")
+            raise RefusedInput("velocities refused", f"{tuple(linear)} m/s, {tuple(angular)} rad/s, must be finite")
         self._speed, self._turn_rate = speed, turn_rate
         self._heard, self._since_ns = True, None
 

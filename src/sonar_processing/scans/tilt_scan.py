@@ -33,7 +33,7 @@ class SonarControlParameters(BeamMessageParameters):
     highest_deg: float = parameter(
         60.0, "last tilt of a sweep, before the servo goes back", unit="deg", low=-180.0, high=180.0
     )
-    step_deg: float = parameter(5.0, "from scan to scan", unit="deg", low=0.1, high=180.0)
+    step_deg: float = parameter(5.0, "change of tilt from scan to scan", unit="deg", low=0.1, high=180.0)
     horizontal_deg: float = parameter(0.0, "tilt in HORIZONTAL", unit="deg", low=-180.0, high=180.0)
     tolerance_deg: float = parameter(
         1.0, "largest distance from the goal at which the servo has arrived", unit="deg", low=0.01, high=30.0

@@ -46,12 +46,12 @@ class CircleDetectorParameters(RansacParameters):
     """Parameters of circle_detector."""
 
     n_circles: int = parameter(10, "circles looked for in a scan, at most", low=1, high=100)
-    min_radius: float = parameter(0.2, "of a circle", unit="m", low=0.01, high=100.0)
-    max_radius: float = parameter(0.6, "of a circle", unit="m", low=0.01, high=100.0)
+    min_radius: float = parameter(0.2, "smallest radius of a circle", unit="m", low=0.01, high=100.0)
+    max_radius: float = parameter(0.6, "largest radius of a circle", unit="m", low=0.01, high=100.0)
     min_inliers: int = parameter(2, "echoes that make a circle, each of another beam", low=2, high=10000)
     clearance: float = parameter(
         0.7,
-        "a circle stands at least this far from all other echoes, or it is a piece of a wall",
+        "least distance of a circle from all other echoes; what is nearer is taken for a piece of a wall",
         unit="m",
         low=0.0,
         high=100.0,
@@ -65,14 +65,14 @@ class CircleDetectorParameters(RansacParameters):
     )
     max_residual: float = parameter(
         0.2,
-        "root mean square difference of a circle's ranges from the measured ones, at most",
+        "largest root mean square difference between a circle's ranges and the measured ones",
         unit="m",
         low=0.0,
         high=100.0,
     )
     max_footprint: float = parameter(
         1.65,
-        "two neighbouring beams cover at most this much where they hear a circle, or it may be the end of a wall",
+        "largest width that two neighbouring beams cover at a circle; beyond it a circle may be the end of a wall",
         unit="m",
         low=0.0,
         high=100.0,

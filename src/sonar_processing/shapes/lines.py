@@ -25,7 +25,10 @@ class LineDetectorParameters(RansacParameters):
         25.0, "echoes farther apart along a wall than this belong to different walls", unit="m", low=0.01, high=1000.0
     )
     min_coverage: float = parameter(
-        0.5, "of a wall cut into eighths, this share holds echoes; two things far apart are no wall", low=0.0, high=1.0
+        0.5,
+        "least share of the eight equal parts of a wall that hold echoes, so that two things far apart make no wall",
+        low=0.0,
+        high=1.0,
     )
 
 

@@ -24,7 +24,7 @@ class RansacParameters(StampParameters):
     )
     probability: float = parameter(
         0.999,
-        "the search ends when a better shape would have been met with this probability; 1: never early",
+        "the search ends early once it would have found a better shape with this probability; 1: never early",
         low=0.0,
         high=1.0,
         thesis_name="RANSACProbability",
@@ -36,9 +36,9 @@ class RansacParameters(StampParameters):
         0.5, "bins of a beam this near to each other are one echo; 0: every point counts", unit="m", low=0.0, high=10.0
     )
     min_echo_share: float = parameter(
-        0.15, "echoes of fewer bins than this share of the usual echo's are noise", low=0.0, high=1.0
+        0.15, "an echo with fewer bins than this share of the usual echo counts as noise", low=0.0, high=1.0
     )
-    sonar_frame: str = parameter("sonar", "frame of the sonar, whose place tf knows", tunable=False)
+    sonar_frame: str = parameter("sonar", "frame of the sonar in tf", tunable=False)
     seed: int = parameter(1, "seed of the random hypotheses: same seed and scan, same shapes", low=0, high=2**31 - 1)
 
 

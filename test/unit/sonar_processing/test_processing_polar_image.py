@@ -71,5 +71,5 @@ def test_without_a_size_of_pixels_the_range_fits_into_501():
 
 
 def test_a_picture_that_would_be_too_large_is_refused():
-    with pytest.raises(RefusedInput, match=r"metres_per_pixel 0\.01 and a range of 50 m"):
+    with pytest.raises(RefusedInput, match=r"raise metres_per_pixel, 0\.01 at 50 m"):
         _drawn([0.0], metres_per_pixel=0.01)
