@@ -7,8 +7,9 @@ from typing import Iterator
 import numpy as np
 
 from benchmarks.harness import benchmark_parser
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
 
@@ -70,7 +71,9 @@ def main() -> None:
     parser = benchmark_parser("long_run", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
     scans = parser.parse_args().scans
-    solver, seconds = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), np.zeros(2)), []
+    known = ReplayParameters()
+    parameters = known.solver_parameters(known.part(OdometryErrors), known.range_scale_deviation)
+    solver, seconds = LiveSolver(parameters, np.zeros(2)), []
     for number, scan in enumerate(tour_scans(scans), start=1):
         start = time.process_time()
         estimate = solver.add(scan)

@@ -4,7 +4,7 @@ from typing import Callable, List, NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion.odometry_motion import as_complex
+from mlsm_manager.joint_solver.measured.odometry_log import as_complex
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted

@@ -8,7 +8,6 @@ import yaml
 from benchmarks.harness import ROOT
 from benchmarks.scans import RAYS, SonarKind
 from benchmarks.twin_conditions import TwinParameters, reported
-from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
@@ -18,6 +17,7 @@ from sonar_simulator.vehicle.robot import RobotDescription
 
 HEAD = SonarKind(500, 0.15, 0.3)  # the demo's
 _START = 1000.0  # s
+_MOUNTING, _SCALE = 0.105, 0.01  # rad, relative: deviations of a mounting angle set by eye, and of a DVL's scale
 _STEP = 0.1  # s between poses of the odometry
 
 
@@ -34,11 +34,9 @@ class Tour(NamedTuple):
         return Recording([PlacedBeam(beam, place, True) for beam, place in zip(self.beams, places)], 0, odometry, None)
 
     def with_dvl(self, seed: int) -> Recording:
-        """Return the recording with errors drawn from what the solver expects of a DVL and a compass."""
-        rng, expected = np.random.RandomState(seed), DvlOdometry()
-        errors = TwinParameters(
-            direction=rng.normal(0.0, expected.direction_deviation), scale=rng.normal(0.0, expected.scale_deviation)
-        )
+        """Return the recording with errors of a DVL and a compass, drawn at random."""
+        rng = np.random.RandomState(seed)
+        errors = TwinParameters(direction=rng.normal(0.0, _MOUNTING), scale=rng.normal(0.0, _SCALE))
         made = reported(self.truth, errors, rng)
         return self.recording(Track(made.times, made.poses + np.append(self.truth.poses[0, :2], 0.0)))
 

@@ -11,9 +11,9 @@ import numpy as np
 from mlsm_manager.hovering.echoes import Echoes
 from mlsm_manager.hovering.particle_weights import weighed
 from mlsm_manager.hovering.particles import Particles, drawn, led
+from mlsm_manager.joint_solver.measured.odometry_log import Motion
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.heading_factors import AHEAD, ASIDE
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.motion.velocity_models import AHEAD, ASIDE
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import YAW
 from node_support.geometry import rotated

@@ -6,9 +6,7 @@ from typing import Dict, Mapping, Optional, Protocol
 import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from node_support.parameters import ParameterSet, parameter
 
 # Beams are later than their stamps by so many deviations at most, and s of odometry that are worth waiting for.
@@ -73,6 +71,10 @@ class NodeSearch(Protocol):
         """Return the search after all scans of `log`, which `stored` it then. Raises ValueError, KeyError."""
 
 
+def _none_given() -> OdometryModel:
+    raise TypeError("SolverParameters without odometry, a model of the vehicle's motion")
+
+
 @dataclass(frozen=True)
 class SolverParameters(JointSolverParameters):
     """All parameters of a run. odometry: the model of the vehicle's motion, with its own parameters.
@@ -107,7 +109,7 @@ class SolverParameters(JointSolverParameters):
     tolerance: float = parameter(
         0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
-    odometry: OdometryModel = field(default_factory=lambda: DvlFactors(DvlOdometry()))
+    odometry: OdometryModel = field(default_factory=_none_given)
     node_search: Optional[NodeSearch] = None
 
     @property

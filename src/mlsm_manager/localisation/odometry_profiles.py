@@ -6,17 +6,21 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.motion.odometry_parameters import (
+from mlsm_manager.joint_solver.motion.motion_models import (
+    Compass,
+    DvlFactors,
     DvlOdometry,
-    HeadingOdometry,
+    OdometryModel,
+    ThrusterFactors,
     ThrusterOdometry,
+)
+from mlsm_manager.joint_solver.motion.velocity_models import (
+    HeadingFactors,
+    HeadingOdometry,
+    Speeds,
+    UnaidedFactors,
     UnaidedOdometry,
 )
-from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
-from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
 from mlsm_manager.joint_solver.parameters import NodeSearch
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
@@ -26,8 +30,9 @@ from node_support.parameters import ParameterSet, parameter
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.
 _FOR_EVER = 1e6
 _NO_COMPASS = 1e-5
-# rad/sqrt(s): the solver needs some freedom of the heading from scan to scan.
+# rad/sqrt(s): the solver needs some freedom of the heading from scan to scan; of an unknown turn rate, besides it.
 _LEAST_WALK = 1e-6
+_TURN_NOISE = 3.5e-4
 
 
 class OdometryKind(Enum):
@@ -107,19 +112,19 @@ class OdometryChoice(ParameterSet):
         return ParticleFilter()
 
 
-def _compass(choice: OdometryChoice, errors: OdometryErrors) -> Dict[str, Any]:
+def _compass(choice: OdometryChoice, errors: OdometryErrors) -> Compass:
     compass = errors.heading_deviation > 0.0
-    return {
-        "heading_deviation": errors.heading_deviation if compass else _NO_COMPASS,
-        "heading_time": choice.heading_time if compass else _FOR_EVER,
-        "heading_walk": max(errors.turn_rate_deviation * np.sqrt(2.0 * errors.rate_time), _LEAST_WALK),
-    }
+    return Compass(
+        heading_deviation=errors.heading_deviation if compass else _NO_COMPASS,
+        heading_correlation_time=choice.heading_time if compass else _FOR_EVER,
+        heading_walk=max(errors.turn_rate_deviation * np.sqrt(2.0 * errors.rate_time), _LEAST_WALK),
+    )
 
 
 def _positions(choice: OdometryChoice, errors: OdometryErrors) -> Dict[str, Any]:
     """Return the walks that errors add up to which last `rate_time`, and `motion_time`."""
     return {
-        **_compass(choice, errors),
+        "compass": _compass(choice, errors),
         "position_walk": max(errors.speed_deviation * np.sqrt(2.0 * errors.rate_time), 1e-3),
         "direction": choice.odometry_direction,
         "direction_deviation": errors.direction_deviation,
@@ -129,15 +134,15 @@ def _positions(choice: OdometryChoice, errors: OdometryErrors) -> Dict[str, Any]
     }
 
 
-def _speeds(choice: OdometryChoice, errors: OdometryErrors) -> Dict[str, Any]:
-    return {
-        "start_speed_deviation": choice.start_speed_deviation,
-        "speed_deviation": max(errors.speed_deviation, 1e-3),
-        "speed_time": max(errors.rate_time, 1.0),
-        "travel_walk": choice.travel_walk,
-        "slip_deviation": choice.slip_deviation,
-        "slip_time": choice.slip_time,
-    }
+def _speeds(choice: OdometryChoice, errors: OdometryErrors) -> Speeds:
+    return Speeds(
+        start_speed_deviation=choice.start_speed_deviation,
+        speed_deviation=max(errors.speed_deviation, 1e-3),
+        speed_correlation_time=max(errors.rate_time, 1.0),
+        travel_walk=choice.travel_walk,
+        slip_deviation=choice.slip_deviation,
+        slip_correlation_time=choice.slip_time,
+    )
 
 
 def _dvl(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
@@ -151,14 +156,12 @@ def _thrusters(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
 
 
 def _heading(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    return HeadingFactors(HeadingOdometry(**_compass(choice, errors), **_speeds(choice, errors)))
+    return HeadingFactors(HeadingOdometry(_speeds(choice, errors), _compass(choice, errors)))
 
 
 def _none(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    turn_rate = {
-        "turn_rate_deviation": max(errors.turn_rate_deviation, 1e-5), "turn_rate_time": choice.turn_rate_time
-    }  # fmt: skip
-    return UnaidedFactors(UnaidedOdometry(**_speeds(choice, errors), **turn_rate))
+    deviation = max(errors.turn_rate_deviation, 1e-5)
+    return UnaidedFactors(UnaidedOdometry(_speeds(choice, errors), deviation, choice.turn_rate_time, _TURN_NOISE))
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice, OdometryErrors], OdometryModel]] = {

@@ -6,7 +6,7 @@ from typing import Protocol
 import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.placing.drawing import corrected_path, drawn
 from mlsm_manager.joint_solver.unknowns.state import DELAY, State
 from mlsm_manager.localisation.clouds import Cloud

@@ -5,7 +5,7 @@ from typing import Any, Dict, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion.odometry_model import HELD_DEVIATION
+from mlsm_manager.joint_solver.motion.motion_models import HELD_DEVIATION
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, PartResult
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver

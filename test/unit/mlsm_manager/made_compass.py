@@ -1,12 +1,11 @@
 """Scans of a vehicle that has a compass and nothing else, and a solver for them that is quick."""
 
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.joint_solver.parameters import SolverParameters
+from made_models import HEADING, solver_parameters
+
 from mlsm_manager.scan_matching.scan import Scan, Track
 
-PARAMETERS = SolverParameters(
-    odometry=HeadingFactors(HeadingOdometry()),
+PARAMETERS = solver_parameters(
+    odometry=HEADING,
     sonar_delay_deviation=1.0,
     scans_per_group=1,
     normal_deviation=0.2,

@@ -7,25 +7,15 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
+from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solver_parameters
 
 from mlsm_manager.joint_solver.compare.association import COSINE_FADING, FADING, Pairs
 from mlsm_manager.joint_solver.compare.comparisons import summed
 from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.compiled.compiled_sums import scattered_blocks
 from mlsm_manager.joint_solver.compiled.compiled_weights import weighed_pairs
+from mlsm_manager.joint_solver.measured.odometry_log import as_complex
 from mlsm_manager.joint_solver.measured.surface_points import ramp
-from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_motion import as_complex
-from mlsm_manager.joint_solver.motion.odometry_parameters import (
-    DvlOdometry,
-    HeadingOdometry,
-    ThrusterOdometry,
-    UnaidedOdometry,
-)
-from mlsm_manager.joint_solver.motion.thruster_factors import ThrusterFactors
-from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import RANGE_SCALE, State
@@ -34,8 +24,8 @@ from node_support.geometry import rotated
 SAME = 1e-9
 STEP = 1e-6
 MODELS = [
-    DvlFactors(DvlOdometry()), ThrusterFactors(ThrusterOdometry()), HeadingFactors(HeadingOdometry()),
-    UnaidedFactors(UnaidedOdometry()),
+    DVL, THRUSTERS, HEADING,
+    UNAIDED,
 ]  # fmt: skip
 
 
@@ -85,7 +75,7 @@ def weights(residual, pairs, sources, targets, parameters, cut):
 @given(st.integers(0, 10**6), st.integers(1, 200), st.sampled_from([[-2], [0], [3, 4, 9], list(range(40))]))
 @settings(max_examples=50)
 def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
-    rng, parameters = np.random.RandomState(seed), SolverParameters()
+    rng, parameters = np.random.RandomState(seed), solver_parameters()
     sources, targets = some_points(rng, 30, list(range(50, 60))), some_points(rng, 40, scans)
     pairs = Pairs(np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count), rng.uniform(0.1, 1.0, count))
     residual, jacobian = linearised(pairs, sources, targets)
@@ -155,7 +145,7 @@ def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
     T_base_sonar = np.eye(4)
     T_base_sonar[:2, 3] = SONAR_IN_BASE
     solvers = [
-        LiveSolver(SolverParameters(sonar_delay_deviation=1.0), some) for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])
+        LiveSolver(solver_parameters(sonar_delay_deviation=1.0), some) for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])
     ]
     for scan in tour(2).scans:
         expected, found = (solver.add(scan) for solver in solvers)
@@ -165,7 +155,7 @@ def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
 @given(st.integers(0, 10**6), st.integers(0, 100))
 @settings(max_examples=30)
 def test_comparisons_fade_out_with_distance_and_angle(seed, count):
-    rng, parameters = np.random.RandomState(seed), SolverParameters()
+    rng, parameters = np.random.RandomState(seed), solver_parameters()
     sources, targets = some_points(rng, 30, [5, 6]), some_points(rng, 40, [0, 1, 2])
     rows, neighbours = np.sort(rng.randint(0, 30, count)), rng.randint(0, 40, count)
     distance, shares = rng.uniform(0.0, 3.0, count), rng.uniform(0.1, 1.0, count)

@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_models import HEADING, solver_parameters
 from made_posts import heard, true_path
 
 from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.self_check.map_checks import scans_go_on
 
@@ -32,11 +30,11 @@ def shifted(scan, along):
 
 def shares_at(log, aside):
     """Return the shares where each scan is displaced across the canal by `aside` [m] against the one before."""
-    odometry = HeadingFactors(HeadingOdometry())
+    odometry = HEADING
     nodes = np.zeros((log.scan_count + 1, odometry.width))
     nodes[:, :2] = true_path(log.node_times)
     nodes[:, 1] = aside * np.arange(len(nodes))
-    return shares_heard_before(log, odometry, State(nodes, np.zeros(2)), SolverParameters(), 0)
+    return shares_heard_before(log, odometry, State(nodes, np.zeros(2)), solver_parameters(), 0)
 
 
 def test_scans_at_their_places_lie_on_what_was_heard_before(log):

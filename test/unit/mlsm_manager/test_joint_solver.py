@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
+from made_models import DVL_ODOMETRY, solver_parameters
 
-from mlsm_manager.joint_solver.motion.dvl_factors import DIRECTION, DvlFactors
-from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.motion.motion_models import DIRECTION, DvlFactors
 from mlsm_manager.joint_solver.placing.path import solved_path
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
@@ -18,7 +17,7 @@ from node_support.errors import RefusedInput
 from node_support.geometry import composed
 
 DIRECTION_ERROR, LATE = 0.12, 0.6
-DEFAULTS = SolverParameters(sonar_delay_deviation=1.0)
+DEFAULTS = solver_parameters(sonar_delay_deviation=1.0)
 SHORT_WINDOW = replace(DEFAULTS, free_scans=6)
 
 
@@ -91,7 +90,7 @@ def test_the_frozen_map_s_own_error_counts_in_the_calibration_too(made):
 
 
 def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(made):
-    wrong = SolverParameters(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1, free_scans=4)
+    wrong = solver_parameters(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1, free_scans=4)
     solver = followed(made.scans, wrong)
     assert solver.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.3)
 
@@ -159,7 +158,7 @@ def test_scans_without_echoes_are_bridged_by_the_odometry(made):
 
 
 def test_a_run_that_begins_deaf_starts_at_the_odometry(made):
-    solver = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
+    solver = LiveSolver(solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
     estimate = solver.add(without_points(made.scans[0]))
     np.testing.assert_allclose(estimate.T_map_base, estimate.T_odom_base, atol=1e-9)
     assert estimate.comparisons == 0
@@ -175,7 +174,9 @@ def test_scans_agree_with_the_map_they_made_and_not_with_another(made, live):
     scan = made.scans[10]
     strange = replace(scan, points=scan.points + np.array([1.9, 1.9, 0.0, 0.0]))
     solver = followed(made.scans[:10])
-    sure = replace(solver.parameters, odometry=DvlFactors(DvlOdometry(position_walk=0.001, direction_deviation=0.001)))
+    sure = replace(
+        solver.parameters, odometry=DvlFactors(replace(DVL_ODOMETRY, position_walk=0.001, direction_deviation=0.001))
+    )
     solver = followed(tour(10).scans, sure)
     assert solver.add(strange).agreement < 0.5
 

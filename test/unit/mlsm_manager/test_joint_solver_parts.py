@@ -7,16 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import logged, tour
+from made_models import DVL, DVL_ODOMETRY, solver_parameters
 
 from mlsm_manager.joint_solver.compare.association import pairs_of
 from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.measured.growing import GrowingArray
-from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
-from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
-from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry
-from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.motion.motion_models import DvlFactors
 from mlsm_manager.joint_solver.placing.placement import place
 from mlsm_manager.joint_solver.solve.frozen_map import fading, joint_covariance, nearest_blocks
 from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations, SparseSolution
@@ -24,7 +22,6 @@ from mlsm_manager.joint_solver.unknowns.state import Layout, State
 from mlsm_manager.scan_matching.scan import Track
 
 STEP = 1e-6
-DVL = DvlFactors(DvlOdometry())
 TIMES = np.array([0.0, 14.0, 28.0])
 POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
 MOTION = Motion(TIMES, POSES, np.column_stack([TIMES, 0.3 * TIMES]))
@@ -42,7 +39,7 @@ def some_state(log):
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
     placed = place(log, DVL, some_state(log), log.rows(0, 3))
-    pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, SolverParameters())
+    pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, solver_parameters())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
 
@@ -60,7 +57,7 @@ def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown)
 
 
 def test_odometry_that_went_as_expected_pulls_at_nothing():
-    factors = DvlFactors(DvlOdometry(direction=0.2, scale=0.05))
+    factors = DvlFactors(replace(DVL_ODOMETRY, direction=0.2, scale=0.05))
     nodes = [factors.first_node()]
     for node in range(2):
         after = factors.advanced(nodes[-1][np.newaxis], MOTION[node : node + 1], MOTION[node + 1 : node + 2])
@@ -96,7 +93,7 @@ def test_at_most_so_many_blocks_count(distances, most):
 
 
 def test_a_scan_is_compared_with_the_nearest_blocks_only(log):
-    few = replace(SolverParameters(), scans_per_group=1, frozen_scans=2)
+    few = replace(solver_parameters(), scans_per_group=1, frozen_scans=2)
     near = nearest_blocks(log, DVL, some_state(log), 3, np.array([12.0, 0.0]), few)
     assert 1 <= len(near.numbers) <= 2
     assert set(near.points.scans) == set(near.numbers)
@@ -207,7 +204,7 @@ def test_an_array_keeps_what_was_appended(counts):
 
 
 def test_tracks_that_overlap_make_one_path_without_a_turn_in_its_yaw():
-    whole = OdometryTimeline()
+    whole = OdometryLog()
     whole.extend(Track(np.arange(0.0, 5.0), np.column_stack([np.arange(5.0), np.zeros(5), np.full(5, 3.1)])), 3.0)
     whole.extend(Track(np.arange(2.0, 8.0), np.column_stack([np.arange(2.0, 8.0), np.zeros(6), np.full(6, -3.1)])), 9.0)
     np.testing.assert_allclose(whole.at(np.array([1.0, 3.5, 6.5]))[:, 0], [1.0, 3.5, 6.5])

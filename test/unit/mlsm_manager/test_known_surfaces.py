@@ -5,16 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_harbour import tour
+from made_models import solver_parameters
 
 from mlsm_manager.joint_solver.compare.association import Pairs
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import place
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from node_support.geometry import transformed
 
 HARBOUR = tour(4)
-PARAMETERS = SolverParameters(sonar_delay_deviation=0.01)
+PARAMETERS = solver_parameters(sonar_delay_deviation=0.01)
 SONAR = np.array([0.3, 0.0])
 
 
@@ -26,7 +26,7 @@ def pairs_with(known):
     solver = LiveSolver(PARAMETERS, SONAR)
     solver.add(HARBOUR.scans[0])
     sources = place(solver.log, solver.odometry, solver.state, solver.log.rows(0, 1))
-    return known.compared(sources, 2.2, SolverParameters()), sources
+    return known.compared(sources, 2.2, solver_parameters()), sources
 
 
 @pytest.mark.parametrize("places", [np.empty((0, 2)), np.array([[1.0, 2.0]])])
@@ -71,9 +71,9 @@ def test_a_vehicle_that_goes_far_meets_what_is_there():
     known = KnownSurfaces(np.concatenate([known_places(), known_places() + np.array([400.0, -900.0])]))
     _, sources = pairs_with(known)
     there = replace(sources, places=sources.places + np.array([400.0, -900.0]))
-    pairs, _ = known.compared(there, 2.2, SolverParameters())
+    pairs, _ = known.compared(there, 2.2, solver_parameters())
     assert len(pairs.rows) > 40
-    again, _ = known.compared(sources, 2.2, SolverParameters())
+    again, _ = known.compared(sources, 2.2, solver_parameters())
     np.testing.assert_array_equal(pairs.rows, again.rows)
 
 
@@ -84,7 +84,7 @@ def drawn_to(x):
     """Return the place (2,) that a point at (x, 5.1) is drawn to, beside a wall with a block every half metre."""
     _, sources = pairs_with(KnownSurfaces(known_places()))
     point = replace(sources.selected(np.array([0])), places=np.array([[x, 5.1]]), normals=np.array([[0.0, 1.0]]))
-    pairs, targets = KnownSurfaces(WALL).compared(point, 2.2, SolverParameters())
+    pairs, targets = KnownSurfaces(WALL).compared(point, 2.2, solver_parameters())
     return (pairs.importance[:, np.newaxis] * targets.places[pairs.neighbours]).sum(axis=0) / pairs.importance.sum()
 
 

@@ -2,13 +2,11 @@
 
 import numpy as np
 import pytest
+from made_models import HEADING, solver_parameters
 from made_posts import SPEED, cluttered, heard, true_path
 
 from mlsm_manager.joint_solver.measured.lone_points import crowds, lone_points
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_parameters import HeadingOdometry
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -89,8 +87,8 @@ def scans():
 
 
 def solver_of(scans, post_confidence):
-    odometry = HeadingFactors(HeadingOdometry())
-    parameters = SolverParameters(
+    odometry = HEADING
+    parameters = solver_parameters(
         odometry=odometry, range_scale_deviation=0.0, normal_deviation=0.2, scans_per_group=1, echo_deviation=0.2,
         post_confidence=post_confidence,
     )  # fmt: skip

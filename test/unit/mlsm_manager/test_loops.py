@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
+from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.search.places import PlaceCandidate
 from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
@@ -36,7 +36,7 @@ def _heard_by(scan, number, track):
 
 
 def followed(scans):
-    solver = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
+    solver = LiveSolver(solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
     for scan in scans:
         solver.add(scan)
     return solver

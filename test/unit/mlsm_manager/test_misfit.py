@@ -2,14 +2,11 @@
 
 import numpy as np
 import pytest
+from made_models import DVL, HEADING, solver_parameters
 from made_posts import heard, true_path
 
 from mlsm_manager.joint_solver.judge.misfit import misfit_variances
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry, HeadingOdometry
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.unknowns.state import State
 
 TURNS = 4
@@ -25,11 +22,11 @@ def log():
 
 def variances_at(log, aside, odometry=None):
     """Return the variances where the last scan lies `aside` [m] across the canal of its true place."""
-    odometry = odometry or HeadingFactors(HeadingOdometry())
+    odometry = odometry or HEADING
     nodes = np.zeros((log.scan_count + 1, odometry.width))
     nodes[:, :2] = true_path(log.node_times)
     nodes[-1, 1] = aside
-    return misfit_variances(log, odometry, State(nodes, np.zeros(2)), SolverParameters(), 0)
+    return misfit_variances(log, odometry, State(nodes, np.zeros(2)), solver_parameters(), 0)
 
 
 def test_scans_at_their_places_leave_the_path_as_certain_as_it_is(log):
@@ -47,4 +44,4 @@ def test_a_turn_in_which_nothing_fits_is_as_uncertain_as_a_vehicle_goes_far(log)
 
 
 def test_a_reported_motion_is_not_lost_with_a_scan(log):
-    np.testing.assert_array_equal(variances_at(log, 6.0, DvlFactors(DvlOdometry())), np.zeros(TURNS))
+    np.testing.assert_array_equal(variances_at(log, 6.0, DVL), np.zeros(TURNS))

@@ -3,19 +3,14 @@
 import numpy as np
 import pytest
 from made_harbour import ahead, logged, tour
+from made_models import DVL, HEADING, UNAIDED, solver_parameters
 
-from mlsm_manager.joint_solver.motion.dvl_factors import DvlFactors
-from mlsm_manager.joint_solver.motion.heading_factors import HeadingFactors
-from mlsm_manager.joint_solver.motion.odometry_parameters import DvlOdometry, HeadingOdometry, UnaidedOdometry
-from mlsm_manager.joint_solver.motion.transition import Transition
-from mlsm_manager.joint_solver.motion.unaided_factors import UnaidedFactors
-from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.motion.motion_models import Transition
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.search.motion_search import searched_node
 from mlsm_manager.joint_solver.unknowns.state import YAW, State
 
 FAR = np.array([3.0, -5.0])
-HEADING = HeadingFactors(HeadingOdometry())
 
 
 @pytest.fixture(scope="module")
@@ -32,35 +27,35 @@ def state_with(log, model, shift):
 
 def test_a_scan_is_found_metres_from_where_it_was_expected(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
-    found = searched_node(log, HEADING, state_with(log, HEADING, FAR), covariance, SolverParameters())
+    found = searched_node(log, HEADING, state_with(log, HEADING, FAR), covariance, solver_parameters())
     assert np.hypot(*found[:2]) < 1.5
     assert np.hypot(*found[3:5]) > 0.05  # a node that is moved has another velocity
 
 
 def test_a_scan_that_is_where_it_was_expected_stays(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
-    found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, SolverParameters())
+    found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, solver_parameters())
     assert np.hypot(*found[:2]) < 1.5
 
 
 @pytest.mark.parametrize("turn", [-1.2, 0.5])
 def test_a_turn_that_nobody_measured_is_found(log, turn):
     """A vehicle without a compass: the newest node is turned against the true heading, and beside the true place."""
-    unaided = UnaidedFactors(UnaidedOdometry())
+    unaided = UNAIDED
     state = state_with(log, unaided, np.array([1.0, 1.0]))
     state.nodes[-1, YAW] = turn
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3, 0.05]) ** 2
-    found = searched_node(log, unaided, state, covariance, SolverParameters())
+    found = searched_node(log, unaided, state, covariance, solver_parameters())
     assert abs(found[YAW]) < 0.1
     assert np.hypot(*found[:2]) < 1.5
 
 
 def test_a_motion_that_is_known_is_not_searched(log):
-    dvl = DvlFactors(DvlOdometry())
+    dvl = DVL
     state = state_with(log, dvl, FAR)
     covariance = np.diag([0.01, 0.01, 0.01, 0.01, 0.01]) ** 2
-    assert searched_node(log, dvl, state, covariance, SolverParameters()) is not None
-    np.testing.assert_array_equal(searched_node(log, dvl, state, covariance, SolverParameters())[:2], FAR)
+    assert searched_node(log, dvl, state, covariance, solver_parameters()) is not None
+    np.testing.assert_array_equal(searched_node(log, dvl, state, covariance, solver_parameters())[:2], FAR)
 
 
 def test_a_speed_that_is_unknown_makes_a_step_unknown(log):

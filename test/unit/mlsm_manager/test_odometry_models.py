@@ -7,8 +7,7 @@ import numpy as np
 import pytest
 from made_harbour import CANAL, SONAR_IN_BASE, ahead, along_canal, tour
 
-from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.placing.estimate import scale_covariance
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
@@ -116,7 +115,7 @@ def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
 def test_ahead_is_where_a_vehicle_would_be_that_always_went_ahead():
     times = np.linspace(0.0, 10.0, 1001)
     yaw = 0.3 * times
-    timeline = OdometryTimeline.of(Track(times, np.column_stack([0.0 * times, 0.0 * times, yaw])))
+    timeline = OdometryLog.of(Track(times, np.column_stack([0.0 * times, 0.0 * times, yaw])))
     expected = np.column_stack([np.sin(yaw), 1.0 - np.cos(yaw)]) / 0.3
     np.testing.assert_allclose(timeline.motion(times).ahead, expected, atol=1e-4)
 
@@ -124,10 +123,10 @@ def test_ahead_is_where_a_vehicle_would_be_that_always_went_ahead():
 def test_a_timeline_that_grows_piece_by_piece_goes_on_ahead():
     times = np.linspace(0.0, 10.0, 101)
     track = Track(times, np.column_stack([0.0 * times, 0.0 * times, np.sin(times)]))
-    pieces = OdometryTimeline()
+    pieces = OdometryLog()
     for end in (3.0, 3.05, 7.2, 10.0):
         pieces.extend(track, end)
-    np.testing.assert_allclose(pieces.motion(times).ahead, OdometryTimeline.of(track).motion(times).ahead, atol=1e-12)
+    np.testing.assert_allclose(pieces.motion(times).ahead, OdometryLog.of(track).motion(times).ahead, atol=1e-12)
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
+from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved, solved_part
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RUN_COLUMNS
@@ -15,7 +15,7 @@ SCANS = tour(24, direction=0.12, delay=0.6).scans
 
 
 def followed(scans):
-    solver = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
+    solver = LiveSolver(solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
     for scan in scans:
         solver.add(scan)
     return solver

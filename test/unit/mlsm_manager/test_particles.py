@@ -19,9 +19,8 @@ from mlsm_manager.hovering.particle_weights import (
     weighed,
 )
 from mlsm_manager.hovering.particles import Particles, drawn, led
-from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
-from mlsm_manager.joint_solver.motion.heading_factors import AHEAD, ASIDE
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.motion.velocity_models import AHEAD, ASIDE
 from mlsm_manager.scan_matching.scan import Track
 
 PART = 5.0  # s
@@ -227,7 +226,7 @@ def test_the_likeliest_path_is_that_of_the_larger_group():
 
 def test_nodes_on_a_path_have_its_places_and_its_speeds_in_base_link():
     times, heading = np.arange(4) * PART, np.pi / 2.0
-    motion = OdometryTimeline.of(Track(times, np.tile([1.0, 2.0, heading], (4, 1)))).motion(times)
+    motion = OdometryLog.of(Track(times, np.tile([1.0, 2.0, heading], (4, 1)))).motion(times)
     assert isinstance(motion, Motion)
     nodes = on_path(np.zeros((4, 6)), np.column_stack([0.5 * times, np.zeros(4)]), motion)
     np.testing.assert_allclose(nodes[:, :2] + [1.0, 2.0], np.column_stack([0.5 * times, np.zeros(4)]), atol=1e-9)

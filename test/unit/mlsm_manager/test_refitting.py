@@ -5,8 +5,8 @@ from dataclasses import fields, replace
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
+from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.offline.refitting import displaced, other_settings, refitted_verdicts
@@ -29,7 +29,7 @@ def among_furrows(scan, truth, rng):
 
 
 def followed(scans):
-    solver = LiveSolver(SolverParameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
+    solver = LiveSolver(solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
     for scan in scans:
         solver.add(scan)
     return solver
@@ -65,6 +65,6 @@ def test_the_second_start_lies_a_told_deviation_beside_the_path_and_within_the_c
 
 
 def test_other_settings_differ_from_the_run_s_in_one_thing_each():
-    own = SolverParameters()
+    own = solver_parameters()
     for other in other_settings(own):
         assert sum(getattr(other, one.name) != getattr(own, one.name) for one in fields(own)) == 1

@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
+from made_models import solver_parameters
 
 from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
 from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN
 
-MATCHING = SolverParameters(normal_deviation=0.2)
+MATCHING = solver_parameters(normal_deviation=0.2)
 SCANS = 5
 
 
@@ -108,7 +108,7 @@ def test_surfaces_of_a_map_from_before_the_run_are_told_by_the_scans_compared_wi
 
 def test_normals_without_error_stay_as_they_are():
     points = canal(0.3)
-    assert told_by(points, SolverParameters(normal_deviation=0.0)) is points
+    assert told_by(points, solver_parameters(normal_deviation=0.0)) is points
 
 
 def test_no_points_have_no_weak_direction():

@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.compare.comparisons import add_comparisons
 from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.surface_points import ramp
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place_lone
 from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations

@@ -6,10 +6,9 @@ import numpy as np
 
 from mlsm_manager.joint_solver.measured.growing import GrowingArray
 from mlsm_manager.joint_solver.measured.lone_points import lone_points
-from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
+from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.measured.point_table import PointTable
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
@@ -25,7 +24,7 @@ class RunLog:
     def __init__(self, sonar_in_base: np.ndarray) -> None:
         # Compiled loops take no column of a matrix.
         self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
-        self.odometry = OdometryTimeline()
+        self.odometry = OdometryLog()
         self._node_times = GrowingArray()
         self._surfaces, self.lone = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []

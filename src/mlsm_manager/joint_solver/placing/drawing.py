@@ -3,7 +3,7 @@
 import numpy as np
 
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, State
 from node_support.geometry import inverse, transformed

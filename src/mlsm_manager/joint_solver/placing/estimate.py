@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion.odometry_model import Drift
-from mlsm_manager.joint_solver.motion.odometry_motion import as_complex
+from mlsm_manager.joint_solver.measured.odometry_log import as_complex
+from mlsm_manager.joint_solver.motion.motion_models import Drift
 from mlsm_manager.joint_solver.unknowns.state import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
 
 

@@ -2,10 +2,8 @@
 
 import numpy as np
 
-from mlsm_manager.joint_solver.measured.odometry_timeline import OdometryTimeline
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion, as_complex, product
-from mlsm_manager.joint_solver.motion.odometry_terms import turned
+from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog, as_complex, product
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel, turned
 from mlsm_manager.joint_solver.unknowns.state import YAW
 from mlsm_manager.scan_matching.scan import Track
 
@@ -13,9 +11,7 @@ from mlsm_manager.scan_matching.scan import Track
 class NodePath:
     """The path between nodes: the model's reference path, turned and scaled, stretched from node to node."""
 
-    def __init__(
-        self, odometry: OdometryModel, timeline: OdometryTimeline, times: np.ndarray, nodes: np.ndarray
-    ) -> None:
+    def __init__(self, odometry: OdometryModel, timeline: OdometryLog, times: np.ndarray, nodes: np.ndarray) -> None:
         """times: (n,) s of the nodes, n > 1. nodes: (n, width)."""
         self._odometry, self._timeline, self._times, self._nodes = odometry, timeline, times, nodes
         motion = timeline.motion(times)
@@ -64,4 +60,4 @@ def solved_path(
 
     node_times: (n,) s. nodes: (n, width).
     """
-    return NodePath(odometry, OdometryTimeline.of(track), node_times, nodes).at(times)
+    return NodePath(odometry, OdometryLog.of(track), node_times, nodes).at(times)

@@ -6,10 +6,10 @@ from typing import Union
 import numpy as np
 
 from mlsm_manager.joint_solver.compiled.compiled_places import placed_rows
+from mlsm_manager.joint_solver.measured.odometry_log import Motion
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.placing.path import NodePath
 from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, YAW, State
 

@@ -11,8 +11,7 @@ import numpy as np
 from mlsm_manager.joint_solver.compare.islands import MAP, Islands
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel
-from mlsm_manager.joint_solver.motion.transition import Transition
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel, Transition
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
 from mlsm_manager.joint_solver.search.places import (

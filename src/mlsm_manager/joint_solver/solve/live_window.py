@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
 from mlsm_manager.joint_solver.judge.agreement import agreement, surfaces_met
 from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.odometry_model import OdometryModel, frozen_deviations
+from mlsm_manager.joint_solver.motion.motion_models import OdometryModel, frozen_deviations
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place

@@ -1,17 +1,48 @@
-"""The odometry over the whole run, as far as it is known."""
+"""What the odometry reported: over the whole run as far as it is known, and at some times."""
+
+from dataclasses import dataclass
+from typing import Union
 
 import numpy as np
 
 from mlsm_manager.joint_solver.measured.growing import GrowingArray
-from mlsm_manager.joint_solver.motion.odometry_motion import Motion
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse
 
 _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
 
 
-class OdometryTimeline:
-    """Poses T_odom_base in the order of time; grows at its end, and yaw never jumps by a turn."""
+@dataclass(frozen=True)
+class Motion:
+    """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
+
+    "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
+    """
+
+    times: np.ndarray
+    poses: np.ndarray
+    ahead: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __getitem__(self, rows: Union[slice, np.ndarray]) -> "Motion":
+        """Return the motion at `rows`: a slice or an array of indices."""
+        return Motion(self.times[rows], self.poses[rows], self.ahead[rows])
+
+    @property
+    def durations(self) -> np.ndarray:
+        """(m - 1,) s between the times."""
+        return np.diff(self.times)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(m,) complex x + i y [m] in odom."""
+        return as_complex(self.poses)
+
+
+class OdometryLog:
+    """Poses T_odom_base of a run in the order of time; grows at its end, and yaw never jumps by a turn."""
 
     def __init__(self) -> None:
         self._times = GrowingArray()
@@ -19,11 +50,11 @@ class OdometryTimeline:
         self._ahead = GrowingArray(2)
 
     @classmethod
-    def of(cls, track: Track) -> "OdometryTimeline":
-        """Return the timeline of a whole track."""
-        timeline = cls()
-        timeline.extend(track, np.inf)
-        return timeline
+    def of(cls, track: Track) -> "OdometryLog":
+        """Return the log of a whole track."""
+        log = cls()
+        log.extend(track, np.inf)
+        return log
 
     def __len__(self) -> int:
         return len(self._times)
@@ -97,3 +128,17 @@ def _around(known: np.ndarray, start: float, end: float) -> slice:
     """Return which of the times `known` (n,) lie between `start` and `end`, and the nearest beyond."""
     first, last = np.searchsorted(known, [start, end])
     return slice(max(first - 1, 0), last + 2)
+
+
+def as_complex(vectors: np.ndarray) -> np.ndarray:
+    """Return x + i y (...) of vectors (..., >= 2)."""
+    return vectors[..., 0] + 1j * vectors[..., 1]
+
+
+def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the products (...) of complex numbers.
+
+    numpy's own product rounds by where in memory the numbers lie, so that equal runs would end differently.
+    """
+    real = first.real * second.real - first.imag * second.imag
+    return real + 1j * (first.real * second.imag + first.imag * second.real)

@@ -1,0 +1,39 @@
+"""Motion models of small vehicles, and parameters of the joint solver with a DVL."""
+
+from mlsm_manager.joint_solver.motion.motion_models import (
+    Compass,
+    DvlFactors,
+    DvlOdometry,
+    ThrusterFactors,
+    ThrusterOdometry,
+)
+from mlsm_manager.joint_solver.motion.velocity_models import (
+    HeadingFactors,
+    HeadingOdometry,
+    Speeds,
+    UnaidedFactors,
+    UnaidedOdometry,
+)
+from mlsm_manager.joint_solver.parameters import SolverParameters
+
+COMPASS = Compass(heading_deviation=0.01745, heading_correlation_time=300.0, heading_walk=0.00035)
+DVL_ODOMETRY = DvlOdometry(
+    COMPASS, position_walk=0.12, direction=0.0, direction_deviation=0.105, direction_walk=0.0014, scale=0.0,
+    scale_deviation=0.01,
+)  # fmt: skip
+THRUSTER_ODOMETRY = ThrusterOdometry(
+    **{**vars(DVL_ODOMETRY), "scale_deviation": 0.3}, scale_walk=0.005, current_deviation=0.05, current_walk=0.002
+)
+SPEEDS = Speeds(
+    start_speed_deviation=0.3, speed_deviation=0.1, speed_correlation_time=40.0, travel_walk=0.005,
+    slip_deviation=0.05, slip_correlation_time=20.0,
+)  # fmt: skip
+
+DVL, THRUSTERS = DvlFactors(DVL_ODOMETRY), ThrusterFactors(THRUSTER_ODOMETRY)
+HEADING = HeadingFactors(HeadingOdometry(SPEEDS, COMPASS))
+UNAIDED = UnaidedFactors(UnaidedOdometry(SPEEDS, 0.05, 10.0, 0.00035))
+
+
+def solver_parameters(**values):
+    """Return parameters of the joint solver with `values` of some, and the model of a DVL unless another is given."""
+    return SolverParameters(**{"odometry": DVL, **values})
