@@ -1,4 +1,4 @@
-"""Where numba keeps what it compiles: it refuses to work where it finds no folder to write to."""
+"""Compiles loops with numba and keeps them on disk: numba refuses to work where it finds no folder to write to."""
 
 import atexit
 import logging
@@ -7,51 +7,37 @@ import tempfile
 from functools import lru_cache
 from typing import Any, Callable
 
-ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
+from numba import config, njit
 
-
-@lru_cache(maxsize=None)
-def has_cache() -> bool:
-    """Return whether numba finds a folder that lasts; the first time that there is none, one line says what to do."""
-    from numba import njit
-
-    try:
-        njit(cache=True)(_probe)
-    except RuntimeError:
-        logging.getLogger(__name__).warning(
-            "numba finds no folder to keep compiled loops in and compiles them at every start: %s", ADVICE
-        )
-        return False
-    return True
-
-
-@lru_cache(maxsize=None)
-def prepare_cache() -> None:
-    """Let numba compile into a temporary folder of this process where it finds none that lasts.
-
-    Raises ImportError where no temporary folder can be made.
-    """
-    if has_cache():
-        return
-    from numba import config
-
-    try:
-        config.CACHE_DIR = tempfile.mkdtemp(prefix="compiled_loops_")
-    except OSError as error:
-        raise ImportError(f"no temporary folder for compiled loops: {error}; {ADVICE}") from None
-    atexit.register(shutil.rmtree, config.CACHE_DIR, ignore_errors=True)
+_ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
 
 
 def compiled(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], Any]:
-    """Return numba's decorator for a loop that stays compiled in the cache on disk, see `prepare_cache`.
+    """Return numba's decorator for a loop that stays compiled in the cache on disk.
 
-    signature, options: as numba.njit takes them; with a signature the loop is compiled where it is defined, otherwise
-    when it is called first with arguments of new types.
+    signature, options: as numba.njit takes them. With a signature the loop is compiled, or read from the cache, when
+    its module is imported, otherwise when it is called first with arguments of new types. Arrays of messages are
+    read-only. Raises ImportError where numba finds no folder, not even a temporary one.
     """
-    prepare_cache()
-    from numba import njit
-
+    _prepare_cache()
     return njit(*signature, cache=True, **options)
+
+
+@lru_cache(maxsize=None)
+def _prepare_cache() -> None:
+    """Let numba compile into a temporary folder of this process where it finds none that lasts; one line says so."""
+    try:
+        njit(cache=True)(_probe)
+        return
+    except RuntimeError:
+        logging.getLogger(__name__).warning(
+            "numba finds no folder to keep compiled loops in: they are compiled at every start; %s", _ADVICE
+        )
+    try:
+        config.CACHE_DIR = tempfile.mkdtemp(prefix="compiled_loops_")
+    except OSError as error:
+        raise ImportError(f"no temporary folder for compiled loops: {error}; {_ADVICE}") from None
+    atexit.register(shutil.rmtree, config.CACHE_DIR, ignore_errors=True)
 
 
 def _probe() -> None:
