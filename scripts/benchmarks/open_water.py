@@ -6,7 +6,7 @@ from typing import Callable, Dict, Iterator, List
 import numpy as np
 
 from benchmarks.harness import Row, benchmark_parser, print_table
-from mlsm_manager.localisation.joint_parameters import EstimatorName
+from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay

@@ -13,7 +13,6 @@ from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.odometry_kind import with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan
 
 Truth = Callable[[np.ndarray], np.ndarray]
@@ -57,7 +56,7 @@ def solved_live(recording: Recording, kind: OdometryKind, shape: EchoShape) -> L
     """Return the joint solver after all scans of a recording."""
     scans, parameters = replay_input(recording, kind, shape)
     solver = LiveSolver(
-        parameters.solver_parameters(parameters.part(OdometryErrors), parameters.range_scale_deviation),
+        parameters.solver_parameters(),
         recording.sonar_in_base,
     )
     for scan in scans:

@@ -12,7 +12,6 @@ from mlsm_manager.offline.bag_recording import read_recording
 from mlsm_manager.offline.echo_shape import EchoShape, suited
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from recordings.reader import Request
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -33,10 +32,7 @@ def recorded():
 
 
 def path_of(recording, parameters, scans):
-    errors = parameters.part(OdometryErrors)
-    solver = LiveSolver(
-        parameters.solver_parameters(errors, parameters.range_scale_deviation), np.array(recording.sonar_in_base)
-    )
+    solver = LiveSolver(parameters.solver_parameters(), np.array(recording.sonar_in_base))
     for scan in scans:
         solver.add(scan)
     return np.array([estimate.T_map_base for estimate in solver.estimates])

@@ -9,7 +9,9 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
-from mlsm_manager.localisation.joint_belief import (
+from mlsm_manager.localisation.joint_maps import JointMaps
+from mlsm_manager.localisation.joint_session import (
+    JointSession,
     belief_at,
     belief_of,
     belief_of_match,
@@ -18,8 +20,6 @@ from mlsm_manager.localisation.joint_belief import (
     prior_at,
     update_of,
 )
-from mlsm_manager.localisation.joint_maps import JointMaps
-from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.localisation.run_continuation import continued

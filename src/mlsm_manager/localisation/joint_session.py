@@ -1,4 +1,4 @@
-"""Fills pauses in which no scan came with scans that heard nothing, so that the motion in a pause has nodes too."""
+"""One run of the joint solver in the map, and what its estimates mean for the localiser."""
 
 from dataclasses import dataclass, field, replace
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple
@@ -11,42 +11,32 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.placement import SolvedPlacement
+from mlsm_manager.localisation.updates import ScanUpdate
+from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
+from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import told_deviation
 from mlsm_manager.self_check.verdict import Verdict
-from node_support.geometry import composed, transformed
+from node_support.geometry import composed, inverse, transformed, wrapped
 
 _LONGEST_PAUSE = 2.0
 """Usual durations of a scan between two scans: fewer may be a turn that was lost."""
 _MOST_SCANS = 30
 """For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
-
-
-def scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
-    """Return scans without points from the newest of node_times (n,) [s] to the beginning of `scan`, n > 0.
-
-    None where that is less than a pause. The last one ends where the scan begins, so that the vehicle's motion within
-    the scan does not hang on that in the pause.
-    """
-    if len(node_times) < 2:
-        return []
-    newest, usual = node_times[-1], float(np.median(np.diff(node_times)))
-    count = min(round((scan.start - newest) / usual), _MOST_SCANS)
-    if scan.start - newest <= _LONGEST_PAUSE * usual:
-        return []
-    return [scan.without_points(float(end)) for end in np.linspace(newest, scan.start, count + 1)[1:]]
-
-
-_AGREES = 0.5  # share of a scan's points on surfaces of others from which on it agrees with them
+_AGREES = 0.5
+"""Share of a scan's points on surfaces of others from which on it agrees with them."""
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
-
 _MOST_APART = 200
 """Scans whose place in the map is not known that may still be moved: an hour's, since drawing takes as long as there
 are many."""
+_PATH_POINTS = 17
+"""Points of the path within a scan: about one per second of a slow head's revolution."""
 
 
 @dataclass
@@ -63,7 +53,7 @@ class JointSession:
 
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
-        for silent in scans_of_pause(scan, self.solver.log.node_times):
+        for silent in _scans_of_pause(scan, self.solver.log.node_times):
             self._add(silent)
         return self._add(scan)
 
@@ -193,6 +183,21 @@ class JointSession:
         return int(self.solver.islands.apart.sum()) // self.solver.parameters.parts_per_turn
 
 
+def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
+    """Return scans without points from the newest of node_times (n,) [s] to the beginning of `scan`, n > 0.
+
+    None where that is less than a pause. The last one ends where the scan begins, so that the vehicle's motion within
+    the scan does not hang on that in the pause.
+    """
+    if len(node_times) < 2:
+        return []
+    newest, usual = node_times[-1], float(np.median(np.diff(node_times)))
+    count = min(round((scan.start - newest) / usual), _MOST_SCANS)
+    if scan.start - newest <= _LONGEST_PAUSE * usual:
+        return []
+    return [scan.without_points(float(end)) for end in np.linspace(newest, scan.start, count + 1)[1:]]
+
+
 def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:
     track = _moved_track(scan.track, T_map_odom)
     return replace(scan, points=transformed(T_map_odom, scan.points), track=track)
@@ -202,3 +207,78 @@ def _moved_track(track: Track, T_map_odom: np.ndarray) -> Track:
     if not T_map_odom.any():
         return track
     return Track(track.times, composed(T_map_odom, track.poses))
+
+
+def belief_of(estimate: LiveEstimate, errors: OdometryErrors, fading: Optional[Fading]) -> Belief:
+    """Return pose and odometry errors; of errors that the solver does not estimate, what is known beforehand.
+
+    fading: of the rates after the estimate.
+    """
+    drift = estimate.drift
+    slopes = np.zeros((STATES, estimate.node.size))
+    slopes[:POSE_COLUMNS, :POSE_COLUMNS] = np.eye(POSE_COLUMNS)
+    slopes[ERRORS] = drift.slopes
+    of_node = estimate.covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+    covariance = slopes @ of_node @ slopes.T
+    unknown = ~slopes.any(axis=1)
+    covariance[unknown, unknown] = np.diag(errors.covariance())[unknown]
+    return Belief(estimate.time, np.append(estimate.T_map_base, drift.values), covariance, fading)
+
+
+def belief_at(time: float, pose: np.ndarray, errors: OdometryErrors) -> Belief:
+    """Return a belief in a pose (3,) that is taken as certain, with odometry errors as they are beforehand."""
+    return Belief(time, np.concatenate([pose, np.zeros(STATES - POSE_COLUMNS)]), errors.covariance())
+
+
+def belief_of_match(scan: Scan, result: MatchResult, errors: OdometryErrors) -> Belief:
+    """Return a belief in the pose that a match found, with odometry errors as they are beforehand."""
+    belief = belief_at(scan.reference_time, result.pose, errors)
+    belief.covariance[POSE, POSE] = result.covariance[POSE, POSE]
+    return belief
+
+
+def prior_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Prior:
+    """Return a prior where `correction` T_map_odom (3,) puts the end of a scan, as sure as `expected`."""
+    theta = np.concatenate([composed(correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
+    return prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
+
+
+def correction_of(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
+    """Return T_map_odom (3,) that puts the end of a scan to T_map_base (3,)."""
+    correction = composed(T_map_base, inverse(scan.reference_pose))
+    correction[2] = wrapped(correction[2])
+    return correction
+
+
+def path_times(start: float, end: float) -> np.ndarray:
+    """Return the times (_PATH_POINTS,) s at which the path within a scan is told."""
+    return np.linspace(start, end, _PATH_POINTS)
+
+
+def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float) -> ScanUpdate:
+    """Return what a run that has just taken a scan made of it. seconds: that it took."""
+    solver = session.solver
+    estimate = solver.estimates[-1]
+    if not estimate.comparisons:
+        return ScanUpdate(scan, None, True, belief, provisional=session.is_provisional)
+    result = _match(scan, estimate, belief, session, seconds)
+    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional)
+
+
+def _match(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSession, seconds: float) -> MatchResult:
+    """Return what the solver found for a scan, as a matcher would say it."""
+    times = path_times(min(scan.start, estimate.time - 1e-3), estimate.time)
+    return MatchResult(
+        status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
+        covariance=_fix_covariance(estimate), rate=belief.theta[RATE], motion=belief.theta[MOTION],
+        state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
+        iterations=session.solver.parameters.live_iterations, seconds=seconds, beam_times=times,
+        beam_poses=session.path(times),
+    )  # fmt: skip
+
+
+def _fix_covariance(estimate: LiveEstimate) -> np.ndarray:
+    """Return the covariance (6, 6) of pose and velocity; what both share is left out."""
+    covariance = np.zeros((6, 6))
+    covariance[:3, :3], covariance[3:, 3:] = estimate.pose_covariance, estimate.velocity_covariance
+    return covariance

@@ -1,13 +1,16 @@
 """Parameters of the localiser, live and on recordings, and of mlsm_core."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 from typing import Any, Dict, Optional, Sequence
 
+import numpy as np
+
+from mlsm_manager.joint_solver.parameters import JointSolverParameters, SolverParameters
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint import Joint
-from mlsm_manager.localisation.joint_parameters import EstimatorName, JointParameters
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
+from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind
 from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
@@ -21,6 +24,34 @@ from node_support.parameters import ParameterError, ParameterSet, parameter
 
 # A block takes 112 bytes with its part of the index: 1.8 GB, more than a vehicle's computer can spare.
 MAX_PREALLOCATED_CELLS = 16_000_000
+
+
+class EstimatorName(Enum):
+    """How scans find their poses."""
+
+    JOINT = "JOINT"
+    SCAN_BY_SCAN = "SCAN_BY_SCAN"
+    THESIS = "THESIS"
+
+
+@dataclass(frozen=True)
+class JointParameters(OdometryChoice, JointSolverParameters):
+    """Which estimator finds the poses, and what the joint one needs besides OdometryErrors."""
+
+    estimator: EstimatorName = parameter(
+        EstimatorName.SCAN_BY_SCAN,
+        "JOINT: the newest scans find their poses together, none is rejected; `odometry` says what "
+        "the motion is known from. SCAN_BY_SCAN: each alone, against the map of those before. THESIS: the same by the "
+        "matcher of the thesis, to compare with", tunable=False,
+    )  # fmt: skip
+
+    def check(self) -> None:
+        """Refuse parts of turns whose headings nobody reports."""
+        if self.odometry is OdometryKind.NONE and self.parts_per_turn > 1:
+            raise ParameterError(
+                f"parts_per_turn = {self.parts_per_turn}: must be 1 with odometry = NONE, because parts of turns are "
+                "placed by particles that need a heading"
+            )
 
 
 class MatchInput(Enum):
@@ -63,11 +94,24 @@ class LocaliserParameters(
         return Localiser(estimator, settings)
 
     def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
-        errors = self.part(OdometryErrors)
-        if self.estimator is not EstimatorName.JOINT:
-            return ScanByScan(self.map_settings(), errors, matcher, sonar_in_base)
-        solver = self.solver_parameters(errors, self.range_scale_deviation)
-        return Joint(self.map_settings(), errors, matcher, sonar_in_base, solver)
+        given = self.map_settings(), self.part(OdometryErrors), matcher, sonar_in_base
+        return Joint(*given, self.solver_parameters()) if self.estimator is EstimatorName.JOINT else ScanByScan(*given)
+
+    def solver_parameters(self) -> SolverParameters:
+        """Return what these mean for the joint solver."""
+        return SolverParameters(
+            **{field.name: getattr(self, field.name) for field in fields(JointSolverParameters)},
+            range_scale_deviation=self.range_scale_deviation,
+            odometry=self.odometry_model(self.part(OdometryErrors)),
+            node_search=self.node_search(self.parts_per_turn),
+        )
+
+    @property
+    def longest_turn(self) -> float:
+        """How long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
+        measured = not np.isinf(self.odometry_model(self.part(OdometryErrors)).distance_deviation)
+        alone = self.estimator is not EstimatorName.JOINT
+        return np.inf if measured or alone else self.rate_time * self.parts_per_turn
 
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""

@@ -5,8 +5,8 @@ import sys
 from pathlib import Path
 from typing import Any, Dict, List
 
-from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
+from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from node_support.help import CommandLine

@@ -2,8 +2,7 @@
 
 from dataclasses import dataclass
 
-from mlsm_manager.localisation.joint_parameters import EstimatorName
-from mlsm_manager.localisation.parameters import LocaliserParameters
+from mlsm_manager.localisation.parameters import EstimatorName, LocaliserParameters
 from node_support.parameters import with_defaults
 from recordings.reader import ReadingParameters
 from sonar_processing.beams.parameters import BeamCorrection

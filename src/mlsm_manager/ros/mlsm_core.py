@@ -21,7 +21,6 @@ from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform
 from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import Autosave, MapServices
 from mlsm_manager.ros.odometry_track import OdometryTrack
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
@@ -50,7 +49,7 @@ class MlsmCore:
         self.healths = [self.health]
         parameters = read_parameters(MlsmCoreParameters, namespace)
         self._localiser = parameters.build_localiser()
-        self._longest_turn = parameters.longest_turn(parameters.part(OdometryErrors))
+        self._longest_turn = parameters.longest_turn
         self._live = ReconfigurableParameters(
             MlsmCoreParameters, namespace, "MlsmCore", self.health, self._use_parameters
         )

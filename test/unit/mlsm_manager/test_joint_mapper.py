@@ -5,10 +5,9 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.localisation.clouds import Cloud
-from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 from node_support.errors import RefusedInput
 
 SCANS = tour(12).scans

@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
 
-from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.localiser import MapInput
-from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.map_file import map_bytes, map_of_bytes
 from node_support.geometry import composed, transformed

@@ -7,9 +7,8 @@ import pytest
 from made_scans import harbour, scan_of, still, wall
 
 from mlsm_manager.localisation.clouds import Cloud
-from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.localiser import MapInput
-from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 from mlsm_manager.surface_map.map_file import Layer
 
 SONAR_IN_BASE = (5.0, 0.0)

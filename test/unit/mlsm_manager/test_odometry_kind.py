@@ -12,7 +12,6 @@ from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.live_file import replay_values
 from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Track
 from node_support.health import Health
 
@@ -67,7 +66,7 @@ def test_a_turn_of_a_minute_is_too_slow_where_no_speed_is_measured(kind, slow):
     warnings = []
     for seconds in (16.0, 60.0):
         health = Health("mlsm_core", warnings.append)
-        report_turn(health, seconds, parameters.longest_turn(parameters.part(OdometryErrors)))
+        report_turn(health, seconds, parameters.longest_turn)
     assert ["60 s, must be at most 40 s" in line for line in warnings] == [True] * slow
 
 

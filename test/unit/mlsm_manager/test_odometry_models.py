@@ -15,7 +15,6 @@ from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
 from mlsm_manager.joint_solver.unknowns.state import Layout
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, transformed
 
@@ -30,7 +29,7 @@ KINDS = list(OdometryKind)
 
 def parameters(kind, **changes):
     profile = MlsmCoreParameters().changed({**profile_values(kind), **changes})
-    return profile.solver_parameters(profile.part(OdometryErrors), 0.0)
+    return profile.solver_parameters()
 
 
 def model_of(kind, **changes):

@@ -3,7 +3,7 @@
 import pytest
 from benchmarks.open_water import bubbles, outcome
 
-from mlsm_manager.localisation.joint_parameters import EstimatorName
+from mlsm_manager.localisation.parameters import EstimatorName
 
 pytestmark = pytest.mark.long
 

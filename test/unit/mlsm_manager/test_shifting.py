@@ -16,10 +16,8 @@ from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, sh
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
 from mlsm_manager.joint_solver.solve.batch_solver import settled
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
-from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 
 ALONG = np.array([1.0, 0.0])
 TURN = 16.0  # s; each is one scan here
@@ -136,7 +134,7 @@ def test_a_run_that_heard_nothing_stays_as_it_is():
 def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():
     made = tour(6, path=along_canal, corners=CANAL)
     profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(OdometryKind.HEADING))
-    live = LiveSolver(profile.solver_parameters(profile.part(OdometryErrors), 0.0), SONAR_IN_BASE)
+    live = LiveSolver(profile.solver_parameters(), SONAR_IN_BASE)
     for scan in made.scans:
         live.add(scan)
     motion = live.log.node_motion(np.arange(len(live.log.node_times)))

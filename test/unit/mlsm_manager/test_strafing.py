@@ -5,11 +5,9 @@ import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
 
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.joint_parameters import EstimatorName
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted, profile_values, strafes
-from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 from mlsm_manager.offline.odometry_kind import may_strafe
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.errors import RefusedInput
 
 pytestmark = pytest.mark.long
@@ -34,7 +32,7 @@ MADE = tour(14, path=strafed)
 
 def solver_of(kind):
     profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(kind))
-    return LiveSolver(profile.solver_parameters(profile.part(OdometryErrors), 0.0), SONAR_IN_BASE)
+    return LiveSolver(profile.solver_parameters(), SONAR_IN_BASE)
 
 
 def followed(kind, scans=MADE.scans):
