@@ -116,12 +116,12 @@ def test_a_stop_ends_the_scan(tmp_path, gone):
 
 @pytest.mark.parametrize("fault", [Fault.NONE, Fault.SILENCE, Fault.DISAPPEARANCE])
 def test_a_stop_ends_the_scan_at_once(fault):
-    stop = VirtualStopAt(VirtualTime(), 20.0)
+    stop = VirtualStopAt(VirtualTime(), 5.0)
     faults = FaultInjector(EmulatorParameters(silence_duration=60.0, absence_duration=60.0))
     scanner = virtual_scanner(stop, faults, lambda _: None)
     faults.order(fault)
     scanner.run()
-    assert stop.time.now < 20.0 + 0.1
+    assert stop.time.now < 5.0 + 0.1
 
 
 @pytest.fixture(scope="module")

@@ -1,3 +1,6 @@
+from functools import partial
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 from ping360_line import SETTINGS
@@ -6,6 +9,7 @@ from virtual_scan import VirtualScan
 
 from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
 from ping360_driver.protocol.messages import MessageId
+from ping360_driver.protocol.scan_command import PulseSettings, ScanCommand, bin_length
 from sonar_driver.emulator.faults import Fault, FaultInjector
 
 REQUESTS = SETTINGS.changed({"scan_mode": "request"})
@@ -49,6 +53,40 @@ def test_a_head_that_refuses_to_scan_by_itself_is_asked_for_every_ping():
     scan.beams(3)
     assert (scan.stats.mode, scan.stats.refusals) == ("request", 1)
     assert "message 2602: not today" in scan.stats.last_error
+
+
+def test_older_firmware_is_asked_for_every_ping(port):
+    scan = VirtualScan(port, head=partial(EmulatedPing360, auto_transmit=False))
+    scan.beams(3)
+    assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
+
+
+def test_the_mode_can_change_while_the_head_scans(port):
+    scan = VirtualScan(port)
+    scan.beams(1)
+    assert scan.stats.details()["scan mode"] == "auto_transmit"
+    scan.settings = REQUESTS
+    scan.until(lambda: scan.stats.mode == "request")
+    scan.beams(3)
+
+
+def test_changed_settings_reach_the_head(port):
+    scan = VirtualScan(port)
+    scan.beams(3)
+    scan.settings = SETTINGS.changed({"sector_width_deg": 18.0, "max_range": 2.0, "gain_setting": 2})
+    scan.until(lambda: scan.pings[-1].beam.sector == (190, 210, 1))
+    pulse = scan.pings[-1].beam.pulse
+    assert pulse.gain_setting == 2
+    assert pulse.number_of_samples * bin_length(pulse.sample_period, 1500.0) == pytest.approx(2.0, rel=0.005)
+
+
+def test_a_pulse_too_long_for_the_head_comes_back_as_the_head_made_it(port):
+    scan = VirtualScan(port)
+    too_long = ScanCommand(PulseSettings(1, 500, 80, 750, 440))
+    scan.settings = SimpleNamespace(command=lambda: too_long)
+    scan.beams(20)
+    assert scan.pings[-1].beam.pulse.transmit_duration == 128
+    assert scan.stats.details()["transmit duration [us]"] == "128"
 
 
 def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
@@ -130,10 +168,10 @@ def test_the_scan_goes_on_within_two_seconds_after_the_head_was_away(port, setti
 @pytest.mark.parametrize("fault", [Fault.NONE, Fault.SILENCE, Fault.DISAPPEARANCE])
 def test_a_stop_ends_the_scan_at_once(port, settings, fault):
     injector = FaultInjector(EmulatorParameters(silence_duration=60.0, absence_duration=60.0))
-    scan = VirtualScan(port, settings, injector, stop=VirtualStopAt(VirtualTime(), 20.0))
+    scan = VirtualScan(port, settings, injector, stop=VirtualStopAt(VirtualTime(), 3.0))
     injector.order(fault)
     scan.scan()
-    assert scan.device.stop.time.now < 20.0 + 0.2
+    assert scan.device.stop.time.now < 3.0 + 0.2
 
 
 @MODES
