@@ -1,13 +1,18 @@
+"""Replies to bytes and back, in streams with garbage between them, and the angles in them."""
+
 import contextlib
+import math
 
 import pytest
-from driver_strategies import replies
+from driver_strategies import chunks_of, garbage, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind
+from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind, head_angle, head_position
+from imagenex_852_driver.protocol.reply_parser import ReplyParser
 
 RECORDED_HEADER = bytes.fromhex("49475811 45780a32 40037403")
+WHOLE = Reply(ReplyKind.IGX, 50, bytes(range(250)) * 2)
 
 
 @given(replies())
@@ -53,3 +58,110 @@ def test_a_wrong_number_of_echoes_is_refused_with_the_number():
 def test_decoding_raises_nothing_but_frame_errors(data):
     with contextlib.suppress(FrameError):
         Reply.decode(data)
+
+
+def replies_in(parser, chunks):
+    return [parsed.reply for chunk in chunks for parsed in parser.feed(chunk)]
+
+
+@given(st.binary(max_size=2000), st.lists(st.integers(0), max_size=5))
+def test_no_stream_of_bytes_makes_it_raise(data, cuts):
+    replies_in(ReplyParser(), chunks_of(data, cuts))
+
+
+@given(garbage(), replies())
+def test_a_whole_reply_behind_garbage_is_never_lost(noise, reply):
+    assert replies_in(ReplyParser(), [noise + reply.encode()])[-1:] == [reply]
+
+
+@given(garbage(), replies(), garbage(), st.lists(st.integers(0), max_size=8))
+def test_any_cutting_of_the_stream_gives_the_same_replies_and_counts(before, reply, after, cuts):
+    stream = before + reply.encode() + after
+    whole, cut = ReplyParser(), ReplyParser()
+    assert replies_in(whole, [stream]) == replies_in(cut, chunks_of(stream, cuts))
+    assert whole.counts == cut.counts
+
+
+@given(st.lists(replies(), max_size=4))
+def test_replies_back_to_back_come_out_in_order(sent):
+    stream = b"".join(reply.encode() for reply in sent)
+    assert replies_in(ReplyParser(), [bytes([byte]) for byte in stream]) == sent
+
+
+def test_a_reply_is_held_back_until_its_last_byte():
+    parser = ReplyParser()
+    frame = WHOLE.encode()
+    assert parser.feed(frame[:-1]) == []
+    assert parser.pending
+    assert parser.feed(frame[-1:])[0].reply == WHOLE
+
+
+def test_a_reply_cut_short_whose_end_falls_on_a_terminator_does_not_swallow_the_next():
+    following = Reply(ReplyKind.IGX, 50, b"\xfc" * 500)
+    stream = WHOLE.encode()[:200] + following.encode()
+    assert replies_in(ReplyParser(), [stream]) == [following]
+
+
+def test_a_status_byte_is_not_taken_for_the_terminator_of_a_cut_reply():
+    following = Reply(ReplyKind.IGX, 50, bytes(500), status=0xFC)
+    stream = WHOLE.encode()[: 513 - 5] + following.encode()
+    assert replies_in(ReplyParser(), [stream]) == [following]
+
+
+def test_a_reply_cut_short_counts_as_incomplete_and_not_as_corrupt():
+    parser = ReplyParser()
+    parser.feed(WHOLE.encode()[:100] + WHOLE.encode())
+    assert (parser.counts.incomplete, parser.counts.corrupt) == (1, 0)
+
+
+def test_a_reply_cut_short_by_silence_counts_as_incomplete():
+    parser = ReplyParser()
+    parser.feed(WHOLE.encode()[:100])
+    parser.reset()
+    assert parser.counts.incomplete == 1
+    assert not parser.pending
+
+
+def test_a_reply_with_a_wrong_terminator_counts_as_corrupt_and_not_as_incomplete():
+    parser = ReplyParser()
+    parser.feed(WHOLE.encode()[:-1] + b"\x00")
+    assert (parser.counts.incomplete, parser.counts.corrupt) == (0, 1)
+
+
+def test_every_byte_outside_of_replies_is_counted():
+    parser = ReplyParser()
+    parser.feed(b"noise" + WHOLE.encode() + b"more")
+    assert parser.counts.skipped_bytes == 9
+
+
+def test_the_offset_is_where_the_reply_began_in_the_stream():
+    parser = ReplyParser()
+    parser.feed(b"abc")
+    assert parser.feed(b"de" + WHOLE.encode())[0].offset == 5
+
+
+def test_straight_ahead_is_zero():
+    assert head_angle(1400) == 0.0
+
+
+def test_the_head_counts_clockwise_and_the_angle_counter_clockwise():
+    assert head_angle(1400 + 600) == pytest.approx(-math.pi / 2)
+
+
+def test_a_head_upside_down_turns_the_other_way():
+    assert head_angle(1400 + 600, inverted=True) == pytest.approx(math.pi / 2)
+
+
+@pytest.mark.parametrize("position", range(0, 2801, 20))
+def test_angles_stay_within_half_a_turn(position):
+    assert abs(head_angle(position)) <= math.pi
+
+
+def test_positions_a_turn_apart_have_one_angle():
+    assert head_angle(2800) == pytest.approx(head_angle(2800 - 2400))
+
+
+@pytest.mark.parametrize("inverted", [False, True])
+@pytest.mark.parametrize("position", range(201, 2600, 7))
+def test_positions_come_back_from_their_angles(position, inverted):
+    assert head_position(head_angle(position, inverted), inverted) == position

@@ -1,4 +1,4 @@
-"""The one holder of tf, on tf2 itself. No ROS master is needed: messages are handed to its callbacks."""
+"""Where frames and joints are, on tf2 itself. No ROS master is needed: messages are handed to callbacks."""
 
 import math
 
@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 import rospy
 from geometry_msgs.msg import TransformStamped
+from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
 from node_support.errors import RefusedInput
 from node_support.health import Health
-from node_support.ros.transforms import TfBuffer
+from node_support.ros.transforms import JointAngle, TfBuffer
 
 SECOND = 10**9
 CLOCK = 1_700_000_000.0
@@ -143,3 +144,43 @@ def test_waiting_ends_with_what_is_in_the_way(tf):
     assert "base_link" in tf.buffer.wait_for("odom", "base_link", int(CLOCK * SECOND), patience=0.01)
     tf.send(transform(CLOCK))
     assert tf.buffer.wait_for("odom", "base_link", int(CLOCK * SECOND), patience=60.0) == ""
+
+
+@pytest.fixture
+def warnings():
+    return []
+
+
+@pytest.fixture
+def servo(warnings, monkeypatch):
+    """Return a JointAngle and what hands it messages."""
+    callbacks = []
+    monkeypatch.setattr(rospy, "Subscriber", lambda topic, kind, callback, **_: callbacks.append(callback))
+    angles = []
+    joint = JointAngle("servo", Health("test", warnings.append), angles.append)
+    return joint, callbacks[0], angles
+
+
+def test_the_newest_angle_of_the_joint_is_told(servo):
+    joint, take, angles = servo
+    take(JointState(name=["other", "servo"], position=[0.1, 0.2]))
+    take(JointState(name=["other"], position=[0.3]))
+    assert (joint.for_beam(), angles) == (0.2, [0.2])
+
+
+def test_an_angle_that_is_not_finite_is_refused(servo, warnings):
+    joint, take, angles = servo
+    take(JointState(name=["servo"], position=[0.2]))
+    take(JointState(name=["servo"], position=[math.nan]))
+    assert (joint.for_beam(), angles) == (0.2, [0.2])
+    assert "joint states refused" in warnings[0]
+
+
+def test_beams_before_the_first_angle_are_counted(servo, warnings):
+    assert servo[0].for_beam() == 0.0
+    assert "beams of unknown tilt" in warnings[0]
+
+
+def test_without_a_joint_nothing_is_missed(warnings):
+    assert JointAngle("", Health("test", warnings.append)).for_beam() == 0.0
+    assert warnings == []

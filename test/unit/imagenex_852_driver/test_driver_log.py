@@ -1,0 +1,223 @@
+"""The manufacturer's logs: records, whole files with damages, and the times of their pings."""
+
+import os
+
+import pytest
+from driver_strategies import commands, replies
+from hypothesis import given
+from hypothesis import strategies as st
+
+from imagenex_852_driver.log_file import LogReader, LogWriteError, LogWriter, timed
+from imagenex_852_driver.log_record import LoggedPing, check_record_header, decode_record
+from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind
+
+REPLY = Reply(ReplyKind.IGX, 50, bytes(range(250)) * 2, head_id=0x11)
+
+pings = st.builds(
+    LoggedPing,
+    reply=replies(),
+    stamp=st.none() | st.integers(0, 4_000_000_000_00).map(lambda hundredths: hundredths / 100),
+    clockwise=st.booleans(),
+    transducer_up=st.booleans(),
+    step_code=st.integers(0, 7),
+    start_gain_db=st.integers(0, 40),
+    sector_width_deg=st.integers(0, 120).map(lambda value: 3 * value),
+    train_angle_deg=st.integers(-70, 70).map(lambda value: 3 * value),
+    pulse_length_us=st.integers(0, 255),
+    profile=st.integers(0, 4),
+    speed_of_sound=st.integers(14000, 16000).map(lambda tenths: tenths / 10),
+    text=st.text("abc Ä", max_size=31),
+    depth=st.none() | st.integers(0, 32767).map(lambda tenths: tenths / 10),
+    heading_deg=st.none() | st.integers(0, 3600).map(lambda tenths: tenths / 10),
+    frequency_khz=st.sampled_from((675, 850)),
+)
+
+
+@given(pings)
+def test_every_ping_round_trips(ping):
+    assert decode_record(ping.encode()) == ping
+
+
+@pytest.mark.parametrize(("kind", "length"), [(ReplyKind.IPX, 128), (ReplyKind.IMX, 384), (ReplyKind.IGX, 640)])
+def test_records_have_the_lengths_of_the_maker(kind, length):
+    assert len(LoggedPing(Reply(kind, 20, bytes(kind.echo_count))).encode()) == length
+
+
+def test_date_and_time_are_written_as_the_maker_does():
+    record = LoggedPing(REPLY, stamp=1561626123.25).encode()
+    assert record[8:33] == b"27-Jun-2019\x0009:02:03\x00.25\x00"
+
+
+def test_negative_turns_are_kept():
+    assert decode_record(LoggedPing(REPLY, turns=-2.5).encode()).turns == -2.5
+
+
+def test_a_depth_in_feet_is_read_in_metres():
+    record = bytearray(LoggedPing(REPLY, depth=10.0).encode())
+    record[82:83] = b"F"
+    assert decode_record(bytes(record)).depth == pytest.approx(3.048)
+
+
+@pytest.mark.parametrize("text", [b"31-Feb-2019", b"27-Xyz-2019", b"99-Jun-2019", b"27-Jun-0001", b"\xff" * 11])
+def test_a_broken_date_leaves_the_ping_readable_and_without_a_stamp(text):
+    record = bytearray(LoggedPing(REPLY, stamp=1.0).encode())
+    record[8:19] = text
+    assert decode_record(bytes(record)) == LoggedPing(REPLY, stamp=None)
+
+
+@pytest.mark.parametrize("index", [0, 3, 4, 7, 100, 103, 112 + 500])
+def test_a_record_that_does_not_hold_together_is_refused(index):
+    record = bytearray(LoggedPing(REPLY).encode())
+    record[index] ^= 0x80
+    with pytest.raises(FrameError):
+        decode_record(bytes(record))
+
+
+def test_a_value_that_does_not_fit_is_refused_with_the_value():
+    with pytest.raises(FrameError, match="byte 38 of the log record = 300"):
+        LoggedPing(REPLY, start_gain_db=300).encode()
+
+
+@given(st.binary(max_size=700))
+def test_checking_raises_nothing_but_frame_errors(data):
+    try:
+        check_record_header(data)
+    except FrameError:
+        return
+    assert data[:3] == b"852"
+
+
+@given(commands, replies(), st.integers(0, 2_000_000_000))
+def test_every_ping_of_the_driver_can_be_logged(command, reply, stamp):
+    logged = LoggedPing.of(float(stamp), command, reply)
+    assert decode_record(logged.encode()) == logged
+
+
+def numbered(number):
+    return LoggedPing(Reply(ReplyKind.IGX, 50, bytes([number]) * 500), stamp=1000.0 + number)
+
+
+PINGS = [numbered(number) for number in range(5)]
+RECORDS = [ping.encode() for ping in PINGS]
+
+
+@pytest.fixture
+def log(tmp_path):
+    return tmp_path / "test.852"
+
+
+def read_back(path, data):
+    path.write_bytes(data)
+    reader = LogReader(path)
+    return list(reader), reader
+
+
+def test_every_ping_of_the_real_log_is_read(hydroball):
+    reader = LogReader(hydroball)
+    seen = {
+        (ping.reply.max_range, len(ping.reply.echoes), ping.start_gain_db, ping.reply.head_id, ping.stamp)
+        for ping in reader
+    }
+    assert (reader.ping_count, reader.damage_count) == (177, 0)
+    assert seen == {(50, 500, 12, 0x11, None)}
+
+
+def test_what_was_written_is_read_back(log):
+    with LogWriter(log) as writer:
+        for ping in PINGS:
+            writer.write(ping)
+    assert list(LogReader(log)) == PINGS
+
+
+def test_a_writer_appends_to_what_is_there(log):
+    for ping in PINGS:
+        with LogWriter(log) as writer:
+            writer.write(ping)
+    assert list(LogReader(log)) == PINGS
+
+
+def test_an_empty_log_has_no_pings(log):
+    assert read_back(log, b"")[0] == []
+
+
+def test_garbage_between_pings_is_skipped_and_reported(log):
+    pings, reader = read_back(log, RECORDS[0] + b"852\x03garbage" + RECORDS[1])
+    assert pings == PINGS[:2]
+    assert [(part.offset, part.length) for part in reader.damages] == [(640, 11)]
+
+
+@pytest.mark.parametrize("length", [1, 50, 99, 100, 300, 612, 613, 630, 639])
+def test_a_ping_cut_short_costs_no_other_ping(log, length):
+    pings, reader = read_back(log, RECORDS[0] + RECORDS[1][:length] + RECORDS[2])
+    assert PINGS[2] in pings
+    assert pings[0] == PINGS[0]
+    assert reader.damage_count == 1
+
+
+def test_a_log_that_ends_within_a_ping_is_reported(log):
+    pings, reader = read_back(log, RECORDS[0] + RECORDS[1][:200])
+    assert pings == PINGS[:1]
+    assert "640" in str(reader.damages[0])
+
+
+def test_a_ping_with_a_broken_reply_is_skipped(log):
+    broken = bytearray(RECORDS[1])
+    broken[100] = 0
+    pings, reader = read_back(log, RECORDS[0] + bytes(broken) + RECORDS[2])
+    assert pings == [PINGS[0], PINGS[2]]
+    assert (reader.damages[0].offset, reader.damages[0].length) == (640, 640)
+
+
+def test_only_the_first_hundred_damages_are_remembered_but_all_are_counted(log):
+    _, reader = read_back(log, b"".join(b"x" + RECORDS[0] for _ in range(150)))
+    assert (reader.damage_count, len(reader.damages), reader.ping_count) == (150, 100, 150)
+
+
+@given(st.binary(max_size=300), st.integers(0, 639), st.binary(max_size=300))
+def test_no_damage_ends_the_reading_or_costs_a_whole_ping(tmp_path_factory, before, cut, after):
+    path = tmp_path_factory.mktemp("log") / "damaged.852"
+    pings, _ = read_back(path, before + RECORDS[0] + RECORDS[1][:cut] + RECORDS[2] + after)
+    assert [ping for ping in pings if ping != PINGS[1]] == [PINGS[0], PINGS[2]]
+
+
+def test_a_full_disk_leaves_whole_pings_only(log, monkeypatch):
+    write = os.write
+    with LogWriter(log) as writer:
+        writer.write(PINGS[0])
+        monkeypatch.setattr(os, "write", lambda file, data: write(file, data[:100]))
+        with pytest.raises(LogWriteError, match="100 of 640"):
+            writer.write(PINGS[1])
+    assert log.read_bytes() == RECORDS[0]
+
+
+def test_a_log_that_is_not_there_raises_at_once(tmp_path):
+    with pytest.raises(FileNotFoundError):
+        LogReader(tmp_path / "none.852")
+
+
+def times(stamps, rate=None):
+    return [time for time, _ in timed([LoggedPing(REPLY, stamp=stamp) for stamp in stamps], rate)]
+
+
+def test_pings_keep_the_intervals_of_their_stamps():
+    assert times([100.0, 100.5, 102.0]) == [0.0, 0.5, 2.0]
+
+
+def test_pings_without_stamps_follow_each_other_ten_times_a_second():
+    assert times([None, None, None]) == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_a_ping_without_a_stamp_among_others_takes_a_usual_interval():
+    assert times([100.0, None, 107.0]) == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_a_rate_overrides_the_stamps():
+    assert times([100.0, 107.0], rate=4.0) == [0.0, 0.25]
+
+
+def test_time_never_goes_back():
+    assert times([100.0, 50.0, 51.0]) == [0.0, 0.0, 1.0]
+
+
+def test_an_empty_log_has_no_times():
+    assert times([]) == []

@@ -1,0 +1,83 @@
+"""Time in step with the wall clock, and what is overdue."""
+
+import numpy as np
+import pytest
+
+from node_support.timing import Pace, UsualInterval
+
+
+class Clock:
+    """A wall clock that only waiting moves on."""
+
+    def __init__(self):
+        self.now = 100.0
+
+    def wait(self, seconds):
+        self.now += seconds
+
+
+@pytest.fixture
+def clock():
+    return Clock()
+
+
+def _pace(clock, factor):
+    return Pace(factor, clock.wait, lambda: clock.now)
+
+
+@pytest.mark.parametrize("factor", [0.5, 1.0, 20.0])
+def test_simulated_time_passes_factor_times_as_fast(clock, factor):
+    pace = _pace(clock, factor)
+    assert pace.wait_for(10.0) == 0.0
+    assert clock.now == pytest.approx(100.0 + 10.0 / factor)
+
+
+def test_a_small_delay_is_caught_up(clock):
+    pace = _pace(clock, 1.0)
+    clock.now += 0.3
+    assert pace.wait_for(0.1) == pytest.approx(0.2)
+    pace.wait_for(1.0)
+    assert clock.now == pytest.approx(101.0)
+    assert pace.lost == 0.0
+
+
+def test_after_a_long_delay_time_does_not_race(clock):
+    pace = _pace(clock, 1.0)
+    clock.now += 60.0
+    pace.wait_for(1.0)
+    pace.wait_for(2.0)
+    assert clock.now == pytest.approx(161.0)
+    assert pace.lost == pytest.approx(59.0)
+
+
+def taken(times):
+    interval = UsualInterval()
+    for time in times:
+        interval.take(time)
+    return interval
+
+
+def test_after_two_intervals_it_is_overdue():
+    interval = taken([100.0, 114.0, 128.0])
+    assert interval.overdue(128.0 + 28.0) == 0.0
+    assert interval.overdue(128.0 + 38.0) == pytest.approx(10.0)
+
+
+def test_what_came_once_is_never_overdue():
+    assert taken([]).overdue(1e6) == 0.0
+    assert taken([3.0]).overdue(1e6) == 0.0
+
+
+def test_one_long_pause_does_not_change_what_is_usual():
+    interval = taken([0.0, 10.0, 20.0, 300.0, 310.0])
+    assert interval.overdue(335.0) == pytest.approx(5.0)
+
+
+def test_another_rhythm_is_learnt():
+    interval = taken([*np.arange(0.0, 100.0, 10.0), *np.arange(100.0, 400.0, 40.0)])
+    assert interval.overdue(380.0 + 80.0) == 0.0
+
+
+def test_times_that_are_not_newer_say_nothing():
+    interval = taken([0.0, 10.0, 20.0, 20.0, 5.0])
+    assert interval.overdue(41.0) == pytest.approx(1.0)
