@@ -6,7 +6,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.turns import Turns

@@ -4,7 +4,7 @@ from typing import Collection, NamedTuple, Optional
 
 import numpy as np
 
-from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.offline.replay_parameters import ReplayParameters

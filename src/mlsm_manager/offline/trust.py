@@ -5,7 +5,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.batch_solver import solved_part

@@ -7,7 +7,7 @@ import pytest
 from made_models import HEADING, solver_parameters
 from made_posts import heard, true_path
 
-from mlsm_manager.joint_solver.judge.continuity import shares_heard_before
+from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.unknowns.state import State
 from mlsm_manager.self_check.map_checks import scans_go_on

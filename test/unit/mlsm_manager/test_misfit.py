@@ -5,7 +5,7 @@ import pytest
 from made_models import DVL, HEADING, solver_parameters
 from made_posts import heard, true_path
 
-from mlsm_manager.joint_solver.judge.misfit import misfit_variances
+from mlsm_manager.joint_solver.compare.map_support import misfit_variances
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.unknowns.state import State
 

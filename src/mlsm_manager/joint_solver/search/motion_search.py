@@ -5,6 +5,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mlsm_manager.joint_solver.compare.map_support import map_support, nearness
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.motion_models import OdometryModel, Transition
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -13,9 +14,7 @@ from mlsm_manager.joint_solver.search.places import (
     MOST_POINTS,
     NATS,
     REACH,
-    map_support,
     moved,
-    nearness,
     places_within,
 )
 from mlsm_manager.joint_solver.unknowns.state import YAW, State

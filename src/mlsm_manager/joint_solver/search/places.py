@@ -8,11 +8,10 @@ from dataclasses import dataclass
 from typing import List, Protocol, Tuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
+from mlsm_manager.joint_solver.compare.map_support import map_support
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.placement import PlacedPoints
-from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN
 
 FEWEST_POINTS = 25
 """On surfaces, that a scan must hear to tell a place: fewer fit anywhere."""
@@ -148,28 +147,6 @@ def moved(sources: PlacedPoints, ends: np.ndarray) -> np.ndarray:
     """Return the places (k, n, 2) of points whose scan begins and ends `ends` (k, 4) beside where they are."""
     share = sources.shares[:, np.newaxis]
     return sources.places + (1.0 - share) * ends[:, np.newaxis, :2] + share * ends[:, np.newaxis, 2:]
-
-
-def map_support(
-    sources: PlacedPoints, targets: PlacedPoints, places: np.ndarray, parameters: SolverParameters
-) -> np.ndarray:
-    """Return how many of n sources (k,) lie on targets that face the same way, where they are at `places` (k, n, 2).
-
-    Each counts by its quality, and in part where it lies a little beside. Surfaces from before the run do not say from
-    which side they were heard.
-    """
-    distance, index = cKDTree(targets.places).query(places.reshape(-1, 2), distance_upper_bound=parameters.cut)
-    found = np.isfinite(distance)
-    index = np.where(found, index, 0).reshape(places.shape[:2])
-    cosine = np.einsum("na,kna->kn", sources.normals, targets.normals[index])
-    cosine = np.where((targets.scans == BEFORE_THE_RUN)[index], np.abs(cosine), cosine)
-    near = nearness(np.where(found, distance, np.inf)).reshape(cosine.shape)
-    return (near * sources.qualities * (cosine > parameters.min_cosine)).sum(axis=1)
-
-
-def nearness(distance: np.ndarray) -> np.ndarray:
-    """Return how far points count as lying on what is `distance` [m] away: 1 on it, 0 far off."""
-    return np.exp(-0.5 * (distance / _CELL) ** 2)
 
 
 def _best_of(shifts: np.ndarray, shares: np.ndarray) -> List[np.ndarray]:

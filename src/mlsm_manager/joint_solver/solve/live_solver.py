@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.compare.islands import Islands
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.judge.misfit import misfit_variances
+from mlsm_manager.joint_solver.compare.map_support import misfit_variances
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.measured.scan_parts import parts_of
 from mlsm_manager.joint_solver.motion.motion_models import OdometryModel

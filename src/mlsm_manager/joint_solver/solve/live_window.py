@@ -9,9 +9,9 @@ from mlsm_manager.joint_solver.compare.comparisons import add_comparisons
 from mlsm_manager.joint_solver.compare.islands import Islands
 from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.compare.lone_comparisons import LoneComparisons
+from mlsm_manager.joint_solver.compare.map_support import agreement, surfaces_met
 from mlsm_manager.joint_solver.compare.neighbours import Neighbours
 from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
-from mlsm_manager.joint_solver.judge.agreement import agreement, surfaces_met
 from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.motion_models import OdometryModel, frozen_deviations
 from mlsm_manager.joint_solver.parameters import SolverParameters
