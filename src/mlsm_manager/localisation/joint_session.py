@@ -20,7 +20,7 @@ from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
-from mlsm_manager.self_check.path_checks import told_deviation
+from mlsm_manager.self_check.path_checks import position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, inverse, transformed, wrapped
 
@@ -100,7 +100,7 @@ class JointSession:
             *self._going_on(turns.times),
             recent_agreement(heard.times, heard.agreements, _CHECKED_SCANS),
             # from the second turn on: the first one alone does not tell its own speed
-            *(told_deviation(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[1:2]),
+            *(position_uncertainty(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[1:2]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
             *in_one_map(turns.times, turns.apart),
         ]

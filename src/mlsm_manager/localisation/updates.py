@@ -94,7 +94,7 @@ def report_verdicts(health: Health, verdicts: Sequence[Verdict]) -> None:
     for verdict in verdicts:
         health.show(verdict.name, verdict.line())
         if verdict.fires:
-            health.problem("position doubtful", f"{verdict.line()}; the map may be smeared: relocalise, or begin anew")
+            health.problem("position doubtful", f"{verdict.text}; the map may be smeared: relocalise, or begin anew")
 
 
 def report_cloud(health: Health, update: CloudUpdate, blocks: int, limit: float) -> None:

@@ -15,7 +15,13 @@ from mlsm_manager.offline.calibration import Calibration
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
-from mlsm_manager.self_check.path_checks import against_odometry, as_expected, halves_agree, per_minute, told_deviation
+from mlsm_manager.self_check.path_checks import (
+    against_odometry,
+    as_expected,
+    halves_agree,
+    per_minute,
+    position_uncertainty,
+)
 from mlsm_manager.self_check.verdict import Verdict
 
 # A window's worth of scans: fewer say too little of scale and delay.
@@ -48,7 +54,7 @@ class Trust:
         firing = [verdict for verdict in self.verdicts if verdict.fires]
         if not firing:
             return f"trust: all {len(self.verdicts)} checks are fine"
-        return "trust: DOUBTFUL; " + "; ".join(verdict.line() for verdict in firing)
+        return "trust: DOUBTFUL: " + "; ".join(verdict.text for verdict in firing)
 
     @property
     def doubtful(self) -> np.ndarray:
@@ -86,7 +92,7 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
         *_against_odometry(replayed, path, solver.odometry),
         *_going_on(solver, solver.state if refined is None else refined.batch.state, turns.times),
         recent_agreement(heard.times, heard.agreements),
-        told_deviation(deviations.times, deviations.radii),
+        position_uncertainty(deviations.times, deviations.radii),
         *surfaces_tell(
             float(solver.log.node_times[0]),
             turns.times,

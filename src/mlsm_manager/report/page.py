@@ -145,10 +145,8 @@ def light_of_run(lights: "list[Light]") -> Light:
 
 def sentence(verdict: Verdict) -> str:
     """Return what a check found, in words."""
-    if np.isnan(verdict.value):
-        return "The run is too short to tell."
-    bound = "at least" if verdict.more_is_better else "at most"
-    return f"{verdict.value:.2f}, should be {bound} {verdict.limit:g} ({verdict.text})"
+    text = f"too little to tell: {verdict.text}" if np.isnan(verdict.value) else verdict.text
+    return f"{text[:1].upper()}{text[1:]}."
 
 
 def slider_json(mission: Mission) -> str:

@@ -1,35 +1,42 @@
-"""Is the place of all scans in the map known, or do some lie apart since the sonar heard nothing for a while?"""
+"""Checks of scans against the map and each other: do they lie where they should, and do they tell the position?"""
 
-from datetime import datetime, timezone
 from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.self_check.verdict import Verdict, merged
+from mlsm_manager.self_check.verdict import Verdict, merged, moment, percent
 
-_WINDOW = 20  # as many as the check of agreement looks at
+_WINDOW = 20  # scans in which some may lie beside the others
 _MAY_BE_BESIDE = 0.2  # share of these: a vehicle that comes around a corner hears new water
 _AGREES = 0.5  # share of a scan's points on known surfaces from which on the scan agrees: the larger part
 _GOOD_ODOMETRY = 0.1  # relative deviation of reported distances up to which these tell the way along a canal
-_RECORDED, _LATEST = 1e9, 2.0**31  # s since 1970 of clocks that tell the time: simulated ones begin near 0
 _SCANS = 10  # about 2 minutes, in which a small vehicle passes what it hears
 
 
 def in_one_map(times: np.ndarray, apart: np.ndarray) -> Tuple[Verdict, ...]:
     """Return a verdict on the share of scans whose place in the map is known; none where that is every scan's.
 
-    times: (n,) s of the scans' ends. apart: (n,) bool, whether a scan lies where nobody knows how it fits to the map.
+    times: (n,) s of the scans' ends. apart: (n,) bool, whether a scan lies in a submap of which nobody knows how it
+    fits to the map, since the sonar heard nothing for a while.
     """
     if not apart.any():
         return ()
-    share, step = float(1.0 - apart.mean()), float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    text = "share of the scans whose place in the map is known; after a silence the others fit at none, or at several"
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    text = (
+        "the place of some scans in the map is unknown since a silence of the sonar: they fit nowhere, or at several "
+    )
+    text += f"places ({np.count_nonzero(apart)} of {len(apart)} scans in submaps of their own)"
     question = "Is the place in the map of all scans known, also after the sonar heard nothing for a while?"
-    return (Verdict("one map", share, 1.0, text, True, merged(times[apart] - step, step), question),)
+    return (
+        Verdict("submaps", float(1.0 - apart.mean()), 1.0, text, True, merged(times[apart] - step, step), question),
+    )
 
 
 def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> Verdict:
-    """Return what share of its points four of five scans at least have on what was heard before, in any 20 scans.
+    """Return the least, over windows of 20 scans, of the share that four of five of them have at least.
+
+    A solver that knows no velocity can hold on to a wrong place: where a scan does not fit, few of its points are
+    compared, and these agree. The points that lie beside what was heard before tell it.
 
     times: (n,) s of the scans' ends. shares: (n,) of each scan's points that lie on surfaces heard before; NaN for a
     scan that does not tell.
@@ -38,17 +45,19 @@ def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> V
     """
     known = np.isfinite(shares)
     times, shares = np.asarray(times)[known], np.asarray(shares)[known]
-    name = "scans go on"
-    text = f"share of its echoes that each of {_WINDOW} scans but the worst fifth has on what was heard before it; "
-    text += "a vehicle that strafes needs --odometry hovering"
-    question = "Do scans lie on what was heard just before them, or has the vehicle moved as it was not expected to?"
+    name, question = "scans go on", "Do scans lie on what was heard just before them, so that the motion is as assumed?"
     if len(shares) < _WINDOW:
-        return Verdict(name, np.nan, limit, text, True, question=question)
+        return Verdict(name, np.nan, limit, f"fewer than {_WINDOW} scans that others precede", True, question=question)
     windows = np.arange(len(shares) - _WINDOW + 1)[:, np.newaxis] + np.arange(_WINDOW)
     values = np.quantile(shares[windows], _MAY_BE_BESIDE, axis=1)
-    starts = times[: len(values)][values < limit]
+    lowest, starts = float(values.min()), times[: len(values)][values < limit]
+    figures = f"{percent(lowest)} of the echoes on earlier surfaces, at least {percent(limit)} needed"
+    text = f"scans fit those before them ({figures})"
+    if len(starts):
+        text = "scans do not fit those before them; a vehicle that moves sideways needs --odometry hovering "
+        text += f"(only {figures})"
     doubtful = merged(starts, float(np.median(np.diff(times))) * (_WINDOW - 1))
-    return Verdict(name, float(values.min()), limit, text, True, doubtful, question)
+    return Verdict(name, lowest, limit, text, True, doubtful, question)
 
 
 def recent_agreement(
@@ -59,32 +68,28 @@ def recent_agreement(
     times: (n,) s of the ends of scans that heard something. agreements: (n,) share of each scan's points that lie on
     surfaces of others.
     """
-    good = np.asarray(agreements[-scans:]) >= agrees
-    value = float(good.mean()) if len(agreements) >= scans else np.nan
-    return Verdict(
-        "scans on the map",
-        value,
-        limit,
-        f"share of the last {scans} scans",
-        True,
-        _lost(times, agreements, scans, limit, agrees),
-        "Do the newest scans lie on the map that earlier scans made?",
-    )
-
-
-def _lost(times: np.ndarray, agreements: np.ndarray, scans: int, limit: float, agrees: float) -> np.ndarray:
-    """Return stretches (k, 2) [s] in which too few of `scans` scans agreed."""
+    name, question = "scans on the map", "Do the newest scans lie on the map that earlier scans made?"
     if len(agreements) < scans:
-        return np.empty((0, 2))
+        return Verdict(name, np.nan, limit, f"fewer than {scans} scans that heard something", True, question=question)
     total = np.cumsum(np.concatenate([[0.0], np.asarray(agreements) >= agrees]))
     share = (total[scans:] - total[:-scans]) / scans
-    return merged(np.asarray(times)[: len(share)][share < limit], float(np.median(np.diff(times))) * (scans - 1))
+    newest, doubtful = float(share[-1]), merged(
+        np.asarray(times)[: len(share)][share < limit], float(np.median(np.diff(times))) * (scans - 1)
+    )  # fmt: skip
+    figures = f"{percent(newest)} of the last {scans} scans, at least {percent(limit)} needed"
+    text = f"the newest scans lie on the map ({figures})"
+    if newest < limit:
+        text = f"the newest scans do not lie on the map: the vehicle has left it, or it is smeared (only {figures})"
+    return Verdict(name, newest, limit, text, True, doubtful, question)
 
 
 def surfaces_tell(
     begin: float, times: np.ndarray, surfaces: np.ndarray, distance_deviation: float, limit: float = 0.05
 ) -> Tuple[Verdict, ...]:
     """Return a verdict on what some following scans together tell of the direction that they tell least of.
+
+    The walls of a canal, or a single wall, do not tell the way along them. A vehicle whose odometry reports no
+    distances then goes on as before, and nothing shows how far.
 
     begin: s, of the run. times: (n,) s of the scans' ends. surfaces: (n, 2, 2) sums of the outer products of the
     normals that each scan met. distance_deviation: relative one of the odometry's distances; there is no verdict where
@@ -94,28 +99,25 @@ def surfaces_tell(
     """
     if distance_deviation <= _GOOD_ODOMETRY:
         return ()
-    name, text = "surfaces on all sides", "share that the weakest direction has"
-    question = "Do the surfaces that were heard tell the position in all directions?"
+    name, question = "surfaces on all sides", "Do the surfaces that were heard tell the position in all directions?"
     if len(times) < _SCANS:
-        return (Verdict(name, np.nan, limit, text, True, question=question),)
+        return (Verdict(name, np.nan, limit, f"fewer than {_SCANS} scans", True, question=question),)
     total = np.cumsum(np.concatenate([np.zeros((1, 2, 2)), surfaces]), axis=0)
     values, vectors = np.linalg.eigh(total[_SCANS:] - total[:-_SCANS])
     shares = np.divide(values[:, 0], values[:, 1], out=np.zeros(len(values)), where=values[:, 1] > 0.0)
-    weak, worst = shares < limit, int(np.argmin(shares))
-    starts = np.asarray(times)[: len(shares)]
-    if weak.any():
-        way = f"next to nothing tells the way along {_degrees(vectors[worst, :, 0])} deg"
-        text = f"from {_moment(starts[weak][0], begin)} on, {way}"
-    doubtful = merged(starts[weak], float(np.median(np.diff(times))) * (_SCANS - 1))
-    return (Verdict(name, float(shares[worst]), limit, text, True, doubtful, question),)
-
-
-def _moment(time: float, begin: float) -> str:
-    """Return when `time` [s] was, for people: seconds into the run, and the clock's time unless it is simulated."""
-    into = f"{time - begin:.0f} s into the run"
-    if not _RECORDED < time < _LATEST:
-        return into
-    return f"{into} ({datetime.fromtimestamp(time, timezone.utc):%H:%M:%S} UTC)"
+    worst, starts = int(np.argmin(shares)), np.asarray(times)[: len(shares)][shares < limit]
+    share = float(shares[worst])
+    figures = f"weakest direction {percent(share, 1)} of the strongest, at least {percent(limit)} needed"
+    text = f"walls tell the position in all directions ({figures})"
+    if len(starts) and values[worst, 1] > 0.0:
+        text = (
+            f"position along {_degrees(vectors[worst, :, 0])} deg unknown since {moment(starts[0], begin)}: all walls "
+        )
+        text += f"are parallel ({figures})"
+    elif len(starts):
+        text = f"position unknown since {moment(starts[0], begin)}: no walls were heard"
+    doubtful = merged(starts, float(np.median(np.diff(times))) * (_SCANS - 1))
+    return (Verdict(name, share, limit, text, True, doubtful, question),)
 
 
 def _degrees(direction: np.ndarray) -> int:

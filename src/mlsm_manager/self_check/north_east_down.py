@@ -6,7 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.verdict import Verdict, percent
 from node_support.geometry import composed, inverse
 
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
@@ -59,14 +59,19 @@ class ZDownSigns:
 
     def turns(self) -> Verdict:
         """Return whether the echoes turn as the odometry does."""
-        return Verdict(
-            "turns of odometry and echoes",
-            self._against / self._pairs if self._pairs >= _LEAST_PAIRS else np.nan,
-            _SHARE,
-            f"share of {self._pairs} pairs of scans that fit better if the vehicle turned the other way: the odometry "
-            "counts z down, or the head turns the other way than its driver says",
-            question="When the vehicle turns, do the walls stay where they are?",
-        )
+        name, question = "turns of odometry and echoes", "When the vehicle turns, do the walls stay where they are?"
+        if self._pairs < _LEAST_PAIRS:
+            text = f"only {self._pairs} pairs of scans show which way the vehicle turned, {_LEAST_PAIRS} needed"
+            return Verdict(name, np.nan, _SHARE, text, question=question)
+        share = self._against / self._pairs
+        figures = f"{percent(share)} of {self._pairs} pairs of scans fit better the other way, limit {percent(_SHARE)}"
+        text = f"echoes turn as the odometry does ({figures})"
+        if share > _SHARE:
+            text = (
+                "echoes turn against the odometry: it counts z down, or the head turns the other way than its driver "
+            )
+            text += f"says ({figures})"
+        return Verdict(name, share, _SHARE, text, question=question)
 
 
 def z_down_signs(heights: np.ndarray, scans: Sequence[Scan]) -> ZDownSigns:

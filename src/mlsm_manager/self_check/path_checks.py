@@ -1,14 +1,10 @@
-"""Does the corrected path go as far as the odometry says, within what the odometry may err?
-
-A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step. The
-odometry's scale is known far better than that.
-"""
+"""Checks of the path and of the calibration: against the odometry, other solutions, and what was expected."""
 
 from typing import Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.self_check.verdict import Verdict, merged
+from mlsm_manager.self_check.verdict import Verdict, merged, percent
 
 _STEP = 14.0  # s between windows: about one turn of a head
 _SHORTEST = 15.0  # m that the vehicle must have gone in a window, so that a ratio means something
@@ -25,27 +21,51 @@ def against_odometry(
     position_walk: float = 0.12,
     limit: float = 4.0,
 ) -> Tuple[Verdict, Verdict]:
-    """Return verdicts on the distances along and across the odometry's, in standard deviations.
+    """Return verdicts on the distances along and across the odometry's, in standard deviations of the odometry.
+
+    A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step. The
+    odometry's scale is known far better than that.
 
     times: (m,) s. odometry, corrected: (m, >= 2) positions. window: s, about 25 scans. scale_deviation and
     position_walk [m/sqrt(s)]: of the odometry.
     """
     starts, by_odometry, ratio = _ratios(times, odometry, corrected, window)
     walk = position_walk**2 * window / np.abs(by_odometry) ** 2
-    along = (np.abs(ratio) - 1.0) / np.sqrt(scale_deviation**2 + walk)
-    direction = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
-    across = direction / np.sqrt(_HEADING_SPREAD**2 + walk)
+    longer = np.abs(ratio) - 1.0
+    turned = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
+    along, across = longer / np.sqrt(scale_deviation**2 + walk), turned / np.sqrt(_HEADING_SPREAD**2 + walk)
+    distance = "the corrected path is as long as the odometry says"
+    if _worst(along) > limit:
+        worst = longer[np.argmax(np.abs(along))]
+        side = "longer" if worst > 0.0 else "shorter"
+        distance = f"the corrected path is {percent(abs(worst))} {side} than the odometry says"
+    direction = "the corrected path turns as the odometry does"
+    if _worst(across) > limit:
+        angle = np.degrees(np.abs(turned[np.argmax(np.abs(across))]))
+        direction = f"the corrected path is turned by {angle:.0f} deg against the odometry"
     return (
-        Verdict(
-            "distance against odometry", _worst(along), limit, "longest or shortest stretch, deviations",
-            doubtful=_doubtful(along, starts, window, limit),
-            question="Is the corrected path as long as the odometry says, within what the odometry may err?",
+        _against_limit(
+            "distance against odometry", distance, along, starts, window, limit,
+            "Is the corrected path as long as the odometry says, within what the odometry may err?",
         ),
-        Verdict(
-            "direction against odometry", _worst(across), limit, "most turned stretch, deviations",
-            doubtful=_doubtful(across, starts, window, limit),
-            question="Does the corrected path turn as the odometry does, all along the run?",
+        _against_limit(
+            "direction against odometry", direction, across, starts, window, limit,
+            "Does the corrected path turn as the odometry does, all along the run?",
         ),
+    )  # fmt: skip
+
+
+def _against_limit(
+    name: str, text: str, deviations: np.ndarray, starts: np.ndarray, window: float, limit: float, question: str
+) -> Verdict:
+    """Return a verdict on deviations (n,) of windows from `starts` (n,) s on."""
+    if not len(deviations):
+        text = f"the vehicle went less than {_SHORTEST:g} m in any {window:g} s"
+        return Verdict(name, np.nan, limit, text, question=question)
+    worst, doubtful = _worst(deviations), merged(starts[np.abs(deviations) > limit], window)
+    return Verdict(
+        name, worst, limit, f"{text} ({worst:.1f} standard deviations of the odometry, limit {limit:g})",
+        doubtful=doubtful, question=question,
     )  # fmt: skip
 
 
@@ -73,24 +93,28 @@ def _worst(deviations: np.ndarray) -> float:
     return float(np.abs(deviations).max()) if len(deviations) else np.nan
 
 
-def _doubtful(deviations: np.ndarray, starts: np.ndarray, window: float, limit: float) -> np.ndarray:
-    return merged(starts[np.abs(deviations) > limit], window)
-
-
 def settings_agree(times: np.ndarray, paths: np.ndarray, deviations: np.ndarray, limit: float = 2.0) -> Verdict:
-    """Return how far paths of other settings or starts lie from the first one, in its told deviations.
+    """Return how far paths of other settings or starts lie from the first one, in its stated standard deviations.
 
     times: (m,) s. paths: (k, m, >= 2), the first is the one that is told. deviations: (m,) m, 2-D standard deviations.
     The value is the root mean square over the run of the farthest path.
     """
-    distance = np.hypot(*np.moveaxis(paths[1:, :, :2] - paths[0, :, :2], 2, 0)) / deviations
-    step = float(np.median(np.diff(times)))
-    far = merged(times[(distance > limit).any(axis=0)], step)
-    value = float(np.sqrt((distance**2).mean(axis=1)).max()) if len(distance) else np.nan
-    question = "Does the path stay where it is when the solver's settings change a little?"
-    return Verdict(
-        "spread over settings", value, limit, "farthest path, told deviations", doubtful=far, question=question
+    name, question = (
+        "spread over settings",
+        "Does the path stay where it is when the solver's settings change a little?",
     )
+    if len(paths) < 2:
+        return Verdict(name, np.nan, limit, "no path of other settings", question=question)
+    distance = np.hypot(*np.moveaxis(paths[1:, :, :2] - paths[0, :, :2], 2, 0)) / deviations
+    far = merged(times[(distance > limit).any(axis=0)], float(np.median(np.diff(times))))
+    value = float(np.sqrt((distance**2).mean(axis=1)).max())
+    text = (
+        "the path depends on the solver's settings"
+        if value > limit
+        else "the solver's other settings find the same path"
+    )
+    text += f" ({value:.1f} of its standard deviations away, limit {limit:g})"
+    return Verdict(name, value, limit, text, doubtful=far, question=question)
 
 
 def starts_agree(
@@ -103,18 +127,19 @@ def starts_agree(
     displaced, left = (np.hypot(*(one - path)[:, :2].T) for one in (other_start, other_path))
     ratio = float(np.sqrt((left**2).mean() / max((displaced**2).mean(), np.finfo(float).tiny)))
     far = merged(times[left > limit * displaced.max()], float(np.median(np.diff(times)))) if ratio > limit else _NOWHERE
-    return Verdict(
-        "second start", ratio, limit, "share of a start's displacement by a told deviation that is left",
-        doubtful=far, question="Does the solver come back to the same path when it starts a told deviation beside it?",
-    )  # fmt: skip
+    text = "the solver does not come back to its path" if ratio > limit else "the solver comes back to its path"
+    text += f" from a standard deviation beside it ({percent(ratio)} of the way is left, limit {percent(limit)})"
+    question = "Does the solver come back to the same path when it starts a standard deviation beside it?"
+    return Verdict("second start", ratio, limit, text, doubtful=far, question=question)
 
 
-def told_deviation(times: np.ndarray, deviations: np.ndarray, limit: float = 5.0) -> Verdict:
-    """Return the largest of the path's own 2-D deviations (m,) [m] at `times` (m,) [s]."""
-    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+def position_uncertainty(times: np.ndarray, deviations: np.ndarray, limit: float = 5.0) -> Verdict:
+    """Return the largest of the path's own 2-D standard deviations (m,) [m] at `times` (m,) [s]."""
+    step, worst = float(np.median(np.diff(times))) if len(times) > 1 else 0.0, float(deviations.max())
+    text = f"position uncertainty reaches {worst:.1f} m (limit {limit:g} m)"
+    question = "How far off may the position be, by the solver's own account?"
     doubtful = merged(times[deviations > limit], step)
-    text, question = "largest along the path, m", "How far off may the position be, by the solver's own account?"
-    return Verdict("told deviation", float(deviations.max()), limit, text, doubtful=doubtful, question=question)
+    return Verdict("position uncertainty", worst, limit, text, doubtful=doubtful, question=question)
 
 
 def per_minute(times: np.ndarray, deviations: np.ndarray) -> np.ndarray:
@@ -136,7 +161,10 @@ def halves_agree(
     spread = np.sqrt(np.asarray(first_deviations) ** 2 + np.asarray(second_deviations) ** 2)
     distances = np.abs(np.asarray(first) - np.asarray(second)) / spread
     worst = int(np.argmax(distances))
-    text = f"halves differ most in {names[worst]}: {first[worst]:.4g} and {second[worst]:.4g}, deviations"
+    found = f"{first[worst]:.3g} and {second[worst]:.3g}, {_deviations(distances[worst], limit)}"
+    text = f"both halves of the run find the same calibration ({names[worst]} {found})"
+    if distances[worst] > limit:
+        text = f"the halves of the run disagree on {names[worst]} ({found})"
     question = "Do the first and the second half of the run find the same errors of sonar and odometry?"
     return Verdict("calibration of the halves", float(distances[worst]), limit, text, question=question)
 
@@ -155,7 +183,13 @@ def as_expected(
     expected, deviations, found = np.asarray(expected), np.asarray(expected_deviations), np.asarray(found)
     distances = np.abs(found - expected) / deviations
     worst = int(np.argmax(distances))
-    before = f"{expected[worst]:.4g} +- {deviations[worst]:.4g} was expected"
-    text = f"{names[worst]} is {found[worst]:.4g}, {before}, deviations"
+    before = f"expected {expected[worst]:.3g} +- {deviations[worst]:.3g}, {_deviations(distances[worst], limit)}"
+    text = f"calibration as expected ({names[worst]} {found[worst]:.3g}, {before})"
+    if distances[worst] > limit:
+        text = f"{names[worst]} {found[worst]:.3g} is unlikely for such a device and mounting ({before})"
     question = "Are the errors of sonar and odometry as large as those of such devices, mounted as described?"
     return Verdict("calibration as expected", float(distances[worst]), limit, text, question=question)
+
+
+def _deviations(distance: float, limit: float) -> str:
+    return f"{distance:.1f} standard deviations apart, limit {limit:g}"

@@ -1,8 +1,11 @@
 """What a check found."""
 
 from dataclasses import dataclass, field
+from datetime import datetime, timezone
 
 import numpy as np
+
+_RECORDED, _LATEST = 1e9, 2.0**31  # s since 1970 of clocks that tell the time: simulated ones begin near 0
 
 
 @dataclass(frozen=True)
@@ -10,8 +13,9 @@ class Verdict:
     """One figure against its limit.
 
     name: of the check. value: what was found; NaN where the run is too short to tell. limit: above it (below it where
-    `more_is_better`) the check fires. text: what the figure means, one line. doubtful: (k, 2) s, beginnings and ends
-    of the stretches that made it fire. question: what the check looks at, for people who do not know the solver.
+    `more_is_better`) the check fires. text: what that means, one clause, the figures last; with NaN what is missing.
+    doubtful: (k, 2) s, beginnings and ends of the stretches that made it fire. question: what the check looks at, for
+    people who do not know the solver.
     """
 
     name: str
@@ -32,10 +36,8 @@ class Verdict:
     def line(self) -> str:
         """Return the verdict as one line."""
         if np.isnan(self.value):
-            return f"{self.name}: too little to tell"
-        bound = "at least" if self.more_is_better else "at most"
-        state = "DOUBTFUL" if self.fires else "fine"
-        return f"{self.name}: {state}, {self.value:.2f}, must be {bound} {self.limit:g} ({self.text})"
+            return f"too little to tell: {self.text}"
+        return f"{'DOUBTFUL' if self.fires else 'fine'}: {self.text}"
 
 
 def merged(starts: np.ndarray, length: float) -> np.ndarray:
@@ -45,3 +47,16 @@ def merged(starts: np.ndarray, length: float) -> np.ndarray:
     breaks = np.flatnonzero(np.diff(starts) > length)
     first, last = np.append(0, breaks + 1), np.append(breaks, len(starts) - 1)
     return np.column_stack([starts[first], starts[last] + length])
+
+
+def moment(time: float, begin: float) -> str:
+    """Return when `time` [s] was: seconds after `begin` [s], and the clock's time unless that is simulated."""
+    into = f"{time - begin:.0f} s"
+    if not _RECORDED < time < _LATEST:
+        return into
+    return f"{into} ({datetime.fromtimestamp(time, timezone.utc):%H:%M:%S} UTC)"
+
+
+def percent(share: float, digits: int = 0) -> str:
+    """Return a share as people read it."""
+    return f"{100.0 * share:.{digits}f} %"

@@ -117,7 +117,7 @@ def test_a_run_says_whether_it_can_be_trusted():
 
 def test_the_first_turn_is_not_doubted_for_a_speed_that_only_the_second_tells():
     names = [[verdict.name for verdict in localiser_after(turns)[0].verdicts()] for turns in (1, 2)]
-    assert ["told deviation" in of_turns for of_turns in names] == [False, True]
+    assert ["position uncertainty" in of_turns for of_turns in names] == [False, True]
 
 
 def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():

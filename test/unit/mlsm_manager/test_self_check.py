@@ -1,21 +1,24 @@
 """Each check fires where it should, and not where it must not."""
 
+import re
+
 import numpy as np
 import pytest
 
-from mlsm_manager.self_check.map_checks import recent_agreement, surfaces_tell
+from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
     halves_agree,
     per_minute,
+    position_uncertainty,
     settings_agree,
     starts_agree,
-    told_deviation,
 )
 from mlsm_manager.self_check.verdict import Verdict, merged
 
 TIMES = np.arange(0.0, 2000.0, 1.0)
+TURNS = np.arange(10) * 14.0
 STRAIGHT = np.column_stack([0.25 * TIMES, np.zeros(len(TIMES))])
 
 
@@ -32,7 +35,7 @@ def test_a_path_that_is_dragged_along_a_canal_is_doubted_there():
     dragged[1000:1600, 0] = 250.0 + 0.7 * 0.25 * np.arange(600.0)
     dragged[1600:, 0] = dragged[1599, 0] + 0.25 * np.arange(1.0, 401.0)
     along, _ = against_odometry(TIMES, STRAIGHT, dragged)
-    assert along.fires
+    assert along.line().startswith("DOUBTFUL: the corrected path is 30 % shorter than the odometry says")
     assert along.doubtful[0, 0] < 1000.0 < along.doubtful[0, 1]
     assert along.doubtful[-1, 1] < 1999.0
 
@@ -40,7 +43,8 @@ def test_a_path_that_is_dragged_along_a_canal_is_doubted_there():
 def test_a_path_that_bends_away_is_doubted():
     angle = np.where(TIMES < 1000.0, 0.0, 0.6)
     bent = np.cumsum(0.25 * np.column_stack([np.cos(angle), np.sin(angle)]), axis=0)
-    assert against_odometry(TIMES, STRAIGHT, bent)[1].fires
+    _, across = against_odometry(TIMES, STRAIGHT, bent)
+    assert re.match(r"DOUBTFUL: the corrected path is turned by \d+ deg against the odometry", across.line())
 
 
 def test_a_vehicle_that_stays_says_nothing_about_distances():
@@ -62,7 +66,10 @@ def test_a_head_that_is_mounted_turned_is_told():
     assert not as_expected(names, expected, deviations, np.array([0.9, -0.11])).fires
     verdict = as_expected(names, expected, deviations, np.array([0.9, 0.34]))
     assert verdict.fires
-    assert "odometry_direction is 0.34, 0 +- 0.1 was expected" in verdict.line()
+    assert verdict.line() == (
+        "DOUBTFUL: odometry_direction 0.34 is unlikely for such a device and mounting "
+        "(expected 0 +- 0.1, 3.4 standard deviations apart, limit 3)"
+    )
 
 
 def test_halves_that_find_another_delay_are_told():
@@ -70,7 +77,9 @@ def test_halves_that_find_another_delay_are_told():
     assert not halves_agree(names, np.array([0.01, 0.8]), deviations, np.array([-0.01, 0.9]), deviations).fires
     verdict = halves_agree(names, np.array([0.01, 0.8]), deviations, np.array([-0.01, 0.2]), deviations)
     assert verdict.fires
-    assert "sonar_delay" in verdict.line()
+    assert verdict.line().startswith(
+        "DOUBTFUL: the halves of the run disagree on sonar_delay (0.8 and 0.2, 8.5 standard"
+    )
 
 
 def test_settings_that_lead_elsewhere_are_told():
@@ -91,8 +100,10 @@ def test_a_start_that_is_hardly_left_is_told():
 
 
 def test_a_deviation_that_grows_without_end_is_told():
-    assert not told_deviation(TIMES, np.full(len(TIMES), 2.0)).fires
-    assert told_deviation(TIMES, TIMES * 0.01).fires
+    assert not position_uncertainty(TIMES, np.full(len(TIMES), 2.0)).fires
+    assert (
+        position_uncertainty(TIMES, TIMES * 0.01).line() == "DOUBTFUL: position uncertainty reaches 20.0 m (limit 5 m)"
+    )
 
 
 def test_deviations_are_told_per_minute():
@@ -106,9 +117,13 @@ def test_windows_that_overlap_make_one_stretch():
     assert merged(np.empty(0), 10.0).shape == (0, 2)
 
 
-def test_a_verdict_says_figure_and_limit():
-    assert Verdict("depth", 2.0, 1.0, "m").line() == "depth: DOUBTFUL, 2.00, must be at most 1 (m)"
-    assert not Verdict("depth", np.nan, 1.0, "m").fires
+@pytest.mark.parametrize(
+    ("value", "line"), [(2.0, "DOUBTFUL: deep"), (0.5, "fine: deep"), (np.nan, "too little to tell: deep")]
+)
+def test_a_verdict_says_first_whether_it_is_to_be_trusted(value, line):
+    verdict = Verdict("depth", value, 1.0, "deep")
+    assert verdict.line() == line
+    assert verdict.fires == line.startswith("DOUBTFUL")
 
 
 def heard(angles):
@@ -126,8 +141,11 @@ def canal_after(scans):
 def test_a_canal_that_does_not_tell_the_way_along_it_is_told():
     (verdict,) = surfaces_tell(0.0, *heard(canal_after(30)), distance_deviation=np.inf)
     assert verdict.fires
-    assert "from 420 s into the run on, next to nothing tells the way along" in verdict.line()
-    assert 35 <= int(verdict.text.split()[-2]) <= 45
+    direction, since = re.match(
+        r"DOUBTFUL: position along (\d+) deg unknown since (\d+) s: all walls", verdict.line()
+    ).groups()
+    assert 35 <= int(direction) <= 45
+    assert since == "420"
     np.testing.assert_allclose(verdict.doubtful, [[14.0 * 30, 14.0 * 59]])
 
 
@@ -135,7 +153,7 @@ def test_the_moment_is_told_in_the_run_and_by_the_clock():
     times, surfaces = heard(canal_after(30))
     begin = 1.7e9
     (verdict,) = surfaces_tell(begin, begin + times, surfaces, distance_deviation=np.inf)
-    assert "from 420 s into the run (22:20:20 UTC) on" in verdict.line()
+    assert "since 420 s (22:20:20 UTC)" in verdict.line()
 
 
 def test_corners_tell_the_way():
@@ -143,7 +161,8 @@ def test_corners_tell_the_way():
 
 
 def test_scans_that_meet_nothing_tell_nothing():
-    assert surfaces_tell(0.0, 14.0 * np.arange(20), np.zeros((20, 2, 2)), distance_deviation=np.inf)[0].fires
+    (verdict,) = surfaces_tell(0.0, 14.0 * np.arange(20), np.zeros((20, 2, 2)), distance_deviation=np.inf)
+    assert verdict.line() == "DOUBTFUL: position unknown since 0 s: no walls were heard"
 
 
 def test_a_dvl_tells_the_way_along_a_canal():
@@ -152,3 +171,19 @@ def test_a_dvl_tells_the_way_along_a_canal():
 
 def test_few_scans_say_too_little_of_the_surfaces():
     assert "too little" in surfaces_tell(0.0, *heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
+
+
+def test_a_run_of_one_map_has_no_such_check():
+    assert in_one_map(TURNS, np.zeros(10, dtype=bool)) == ()
+
+
+def test_scans_apart_make_it_fire_and_are_the_doubtful_ones():
+    (verdict,) = in_one_map(TURNS, TURNS > 90.0)
+    assert verdict.fires
+    assert verdict.value == 0.7
+    np.testing.assert_allclose(verdict.doubtful, [[84.0, 126.0]])
+
+
+def test_a_single_scan_apart_is_told():
+    (verdict,) = in_one_map(TURNS[:1], np.ones(1, dtype=bool))
+    assert verdict.fires
