@@ -1,6 +1,7 @@
 #!/usr/bin/env python3
 """Bad parameters stop a node with one line, and are refused while it runs."""
 
+import signal
 import subprocess
 import sys
 import unittest
@@ -8,7 +9,7 @@ import unittest
 import rospy
 import rostest
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE, PATIENCE, Diagnostics
+from graph import PACKAGE, PATIENCE, Diagnostics, wait_until
 
 
 def start(node: str, parameter: str, name: str) -> "subprocess.CompletedProcess[str]":
@@ -41,6 +42,36 @@ class Parameters(unittest.TestCase):
         done = start("sonar_to_cloud", "mode:=SONARLASER", "bad_mode")
         self.assertEqual(done.returncode, 1)
         self.assertIn("mode = 'SONARLASER': must be one of SONAR, LASER, SONARCONT, LASERCONT", done.stdout)
+
+    def test_keys_of_an_older_version_are_named_in_one_warning_and_taken(self) -> None:
+        """Also those that stand beside `expert` and not under it: the server then holds them where they belong."""
+        command = [
+            "rosrun",
+            PACKAGE,
+            "mlsm_core",
+            "__name:=old_keys",
+            "_kernel:=NUMBA",
+            "_free_scans:=30",
+            "_min_points:=20",
+        ]
+        with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as node:
+            wait_until(lambda: rospy.has_param("/old_keys/transform_tolerance"))
+            held = rospy.get_param("/old_keys")
+            node.send_signal(signal.SIGINT)
+            told = [line for line in node.communicate(timeout=PATIENCE)[0].splitlines() if "an older version" in line]
+        self.assertEqual(len(told), 1, told)
+        self.assertIn("kernel has no effect", told[0])
+        self.assertIn("under expert belong free_scans, min_points", told[0])
+        self.assertEqual((held["expert"]["free_scans"], held["expert"]["min_points"]), (30, 20))
+        self.assertNotIn("min_points", held)
+
+    def test_a_change_of_what_is_for_experts_is_held_where_the_node_reads_it(self) -> None:
+        """Of parameters that have a key of their own."""
+        client = Client("/mlsm_core", timeout=PATIENCE)
+        client.update_configuration({"min_points": 21})
+        self.assertEqual(rospy.get_param("/mlsm_core/expert/min_points"), 21)
+        self.assertFalse(rospy.has_param("/mlsm_core/min_points"))
+        client.close()
 
     def test_a_good_change_is_taken_while_running(self) -> None:
         """As dynparam or rqt_reconfigure send it."""

@@ -9,7 +9,6 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
-from mlsm_manager.localisation.joint_maps import JointMaps
 from mlsm_manager.localisation.joint_session import (
     JointSession,
     belief_at,
@@ -21,6 +20,7 @@ from mlsm_manager.localisation.joint_session import (
     update_of,
 )
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
+from mlsm_manager.localisation.keyframe_map import JointMaps
 from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
