@@ -109,7 +109,9 @@ def profile_yaml(kind: OdometryKind) -> str:
     lines += [f"  {EXPERT}:"]
     lines += [line for one in PROFILES[kind] if one.key in experts for line in _setting(one, "    ")]
     if kind in COMPASS_ONLY:
-        fading = Setting("velocity_fading", profile_values(kind)["rate_time"], "s: rate_time above")
+        fading = Setting(
+            "velocity_fading", profile_values(kind)["rate_correlation_time"], "s: rate_correlation_time above"
+        )
         lines += ["dead_reckoning:", *_setting(fading, "  ")]
     return "\n".join(lines) + "\n"
 

@@ -21,7 +21,7 @@ SEEDS = 30
 TURNS = 5
 SPEED, TURN_RATE, WRONG = 0.3, np.radians(2.0), 0.7
 _START = 16.0
-_ERRORS = OdometryErrors(scale_deviation=0.3, turn_rate_deviation=0.01, rate_time=600.0)
+_ERRORS = OdometryErrors(scale_deviation=0.3, turn_rate_deviation=0.01, rate_correlation_time=600.0)
 _SHOWN_KIND = KINDS[0]
 _BEFORE, _AFTER = "#d32f2f", "#2e7d32"
 

@@ -65,7 +65,7 @@ class OdometryChoice(ParameterSet):
     odometry_direction: float = parameter(
         0.0, "angle from reported to true motion, as known beforehand", unit="rad", low=-3.2, high=3.2, tunable=False
     )
-    heading_time: float = parameter(
+    heading_correlation_time: float = parameter(
         300.0, "how long an error of the compass lasts", unit="s", low=1.0, high=1e6, tunable=False,
         expert="five minutes: iron and tilt change a compass's error that slowly",
     )  # fmt: skip
@@ -90,11 +90,11 @@ class OdometryChoice(ParameterSet):
         0.07, "HEADING, HOVERING, NONE: standard deviation of the speed sideways", unit="m/s", low=0.001, high=5.0,
         tunable=False, expert="vehicles go ahead; they slip in turns and in a slow current",
     )  # fmt: skip
-    slip_time: float = parameter(
+    slip_correlation_time: float = parameter(
         20.0, "HEADING, HOVERING, NONE: how long a speed sideways lasts", unit="s", low=1.0, high=1e5, tunable=False,
         expert="a turn",
     )  # fmt: skip
-    turn_rate_time: float = parameter(
+    turn_rate_correlation_time: float = parameter(
         10.0, "NONE: how long a turn rate lasts", unit="s", low=1.0, high=1e5, tunable=False, expert="a turn",
     )  # fmt: skip
 
@@ -116,19 +116,19 @@ def _compass(choice: OdometryChoice, errors: OdometryErrors) -> Compass:
     compass = errors.heading_deviation > 0.0
     return Compass(
         heading_deviation=errors.heading_deviation if compass else _NO_COMPASS,
-        heading_correlation_time=choice.heading_time if compass else _FOR_EVER,
-        heading_walk=max(errors.turn_rate_deviation * np.sqrt(2.0 * errors.rate_time), _LEAST_WALK),
+        heading_correlation_time=choice.heading_correlation_time if compass else _FOR_EVER,
+        heading_walk=max(errors.turn_rate_deviation * np.sqrt(2.0 * errors.rate_correlation_time), _LEAST_WALK),
     )
 
 
 def _positions(choice: OdometryChoice, errors: OdometryErrors) -> Dict[str, Any]:
-    """Return the walks that errors add up to which last `rate_time`, and `motion_time`."""
+    """Return the walks that errors add up to which last `rate_correlation_time`, and `motion_correlation_time`."""
     return {
         "compass": _compass(choice, errors),
-        "position_walk": max(errors.speed_deviation * np.sqrt(2.0 * errors.rate_time), 1e-3),
+        "position_walk": max(errors.speed_deviation * np.sqrt(2.0 * errors.rate_correlation_time), 1e-3),
         "direction": choice.odometry_direction,
         "direction_deviation": errors.direction_deviation,
-        "direction_walk": min(errors.direction_deviation * np.sqrt(2.0 / errors.motion_time), 1.0),
+        "direction_walk": min(errors.direction_deviation * np.sqrt(2.0 / errors.motion_correlation_time), 1.0),
         "scale": choice.odometry_scale,
         "scale_deviation": errors.scale_deviation,
     }
@@ -138,10 +138,10 @@ def _speeds(choice: OdometryChoice, errors: OdometryErrors) -> Speeds:
     return Speeds(
         start_speed_deviation=choice.start_speed_deviation,
         speed_deviation=max(errors.speed_deviation, 1e-3),
-        speed_correlation_time=max(errors.rate_time, 1.0),
+        speed_correlation_time=max(errors.rate_correlation_time, 1.0),
         travel_walk=choice.travel_walk,
         slip_deviation=choice.slip_deviation,
-        slip_correlation_time=choice.slip_time,
+        slip_correlation_time=choice.slip_correlation_time,
     )
 
 
@@ -150,7 +150,7 @@ def _dvl(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
 
 
 def _thrusters(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    scale_walk = min(errors.scale_deviation * np.sqrt(2.0 / errors.motion_time), 1.0)
+    scale_walk = min(errors.scale_deviation * np.sqrt(2.0 / errors.motion_correlation_time), 1.0)
     current = {"current_deviation": choice.current_deviation, "current_walk": choice.current_walk}
     return ThrusterFactors(ThrusterOdometry(**_positions(choice, errors), scale_walk=scale_walk, **current))
 
@@ -161,7 +161,9 @@ def _heading(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
 
 def _none(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
     deviation = max(errors.turn_rate_deviation, 1e-5)
-    return UnaidedFactors(UnaidedOdometry(_speeds(choice, errors), deviation, choice.turn_rate_time, _TURN_NOISE))
+    return UnaidedFactors(
+        UnaidedOdometry(_speeds(choice, errors), deviation, choice.turn_rate_correlation_time, _TURN_NOISE)
+    )
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice, OdometryErrors], OdometryModel]] = {
@@ -200,10 +202,10 @@ _TRAVEL = (
 _UNREPORTED = (
     *_NOT_REPORTED,
     Setting("speed_deviation", 0.15, "m/s: by as much a small vehicle changes its speed while it works"),
-    Setting("rate_time", 40.0, "s: as long such a change lasts, a turn or a manoeuvre"),
+    Setting("rate_correlation_time", 40.0, "s: as long such a change lasts, a turn or a manoeuvre"),
     *_TRAVEL,
     Setting("slip_deviation", 0.07, "m/s: vehicles go ahead; they slip in turns and in a slow current"),
-    Setting("slip_time", 20.0, "s: a turn"),
+    Setting("slip_correlation_time", 20.0, "s: a turn"),
     _NEIGHBOURS,
     _NORMALS,
     _POSTS,
@@ -215,8 +217,8 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("scale_deviation", 0.01, "a DVL's data sheet, speed of sound included"),
         Setting("direction_deviation", 0.1, "rad: the angle at which it is mounted, set by eye to 6 degrees"),
         Setting("speed_deviation", 0.025, "m/s: noise of its velocities"),
-        Setting("rate_time", 12.0, "s: as long that noise lasts"),
-        Setting("motion_time", 10000.0, "s: scale and mounting hardly change during a mission"),
+        Setting("rate_correlation_time", 12.0, "s: as long that noise lasts"),
+        Setting("motion_correlation_time", 10000.0, "s: scale and mounting hardly change during a mission"),
         *_COMPASS,
     ),
     OdometryKind.THRUSTERS: (
@@ -224,8 +226,12 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         Setting("scale_deviation", 0.3, "the speed at a thrust is known to a third"),
         Setting("direction_deviation", 0.1, "rad: thrusters push ahead to some degrees"),
         Setting("speed_deviation", 0.02, "m/s: what a command leaves open"),
-        Setting("rate_time", 60.0, "s: as long that lasts"),
-        Setting("motion_time", 3600.0, "s: the scale changes with the battery and with what hangs on the vehicle"),
+        Setting("rate_correlation_time", 60.0, "s: as long that lasts"),
+        Setting(
+            "motion_correlation_time",
+            3600.0,
+            "s: the scale changes with the battery and with what hangs on the vehicle",
+        ),
         Setting("current_deviation", 0.05, "m/s: a current in sheltered water"),
         Setting("current_walk", 0.002, "m/s per root second: the current may change by 0.05 m/s in ten minutes"),
         _NEIGHBOURS,
@@ -238,10 +244,10 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         _JOINT,
         *_NOT_REPORTED,
         Setting("speed_deviation", 0.5, "m/s: such a vehicle goes ahead and back"),
-        Setting("rate_time", 10.0, "s: as long as it keeps a speed"),
+        Setting("rate_correlation_time", 10.0, "s: as long as it keeps a speed"),
         *_TRAVEL,
         Setting("slip_deviation", 0.5, "m/s: it strafes as fast as it goes ahead"),
-        Setting("slip_time", 10.0, "s: as long as it keeps a speed"),
+        Setting("slip_correlation_time", 10.0, "s: as long as it keeps a speed"),
         Setting(
             "parts_per_turn", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"
         ),
@@ -255,7 +261,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
         *_UNREPORTED,
         Setting("heading_deviation", 0.0, "no compass"),
         Setting("turn_rate_deviation", 0.05, "rad/s: 3 degrees per second, a small vehicle's usual turn"),
-        Setting("turn_rate_time", 10.0, "s: as long such a turn lasts"),
+        Setting("turn_rate_correlation_time", 10.0, "s: as long such a turn lasts"),
     ),
 }
 

@@ -111,7 +111,7 @@ class LocaliserParameters(
         """How long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
         measured = not np.isinf(self.odometry_model(self.part(OdometryErrors)).distance_deviation)
         alone = self.estimator is not EstimatorName.JOINT
-        return np.inf if measured or alone else self.rate_time * self.parts_per_turn
+        return np.inf if measured or alone else self.rate_correlation_time * self.parts_per_turn
 
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""

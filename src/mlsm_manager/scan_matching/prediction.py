@@ -72,11 +72,11 @@ class OdometryErrors(ParameterSet):
     turn_rate_deviation: float = parameter(
         0.001, "standard deviation of the error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
     )
-    rate_time: float = parameter(
+    rate_correlation_time: float = parameter(
         60.0, "correlation time of the errors of speed and turn rate", unit="s", low=0.1, high=1e6, tunable=False,
         expert="a minute: a current, or the trim of a thruster, changes that slowly",
     )  # fmt: skip
-    motion_time: float = parameter(
+    motion_correlation_time: float = parameter(
         3600.0, "correlation time of the errors of scale and direction", unit="s", low=0.1, high=1e9, tunable=False,
         expert="an hour: a mounting angle hardly changes during a dive",
     )  # fmt: skip
@@ -116,8 +116,8 @@ def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors)
         moved = _advanced(belief.theta + change, belief.time, track, time)
         jacobian[POSE, state] = (moved - theta)[POSE] / _DIFFERENCE
     lasting = np.ones(STATES)
-    lasting[RATE] = np.exp(-(time - belief.time) / errors.rate_time)
-    lasting[MOTION] = np.exp(-(time - belief.time) / errors.motion_time)
+    lasting[RATE] = np.exp(-(time - belief.time) / errors.rate_correlation_time)
+    lasting[MOTION] = np.exp(-(time - belief.time) / errors.motion_correlation_time)
     transition = lasting[:, np.newaxis] * jacobian
     fresh = errors.covariance() * (1.0 - lasting**2)
     return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)

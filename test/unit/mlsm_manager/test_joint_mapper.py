@@ -13,7 +13,7 @@ from node_support.errors import RefusedInput
 SCANS = tour(12).scans
 PARAMETERS = MlsmCoreParameters(
     estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
-    speed_deviation=0.025, rate_time=12.0, heading_deviation=0.0175, size_x_meters=0.0, size_y_meters=0.0,
+    speed_deviation=0.025, rate_correlation_time=12.0, heading_deviation=0.0175, size_x_meters=0.0, size_y_meters=0.0,
 )  # fmt: skip
 
 

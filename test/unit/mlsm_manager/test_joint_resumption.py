@@ -19,7 +19,8 @@ KILLED_AFTER = 9
 FREE_SCANS = 4
 PARAMETERS = MlsmCoreParameters(
     estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
-    speed_deviation=0.025, rate_time=12.0, heading_deviation=0.0175, direction_deviation=0.1, size_x_meters=0.0,
+    speed_deviation=0.025, rate_correlation_time=12.0, heading_deviation=0.0175, direction_deviation=0.1,
+    size_x_meters=0.0,
     size_y_meters=0.0, free_scans=FREE_SCANS,
 )  # fmt: skip
 

@@ -92,7 +92,7 @@ def test_a_scale_that_was_found_corrects_the_way_from_then_on():
 
 def test_an_error_of_the_speed_fades_and_what_fades_becomes_unknown():
     track = scan_of(harbour(), still()).track
-    errors = OdometryErrors(rate_time=16.0)
+    errors = OdometryErrors(rate_correlation_time=16.0)
     theta = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
     after = predicted(Belief(0.0, theta, np.zeros((STATES, STATES))), track, 16.0, errors)
     np.testing.assert_allclose(after.theta[3], 0.1 / np.e)

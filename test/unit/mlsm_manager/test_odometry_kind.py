@@ -73,4 +73,7 @@ def test_a_turn_of_a_minute_is_too_slow_where_no_speed_is_measured(kind, slow):
 @pytest.mark.parametrize("kind", [OdometryKind.HEADING, OdometryKind.HOVERING])
 def test_a_velocity_that_is_not_estimated_any_more_fades_as_fast_as_the_profile_lets_speeds_change(kind):
     live = yaml.safe_load(profile_yaml(kind))
-    assert DeadReckoningParameters(**live["dead_reckoning"]).velocity_fading == profile_values(kind)["rate_time"]
+    assert (
+        DeadReckoningParameters(**live["dead_reckoning"]).velocity_fading
+        == profile_values(kind)["rate_correlation_time"]
+    )
