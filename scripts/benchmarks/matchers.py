@@ -9,8 +9,7 @@ import numpy as np
 
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
 from mlsm_manager.scan_matching.distributions import LocalDistributions
-from mlsm_manager.scan_matching.result import Matcher, MatchResult, MatchStatus, Prior
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.blocks import BlockSource, all_of
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters

@@ -10,8 +10,7 @@ import yaml
 from benchmarks.harness import ROOT, Row
 from benchmarks.scans import KINDS, ScanMaker, SonarKind, noise_scan, still
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
-from mlsm_manager.scan_matching.result import Matcher, MatchResult, Prior
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Prior, Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, inverse, wrapped

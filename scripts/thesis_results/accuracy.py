@@ -14,7 +14,7 @@ from matplotlib.image import AxesImage
 from scipy.stats import chi2
 
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
-from mlsm_manager.scan_matching.result import Matcher
+from mlsm_manager.scan_matching.scan import Matcher
 from thesis_results.moves import SEEDS, session_errors, session_scans, session_track
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure

@@ -13,8 +13,7 @@ from matplotlib.axes import Axes
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.result import MatchResult, corrected_points
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
 from mlsm_manager.surface_map.blocks import Blocks
 from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
 from sonar_simulator.world.world import World

@@ -9,8 +9,7 @@ from benchmarks.scans import HEAD, KINDS, ScanMaker, still
 from matplotlib.axes import Axes
 
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.result import MatchResult, corrected_points
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
 from node_support.geometry import inverse, transformed, wrapped
 from sonar_simulator.world.world_file import load_world
 from thesis_results.moves import matching_estimator

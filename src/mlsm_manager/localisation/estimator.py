@@ -12,8 +12,7 @@ from mlsm_manager.localisation.clouds import Cloud, CorrectionHistory
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
-from mlsm_manager.scan_matching.result import Matcher, MatchResult
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.free_space import Carver, CarveReport

@@ -25,8 +25,7 @@ from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.localisation.run_continuation import continued
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
-from mlsm_manager.scan_matching.result import Matcher, MatchResult
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource

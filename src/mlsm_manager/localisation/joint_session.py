@@ -16,8 +16,7 @@ from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
-from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import position_uncertainty

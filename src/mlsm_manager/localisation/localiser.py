@@ -11,11 +11,10 @@ import numpy as np
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.live_correction import LiveCorrection, StandingCorrection
-from mlsm_manager.localisation.relocalisation import relocalised
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
-from mlsm_manager.scan_matching.result import Matcher
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.distribution_matcher import relocalised
+from mlsm_manager.scan_matching.scan import Matcher, Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.blocks import Blocks

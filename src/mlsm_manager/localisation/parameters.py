@@ -11,11 +11,14 @@ from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint import Joint
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind
-from mlsm_manager.localisation.relocalisation import relocaliser
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import (
+    DistributionMatcher,
+    DistributionMatcherParameters,
+    relocaliser,
+)
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.result import Matcher
+from mlsm_manager.scan_matching.scan import Matcher
 from mlsm_manager.surface_map.export.pictures import ColorBy
 from mlsm_manager.surface_map.free_space import Carver, CarvingParameters
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters

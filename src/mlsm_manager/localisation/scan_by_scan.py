@@ -8,8 +8,7 @@ from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.result import MatchResult, corrected_points
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
 from mlsm_manager.scan_matching.scan_path import ERRORS
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.free_space import CarveReport, FirstEchoes

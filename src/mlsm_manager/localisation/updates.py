@@ -4,8 +4,7 @@ from dataclasses import dataclass
 from typing import List, Optional, Sequence
 
 from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.result import MatchResult
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import MatchResult, Scan
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.free_space import CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport

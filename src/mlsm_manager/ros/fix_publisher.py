@@ -9,7 +9,7 @@ from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformS
 from nav_msgs.msg import Odometry, Path
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.scan_matching.result import MatchResult
+from mlsm_manager.scan_matching.scan import MatchResult
 from mlsm_manager.scan_matching.scan_path import POSE
 from node_support import topics
 from node_support.headers import check_stamp

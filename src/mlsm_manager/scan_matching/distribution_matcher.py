@@ -10,30 +10,28 @@ from mlsm_manager.scan_matching.correlative_search import YAW_STEP, ScoreField, 
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.gauss_newton import Fit, PriorState, Refiner
 from mlsm_manager.scan_matching.judgement import agreement, lead_along, significance
-from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
-from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion
-from mlsm_manager.surface_map.blocks import Blocks, BlockSource
-from node_support.geometry import wrapped
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
+from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion, X, Y
+from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
+from node_support.geometry import composed, inverse, wrapped
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.parameters import beam_width_parameter
 
-# Standard deviations of the prior that the search covers.
-_WINDOW_DEVIATIONS = 3.0
+_WINDOW_DEVIATIONS = 3.0  # of the prior, that the search covers
 # Of a score from 0 to 1 per squared standard deviation of the prior: echoes that travel with the vehicle cannot win.
 _PRIOR_COST_SHARE = 0.01
-# Errors of the yaw rate that are tried: the next one costs a ninth more time.
-_MOST_RATES = 9
-# Keeps the covariance of a prior with fixed states invertible.
-_LEAST_VARIANCE = 1e-12
-# Width of the field in search cells: a basin reaches over the nearest grid poses.
-_FIELD_CELLS = 2.0
-# m: neighbours that make the distributions at the edge of the reach.
-_MARGIN = 15.0
-# Of what keeps two candidates of the search apart.
-_APART = 0.5
-# Standard deviations at which a covariance claims to exclude a place.
-_EXCLUDED = 4.0
+_MOST_RATES = 9  # errors of the yaw rate that are tried: the next one costs a ninth more time
+_LEAST_VARIANCE = 1e-12  # keeps the covariance of a prior with fixed states invertible
+_FIELD_CELLS = 2.0  # width of the field in search cells: a basin reaches over the nearest grid poses
+_MARGIN = 15.0  # m: neighbours that make the distributions at the edge of the reach
+_APART = 0.5  # of what keeps two candidates of the search apart
+_EXCLUDED = 4.0  # standard deviations at which a covariance claims to exclude a place
+# Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
+# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.
+_EVERYWHERE = {
+    "search_distance": 500.0, "search_angle": np.pi, "search_cell": 1.0, "candidates": 80, "min_gain_over_second": 6.0
+}  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -193,6 +191,24 @@ class DistributionMatcher:
                 f"a pose beside it, in the least certain direction, is only {lead:.1f} nats worse",
             )
         return MatchStatus.CONVERGED, ""
+
+
+def relocaliser(parameters: DistributionMatcherParameters) -> Matcher:
+    """Return the default matcher, made to look everywhere."""
+    return DistributionMatcher(parameters.changed(_EVERYWHERE))
+
+
+def relocalised(scan: Scan, target: BlockSource, matcher: Matcher, errors: OdometryErrors) -> MatchResult:
+    """Return where in the whole map `scan` was taken, whatever was believed before."""
+    target = all_of(target)
+    centers = target.mean[:, :2] if len(target) else np.zeros((1, 2))
+    low, high = centers.min(axis=0), centers.max(axis=0)
+    middle = np.append((low + high) / 2.0, scan.reference_pose[2])
+    covariance = errors.covariance()
+    covariance[X, X] = covariance[Y, Y] = (float((high - low).max()) / 4.0 + 1.0) ** 2
+    covariance[YAW, YAW] = np.pi**2
+    correction = composed(middle, inverse(scan.reference_pose))
+    return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))
 
 
 def _in_reach(target: BlockSource, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:

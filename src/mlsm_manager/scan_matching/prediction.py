@@ -6,8 +6,7 @@ from typing import Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.result import Prior
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import Prior, Track
 from mlsm_manager.scan_matching.scan_path import (
     DIRECTION,
     ERRORS,

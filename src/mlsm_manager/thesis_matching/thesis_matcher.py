@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.result import MatchResult, MatchStatus, Prior
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from mlsm_manager.thesis_matching.registration import ClosestBlocks, rigid_motion, translate_segments

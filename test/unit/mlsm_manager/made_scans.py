@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from mlsm_manager.scan_matching.result import Prior
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Prior, Scan, Track
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, inverse, transformed
 

@@ -7,7 +7,7 @@ from made_scans import SECONDS, at_velocity, harbour, scan_of, still
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import LocaliserParameters, MlsmCoreParameters
-from mlsm_manager.scan_matching.result import MatchStatus
+from mlsm_manager.scan_matching.scan import MatchStatus
 from node_support.errors import RefusedInput
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)

@@ -5,12 +5,15 @@ from made_scans import at_velocity, harbour, scan_of, still, wall
 
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import MapSettings
-from mlsm_manager.localisation.relocalisation import relocalised, relocaliser
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import (
+    DistributionMatcher,
+    DistributionMatcherParameters,
+    relocalised,
+    relocaliser,
+)
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.result import MatchStatus
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import MatchStatus, Scan
 
 SETTINGS = MapSettings(0.5, 0.5, 1e4, 100, 15)
 

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 from made_scans import DEVIATIONS, at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
-from mlsm_manager.scan_matching.result import MatchStatus, corrected_points
+from mlsm_manager.scan_matching.scan import MatchStatus, corrected_points
 
 FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 

@@ -7,7 +7,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_scans import harbour, map_of, prior_of_pose, scan_of, still
 
-from mlsm_manager.scan_matching.result import MatchStatus
+from mlsm_manager.scan_matching.scan import MatchStatus
 from node_support.geometry import composed
 
 

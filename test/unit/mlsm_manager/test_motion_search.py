@@ -7,7 +7,7 @@ from made_models import DVL, HEADING, UNAIDED, solver_parameters
 
 from mlsm_manager.joint_solver.motion.motion_models import Transition
 from mlsm_manager.joint_solver.placing.path import NodePath
-from mlsm_manager.joint_solver.search.motion_search import searched_node
+from mlsm_manager.joint_solver.search.place_search import searched_node
 from mlsm_manager.joint_solver.unknowns.state import YAW, State
 
 FAR = np.array([3.0, -5.0])

@@ -6,8 +6,7 @@ from made_scans import at_velocity, harbour, scan_of, still
 
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
-from mlsm_manager.scan_matching.result import MatchStatus
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import MatchStatus, Track
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 
 pytestmark = pytest.mark.long

@@ -6,7 +6,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
-from mlsm_manager.scan_matching.result import MatchStatus
+from mlsm_manager.scan_matching.scan import MatchStatus
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.thesis_matching.registration import ClosestBlocks, rigid_motion, translate_segments
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters

@@ -13,8 +13,7 @@ from mlsm_manager.joint_solver.measured.scan_parts import parts_of
 from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
-from mlsm_manager.joint_solver.search.motion_search import searched_node
-from mlsm_manager.joint_solver.search.place_search import island_place, place_after_silence, silent_scans
+from mlsm_manager.joint_solver.search.place_search import island_place, place_after_silence, searched_node, silent_scans
 from mlsm_manager.joint_solver.search.places import PlaceCandidate
 from mlsm_manager.joint_solver.solve.live_window import LiveWindow
 from mlsm_manager.joint_solver.solve.solved_nodes import SolvedNodes
