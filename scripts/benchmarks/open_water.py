@@ -1,18 +1,19 @@
 """Water with nothing in it: no scan of noise may lead to a fix."""
 
 from dataclasses import dataclass
-from typing import Callable, Dict, Iterator, List
+from itertools import product
+from typing import Callable, Dict
 
 import numpy as np
 
-from benchmarks.harness import Row, benchmark_parser, print_table
+from benchmarks.harness import benchmark_parser, print_table
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.replay import replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import pose_matrix
+from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
 
 SCANS = 1000
@@ -58,23 +59,16 @@ WATERS: Dict[str, Turn] = {"silence": silence, "receiver noise": speckle, "noise
 
 def recording(turn: Turn, scans: int, seed: int) -> Recording:
     """Return a recording of a vehicle that drives circles in open water."""
-    times = _START + np.arange(scans * _BEAMS + 1) * _SECONDS_PER_TURN / _BEAMS
-    yaws = _TURN_RATE * (times - _START)
-    radius = _SPEED / _TURN_RATE
+    times, rng = _START + np.arange(scans * _BEAMS + 1) * _SECONDS_PER_TURN / _BEAMS, np.random.default_rng(seed)
+    yaws, radius = _TURN_RATE * (times - _START), _SPEED / _TURN_RATE
     poses = np.column_stack([radius * np.sin(yaws), radius * (1.0 - np.cos(yaws)), yaws])
+    strengths = np.concatenate([np.clip(np.rint(turn(rng)), 0, 255) for _ in range(scans)]).astype(np.uint8)
+    angles = np.tile(2.0 * np.pi * np.arange(_BEAMS) / _BEAMS, scans)
     beams = [
-        PlacedBeam(beam, pose_matrix((x, y, -3.0), (0.0, 0.0, yaw)), is_moving=True)
-        for beam, (x, y, yaw) in zip(_beams(turn, times, np.random.default_rng(seed)), poses)
+        PlacedBeam(Beam(round(1e9 * time), "sonar", angle, row, _RESOLUTION), pose, is_moving=True)
+        for time, angle, row, pose in zip(times, angles, strengths, matrices(poses))
     ]
     return Recording(beams, 0, Track(times, poses), None)
-
-
-def _beams(turn: Turn, times: np.ndarray, rng: np.random.Generator) -> Iterator[Beam]:
-    for number in range(len(times) // _BEAMS):
-        strengths = np.clip(np.rint(turn(rng)), 0, 255).astype(np.uint8)
-        for step in range(_BEAMS):
-            stamp = round(1e9 * times[number * _BEAMS + step])
-            yield Beam(stamp, "sonar", 2.0 * np.pi * step / _BEAMS, strengths[step], _RESOLUTION)
 
 
 def outcome(turn: Turn, estimator: EstimatorName, scans: int, seed: int) -> Outcome:
@@ -84,33 +78,20 @@ def outcome(turn: Turn, estimator: EstimatorName, scans: int, seed: int) -> Outc
     parameters = suited(parameters, echo_shape_of([placed.beam for placed in made.beams]), frozenset())
     found = [scan for scan, _ in scans_of(made, parameters.echoes())]
     replayed = replay(made, found, parameters, lambda _: None)
-    return Outcome(len(found), _fixes(replayed), _farthest(replayed))
-
-
-def _fixes(replayed: Replayed) -> int:
-    return sum(update.accepted and update.result is not None for update in replayed.updates)
-
-
-def _farthest(replayed: Replayed) -> float:
-    return float(np.hypot(*(replayed.corrected - replayed.odometry)[:, :2].T).max())
-
-
-def rows(scans: int = SCANS) -> List[Row]:
-    """Return the figures of all waters and both estimators."""
-    table: List[Row] = []
-    for name, turn in WATERS.items():
-        for estimator in EstimatorName:
-            one = outcome(turn, estimator, scans, seed=1)
-            text = f"{one.fixes} of {one.scans} scans, correction up to {one.farthest:.2f} m"
-            table.append((f"fixes in {name}, {estimator.value}", text, "0"))
-    return table
+    fixes = sum(update.accepted and update.result is not None for update in replayed.updates)
+    return Outcome(len(found), fixes, float(np.hypot(*(replayed.corrected - replayed.odometry)[:, :2].T).max()))
 
 
 def main() -> None:
-    """Print one table."""
+    """Print one table of all waters and both estimators."""
     parser = benchmark_parser("open_water", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS)
-    print_table(rows(parser.parse_args().scans))
+    scans, table = parser.parse_args().scans, []
+    for (name, turn), estimator in product(WATERS.items(), EstimatorName):
+        one = outcome(turn, estimator, scans, seed=1)
+        text = f"{one.fixes} of {one.scans} scans, correction up to {one.farthest:.2f} m"
+        table.append((f"fixes in {name}, {estimator.value}", text, "0"))
+    print_table(table)
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """7.3: the harbour surveyed by stepping the tilt servo, as blocks, and how far these are from its surfaces."""
 
 import itertools
-import math
 from typing import List, Mapping
 
 import numpy as np
@@ -37,7 +36,7 @@ _SURVEYS = {
     "long range, fan beam of 22 deg": (22.0, 50.0),
 }
 """Height of the beam [deg] and range [m]."""
-_SEEN_FROM = math.radians(-50.0), math.radians(38.0)  # direction and elevation: over the open side of the harbour
+_SEEN_FROM = np.radians([-50.0, 38.0])  # direction and elevation: over the open side of the harbour
 
 
 def make(pictures: Pictures) -> str:
