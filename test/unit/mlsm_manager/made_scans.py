@@ -61,6 +61,20 @@ def scan_of(places, true_path, odometry=None, start=0.0, moving=False):
     return Scan(transformed(to_odometry, points), times, np.full(len(times), moving), track, start + SECONDS)
 
 
+def drifting(turn, places=None):
+    """Return a scan of a vehicle at rest while its odometry drifts by 0.32 and 0.16 m a turn after the first."""
+
+    def drift(times):
+        return at_velocity((0.02, 0.01, 0.0))(np.asarray(times) - SECONDS)
+
+    return scan_of(harbour() if places is None else places, still(), drift, start=SECONDS * turn)
+
+
+def elsewhere(turn):
+    """Return such a scan of a place that is in no map."""
+    return drifting(turn, np.random.RandomState(turn).uniform(-20.0, 20.0, (100, 2)))
+
+
 def map_of(places, resolution=0.5):
     """Return the blocks of a map of `places` (n, 2)."""
     surface_map = MultiLevelSurfaceMap(resolution)

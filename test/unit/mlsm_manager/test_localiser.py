@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_scans import SECONDS, at_velocity, harbour, scan_of, still
+from made_scans import SECONDS, drifting, harbour, scan_of, still
 
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.localiser import Localiser, MapInput
@@ -11,15 +11,6 @@ from mlsm_manager.scan_matching.scan import MatchStatus
 from node_support.errors import RefusedInput
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
-
-
-def drifting(turn):
-    """Return a scan of a vehicle that stands still while its odometry drifts by 0.32 and 0.16 m per turn."""
-
-    def drift(times):
-        return at_velocity((0.02, 0.01, 0.0))(np.asarray(times) - SECONDS)
-
-    return scan_of(harbour(), still(), drift, start=SECONDS * turn)
 
 
 def localiser_after(turns, **changes):

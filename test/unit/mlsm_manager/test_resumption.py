@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_scans import at_velocity, harbour, scan_of, still
+from made_scans import SECONDS, at_velocity, drifting, elsewhere, harbour, scan_of, still
 
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
@@ -12,21 +12,6 @@ from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_o
 pytestmark = pytest.mark.long
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
-TURN = 16.0
-
-
-def drifting(turn, places=None):
-    """Return a scan of a vehicle that stands still while its odometry drifts by 0.32 and 0.16 m per turn."""
-
-    def drift(times):
-        return at_velocity((0.02, 0.01, 0.0))(np.asarray(times) - TURN)
-
-    return scan_of(harbour() if places is None else places, still(), drift, start=TURN * turn)
-
-
-def elsewhere(turn):
-    """Return a scan of a place that is not in the map."""
-    return drifting(turn, np.random.RandomState(turn).uniform(-20.0, 20.0, (100, 2)))
 
 
 @pytest.fixture(scope="module")
@@ -49,7 +34,7 @@ def test_all_layers_and_the_place_are_stored(stored):
     assert min(len(blocks) for blocks in stored.layers.values()) > 50
     place = StoredPlace.of_arrays(stored.arrays)
     np.testing.assert_allclose(place.belief.theta[:2], [0.0, 0.0], atol=0.1)
-    np.testing.assert_allclose(place.correction[:2], [-0.02 * TURN * 4, -0.01 * TURN * 4], atol=0.15)
+    np.testing.assert_allclose(place.correction[:2], [-0.02 * SECONDS * 4, -0.01 * SECONDS * 4], atol=0.15)
 
 
 def test_a_killed_node_goes_on_where_its_odometry_has_drifted_to(stored):

@@ -1,7 +1,7 @@
-"""Scans in, map and place out."""
+"""Scans that are matched one by one: map and place out."""
 
 import numpy as np
-from made_scans import at_velocity, harbour, scan_of, still, wall
+from made_scans import drifting, elsewhere, harbour, scan_of, still, wall
 
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import MapSettings
@@ -18,11 +18,6 @@ from mlsm_manager.scan_matching.scan import MatchStatus, Scan
 SETTINGS = MapSettings(0.5, 0.5, 1e4, 100, 15)
 
 
-def drift(times):
-    """Return what an odometry says of a vehicle that is still, from the second turn on."""
-    return at_velocity((0.02, 0.01, 0.0))(np.asarray(times) - 16.0)
-
-
 def estimator_of(matching=True, **changes):
     matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
     estimator = ScanByScan(SETTINGS, OdometryErrors(speed_deviation=0.05), matcher)
@@ -33,15 +28,6 @@ def estimator_of(matching=True, **changes):
 def mapped(scans, **options):
     estimator = estimator_of(**options)
     return estimator, [estimator.add_scan(scan) for scan in scans]
-
-
-def drifting(turn, places=None):
-    """Return a scan of a vehicle that is still while its odometry drifts by 0.32 and 0.16 m a turn after the first."""
-    return scan_of(harbour() if places is None else places, still(), drift, start=16.0 * turn)
-
-
-def unknown_place(turn):
-    return drifting(turn, np.random.default_rng(turn).uniform(-20.0, 20.0, (100, 2)))
 
 
 def test_the_first_scan_makes_the_map_where_the_odometry_says():
@@ -74,7 +60,7 @@ def test_a_matched_scan_goes_into_the_map_undistorted():
 def test_a_rejected_scan_leaves_map_and_correction_alone():
     estimator, _ = mapped([drifting(0), drifting(1)])
     rows, correction = estimator.matched.blocks.rows.copy(), estimator.correction.copy()
-    update = estimator.add_scan(unknown_place(2))
+    update = estimator.add_scan(elsewhere(2))
     assert not update.accepted
     assert update.result.reason
     np.testing.assert_array_equal(estimator.matched.blocks.rows, rows)
@@ -82,26 +68,15 @@ def test_a_rejected_scan_leaves_map_and_correction_alone():
 
 
 def test_after_rejections_the_place_is_less_sure_and_is_found_again():
-    estimator, updates = mapped([drifting(0), drifting(1), unknown_place(2), unknown_place(3), drifting(4)])
+    estimator, updates = mapped([drifting(0), drifting(1), elsewhere(2), elsewhere(3), drifting(4)])
     deviations = [np.sqrt(update.belief.covariance[0, 0]) for update in updates]
     assert deviations[1] < deviations[2] < deviations[3]
     assert updates[4].accepted
     np.testing.assert_allclose(estimator.belief.theta[:2], updates[0].belief.theta[:2], atol=0.15)
 
 
-def test_a_cloud_waits_for_the_match_of_its_time_and_goes_where_that_puts_it():
-    estimator, _ = mapped([drifting(0)])
-    cloud = Cloud.of_scan(drifting(1))
-    assert estimator.add_cloud(cloud).waiting
-    assert estimator.add_waiting() is None
-    estimator.add_scan(drifting(1))
-    update = estimator.add_waiting()
-    assert not update.waiting
-    assert update.report.inserted == len(cloud)
-
-
 def test_a_cloud_of_a_rejected_scan_stays_out_of_the_map():
-    estimator, _ = mapped([drifting(0), drifting(1), unknown_place(2)])
+    estimator, _ = mapped([drifting(0), drifting(1), elsewhere(2)])
     update = estimator.add_cloud(Cloud.of_scan(drifting(2)))
     assert update.unplaced > 0.8 * len(harbour())
     assert update.report.inserted < 0.2 * len(harbour())
@@ -121,21 +96,6 @@ def test_an_empty_scan_is_rejected_and_nothing_breaks():
     assert estimator.add_scan(empty).result.status is MatchStatus.TOO_FEW_POINTS
 
 
-def test_clear_forgets_map_and_place():
-    estimator, _ = mapped([drifting(0), drifting(1)])
-    estimator.clear()
-    assert (len(estimator.matched), len(estimator.shown), estimator.belief) == (0, 0, None)
-    np.testing.assert_array_equal(estimator.correction, np.zeros(3))
-
-
-def test_forget_place_keeps_the_map():
-    estimator, _ = mapped([drifting(0), drifting(1)])
-    count = len(estimator.matched)
-    estimator.forget_place()
-    assert len(estimator.matched) == count
-    assert estimator.belief is None
-
-
 def test_the_belief_can_follow_the_odometry_without_scans():
     estimator, _ = mapped([drifting(0)])
     before = estimator.belief
@@ -144,25 +104,23 @@ def test_the_belief_can_follow_the_odometry_without_scans():
     assert estimator.belief.covariance[0, 0] > before.covariance[0, 0]
 
 
+def found(scan, estimator):
+    """Return what the search in the whole map makes of a scan."""
+    matcher = relocaliser(DistributionMatcherParameters())
+    return relocalised(scan, estimator.matched.blocks, matcher, OdometryErrors())
+
+
 def test_relocalisation_finds_the_place_anywhere_in_the_map():
     estimator, _ = mapped([scan_of(harbour(), still())])
-    lost = scan_of(harbour(), still(), still((40.0, -70.0, 2.5)))
-    matcher = relocaliser(DistributionMatcherParameters())
-    result = relocalised(lost, estimator.matched.blocks, matcher, OdometryErrors())
+    result = found(scan_of(harbour(), still(), still((40.0, -70.0, 2.5))), estimator)
     assert result.accepted, result.reason
     np.testing.assert_allclose(result.pose, np.zeros(3), atol=0.05)
 
 
 def test_relocalisation_along_a_wall_is_refused():
     estimator, _ = mapped([scan_of(wall((-20, 10), (20, 10)), still())])
-    matcher = relocaliser(DistributionMatcherParameters())
-    result = relocalised(
-        scan_of(wall((-10, 10), (10, 10)), still()), estimator.matched.blocks, matcher, OdometryErrors()
-    )
-    assert not result.accepted
+    assert not found(scan_of(wall((-10, 10), (10, 10)), still()), estimator).accepted
 
 
 def test_relocalisation_in_an_empty_map_is_refused():
-    matcher = relocaliser(DistributionMatcherParameters())
-    result = relocalised(drifting(0), estimator_of().matched.blocks, matcher, OdometryErrors())
-    assert result.status is MatchStatus.TOO_FEW_POINTS
+    assert found(drifting(0), estimator_of()).status is MatchStatus.TOO_FEW_POINTS

@@ -1,10 +1,12 @@
-"""Keyframes carve free space, and take it back where they did not see it from."""
+"""A map drawn from keyframes is that of their last places, and free where they saw it from there."""
 
 from dataclasses import dataclass
 
 import numpy as np
+import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_maps import random_points
 
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
@@ -27,6 +29,99 @@ class MovedBy:
 
     def origins(self, cloud):
         return np.tile(ORIGIN + np.array([0.0, self.shift]), (len(cloud), 1))
+
+
+def patch(number):
+    """Return keyframe `number`: a flat patch of points that ends at that second."""
+    points = random_points(number, 40, extent=3.0) * [1.0, 1.0, 0.0, 1.0]
+    return Cloud(points, np.full(len(points), float(number)), float(number))
+
+
+def made_at_once(*parts):
+    made = MultiLevelSurfaceMap(RESOLUTION, LIMIT)
+    for points in parts:
+        made.insert(points)
+    return made.blocks
+
+
+def assert_same(found, wanted):
+    order, other = (np.lexsort(np.column_stack([b.cells, b.mean[:, 2]]).T) for b in (found, wanted))
+    np.testing.assert_array_equal(found.cells[order], wanted.cells[other])
+    np.testing.assert_allclose(found.mean[order], wanted.mean[other], atol=1e-9)
+
+
+STEP = st.tuples(st.sampled_from(["add", "draw", "insert"]), st.integers(-4, 4))
+
+
+@settings(max_examples=40)
+@given(st.lists(STEP, max_size=10), st.integers(-4, 4))
+def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
+    shown, keyframes, inserted = KeyframeMap(RESOLUTION, LIMIT), [], []
+    for number, (step, shift) in enumerate(steps):
+        if step == "add":
+            keyframes.append(patch(number))
+            shown.add(keyframes[-1])
+        elif step == "draw":
+            shown.draw(MovedBy(0.3 * shift), NEVER)
+        else:
+            inserted.append(patch(number).points)
+            shown.insert(inserted[-1])
+    place = MovedBy(0.3 * last)
+    shown.settle(place)
+    assert_same(shown.map.blocks, made_at_once(*inserted, *(place.points(keyframe) for keyframe in keyframes)))
+    assert shown.moving == []
+
+
+def map_of(*numbers):
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    for number in numbers:
+        shown.add(patch(number))
+    return shown
+
+
+def test_a_keyframe_that_moves_leaves_nothing_behind():
+    shown = map_of(1)
+    shown.draw(MovedBy(0.0), NEVER)
+    shown.draw(MovedBy(50.0), NEVER)
+    assert_same(shown.map.blocks, made_at_once(MovedBy(50.0).points(patch(1))))
+
+
+def test_a_settled_keyframe_stays_where_it_was_drawn():
+    shown = map_of(1, 2)
+    shown.draw(MovedBy(0.0), settled_until=1.0)
+    assert len(shown.moving) == 1
+    shown.draw(MovedBy(50.0), settled_until=1.0)
+    assert_same(shown.map.blocks, made_at_once(patch(1).points, MovedBy(50.0).points(patch(2))))
+
+
+@pytest.mark.parametrize("settled_until", [NEVER, np.inf])
+def test_the_report_is_that_of_the_newest_keyframe(settled_until):
+    shown = map_of(1, 2)
+    assert shown.draw(MovedBy(2.0 * LIMIT), settled_until).report.outside == len(patch(2))
+
+
+def with_three_keyframes():
+    """Return a map of keyframes 0 to 2, of which the oldest is settled."""
+    shown = KeyframeMap(RESOLUTION, LIMIT)
+    for number in range(3):
+        shown.add(patch(number))
+        shown.draw(MovedBy(0.0), 0.0)
+    return shown
+
+
+def test_a_copy_ends_at_a_time_and_leaves_the_map_as_it_was():
+    shown, placement = with_three_keyframes(), MovedBy(2.0)
+    older = shown.drawn_until(1.0, placement)
+    assert_same(older.blocks, made_at_once(patch(0).points, placement.points(patch(1))))
+    everything = [patch(0).points, placement.points(patch(1)), placement.points(patch(2))]
+    assert_same(shown.map.blocks, made_at_once(*everything))
+
+
+def test_what_is_settled_until_a_time_forgets_the_keyframes_after_it():
+    shown = with_three_keyframes()
+    shown.settle(MovedBy(2.0), 1.0)
+    assert_same(shown.map.blocks, made_at_once(patch(0).points, MovedBy(2.0).points(patch(1))))
+    assert not shown.moving
 
 
 def cloud(number, *echoes):
@@ -77,22 +172,16 @@ def test_free_space_moves_with_the_keyframe_that_saw_it():
     assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
 
 
-def test_many_keyframes_that_move_at_once_are_followed_a_few_with_each_scan():
+@pytest.mark.parametrize("looks", [True, False])
+def test_many_keyframes_that_move_at_once_are_followed_a_few_with_each_scan(looks):
+    """What nobody looked at in between is followed with the next look."""
     shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)), place=MovedBy(0.0))
     assert {y for _, y in cells(shown.free.blocks)} <= {-1, 0, 1}
     shown.draw(MovedBy(5.0), NEVER)
-    assert {y for _, y in cells(shown.free.blocks)} >= {0, 10}
+    assert not looks or {y for _, y in cells(shown.free.blocks)} >= {0, 10}
     for _ in range(2):
         shown.draw(MovedBy(5.0), NEVER)
-        assert len(shown.map)
-    assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
-
-
-def test_what_nobody_looked_at_in_between_is_followed_with_the_next_look():
-    shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)), place=MovedBy(0.0))
-    assert {y for _, y in cells(shown.free.blocks)} <= {-1, 0, 1}
-    for _ in range(3):
-        shown.draw(MovedBy(5.0), NEVER)
+        assert not looks or len(shown.map)
     assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
 
 
@@ -121,8 +210,7 @@ def test_it_is_there_again_when_they_turn_out_to_have_looked_beside_it():
 
 def test_it_is_gone_for_ever_when_they_are_settled():
     shown = crossed_wall(7)
-    carved = shown.draw(MovedBy(0.0), settled_until=np.inf).carved
-    assert carved.removed == 1
+    assert shown.draw(MovedBy(0.0), settled_until=np.inf).carved.removed == 1
     assert cells(shown.map.blocks) == [(40, 0)]
 
 

@@ -1,4 +1,4 @@
-"""The joint solver as the localiser sees it: matching on and off, lost and found, and clouds that wait."""
+"""The joint estimator: matching on and off, lost and found, and clouds that wait."""
 
 import numpy as np
 import pytest
@@ -143,14 +143,9 @@ def test_free_space_is_known_between_the_vehicle_and_the_walls():
     assert len(walls.intersection(map(tuple, free.cells.tolist()))) < 0.2 * len(walls)
 
 
-def test_free_space_is_known_without_matching_too():
-    localiser, _ = localiser_after(3, start_matching=False)
-    assert len(localiser.free) > 1000
-
-
-def test_free_space_is_not_known_where_nobody_wants_it():
-    localiser, _ = localiser_after(3, carve=False)
-    assert len(localiser.free) == 0
+@pytest.mark.parametrize(("change", "known"), [({"start_matching": False}, True), ({"carve": False}, False)])
+def test_free_space_is_known_without_matching_too_but_not_where_nobody_wants_it(change, known):
+    assert (len(localiser_after(3, **change)[0].free) > 1000) == known
 
 
 def test_a_stored_map_gives_its_free_space_back():
