@@ -1,7 +1,12 @@
-"""Writes the generated files: the default yaml files, docs/nodes.md and docs/thesis_names.md."""
+"""Writes the generated files: the default yaml files, two pages of docs, and the files that make filters nodes.
+
+These pages are docs/nodes.md and docs/thesis_names.md. A filter in the table of stages gets an executable, a
+dynamic_reconfigure description and a launch file.
+"""
 
 import argparse
 import dataclasses
+import inspect
 import sys
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,9 +24,7 @@ from node_support.parameter_text import default_yaml, markdown_table, start_up_y
 from node_support.parameters import EXPERT, ParameterSet, describe
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
-from sonar_processing.filters.echo_extractor import EchoExtractorParameters
-from sonar_processing.filters.outliers import OutlierRemoverParameters
-from sonar_processing.filters.threshold import ThresholderParameters
+from sonar_processing.filters.stage_table import STAGES, config_name
 from sonar_processing.scans.image import SonarImageParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.tilt_scan import SonarControlParameters
@@ -48,6 +51,36 @@ sonar_image and the stages listed in its parameter `~chain`, a list of node name
 outlier_remover, echo_extractor]`. `mapping` also runs mlsm_core. Topics are the same as with one node per stage, and
 parameters stay in the namespaces of the stages (`/thresholder/mode`).
 """
+EXECUTABLE = """\
+#!/usr/bin/env python3
+from sonar_processing.ros.stage_runner import run_stage
+
+run_stage("{name}")
+"""
+CONFIGURATION = """\
+#!/usr/bin/env python3
+import os
+import sys
+
+sys.path.insert(0, os.path.join(os.path.dirname(os.path.realpath(__file__)), os.pardir, "src"))
+
+from node_support.ros.reconfigure_description import generate
+from sonar_processing.filters.stage_table import STAGES
+
+sys.exit(generate(STAGES["{name}"].parameters, "{config}"))
+"""
+LAUNCH = """\
+<launch>
+  <!-- {name} as a node of its own. {summary} -->
+  <arg name="yaml" default="$(find underwater_map_construction)/yaml/{name}_default.yaml"
+       doc="file of the node's parameters"/>
+  <arg name="respawn" default="false" doc="true: start the node again whenever it ends"/>
+  <node name="{name}" pkg="underwater_map_construction" type="{name}" output="screen"
+        respawn="$(arg respawn)">
+    <rosparam command="load" file="$(arg yaml)"/>
+  </node>
+</launch>
+"""
 
 
 @dataclass(frozen=True)
@@ -61,18 +94,16 @@ class LiveNode:
 LIVE_NODES: Dict[str, LiveNode] = {
     "circle_detector": LiveNode(CircleDetectorParameters, "CircleDetector"),
     "dead_reckoning": LiveNode(DeadReckoningParameters, "DeadReckoning"),
-    "echo_extractor": LiveNode(EchoExtractorParameters, "EchoExtractor"),
     "imagenex_852_driver": LiveNode(DriverParameters, "Imagenex852"),
     "imagenex_852_emulator": LiveNode(EmulatorParameters, "Imagenex852Emulator"),
     "line_detector": LiveNode(LineDetectorParameters, "LineDetector"),
     "mlsm_core": LiveNode(MlsmCoreParameters, "MlsmCore"),
-    "outlier_remover": LiveNode(OutlierRemoverParameters, "OutlierRemover"),
     "ping360_driver": LiveNode(Ping360DriverParameters, "Ping360"),
     "ping360_emulator": LiveNode(Ping360EmulatorParameters, "Ping360Emulator"),
     "sonar_control": LiveNode(SonarControlParameters, "SonarControl"),
     "sonar_image": LiveNode(SonarImageParameters, "SonarImage"),
     "sonar_to_cloud": LiveNode(SonarToCloudParameters, "SonarToCloud"),
-    "thresholder": LiveNode(ThresholderParameters, "Thresholder"),
+    **{name: LiveNode(stage.parameters, config_name(name)) for name, stage in STAGES.items()},
 }
 
 START_UP_NODES: Dict[str, Type[ParameterSet]] = {
@@ -92,6 +123,11 @@ def generated() -> Dict[Path, str]:
         texts[ROOT / f"yaml/{name}_default.yaml"] = start_up_yaml(name, parameters, groups[name])
     for kind in OdometryKind:
         texts[ROOT / f"yaml/odometry_{kind.value.lower()}.yaml"] = profile_yaml(kind)
+    for name, stage in STAGES.items():
+        words = {"name": name, "config": config_name(name), "summary": inspect.getdoc(stage.build).splitlines()[0]}
+        texts[ROOT / f"nodes/{name}"] = EXECUTABLE.format(**words)
+        texts[ROOT / f"cfg/{config_name(name)}.cfg"] = CONFIGURATION.format(**words)
+        texts[ROOT / f"launch/{name}.launch"] = LAUNCH.format(**words)
     texts[ROOT / "docs/nodes.md"] = nodes_page()
     texts[ROOT / "docs/thesis_names.md"] = thesis_names()
     return texts
@@ -130,7 +166,7 @@ def thesis_names() -> str:
         "| node | thesis | here |",
         "| --- | --- | --- |",
     ]
-    for name, node in LIVE_NODES.items():
+    for name, node in sorted(LIVE_NODES.items()):
         for field in dataclasses.fields(node.parameters):
             described = describe(field)
             here = f"{EXPERT}/{field.name}" if described.expert else field.name
@@ -175,7 +211,9 @@ def main() -> int:
     for path in stale:
         print(f"{path.relative_to(ROOT)}: {'not up to date; run scripts/document' if check else 'written'}")
         if not check:
-            path.write_text(generated()[path])
+            text = generated()[path]
+            path.write_text(text)
+            path.chmod(0o755 if text.startswith("#!") else 0o644)
     return int(check and bool(stale))
 
 

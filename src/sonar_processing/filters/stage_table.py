@@ -1,4 +1,4 @@
-"""The table of stages: a stage takes a cloud and returns a cloud. A new filter is one line here."""
+"""The table of stages: a stage takes a cloud and returns a cloud. A new filter is one entry here."""
 
 from dataclasses import dataclass, field
 from typing import Any, Callable, Dict, Mapping, Optional, Type
@@ -63,6 +63,11 @@ STAGES: Dict[str, StageType] = {
         {"threshold": lambda stage: stage.newest_threshold},
     ),
 }
+
+
+def config_name(stage: str) -> str:
+    """Return the name of a stage's dynamic_reconfigure description: OutlierRemover of outlier_remover."""
+    return stage.title().replace("_", "")
 
 
 class EmptiedScans:

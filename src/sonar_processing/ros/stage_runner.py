@@ -11,7 +11,7 @@ from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
+from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans, config_name
 from sonar_processing.ros.cloud_topics import CloudPublisher, FigurePublisher, report_broken, subscribe_to_clouds
 
 
@@ -25,7 +25,7 @@ class StageRunner:
         self._type = STAGES[name]
         self._emptied = EmptiedScans()
         self._live = ReconfigurableParameters(
-            self._type.parameters, namespace, name.title().replace("_", ""), self.health, self._use_parameters
+            self._type.parameters, namespace, config_name(name), self.health, self._use_parameters
         )
         self._publisher = CloudPublisher(self._type.output_topic)
         self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self._type.figures]
