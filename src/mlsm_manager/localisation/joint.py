@@ -21,8 +21,7 @@ from mlsm_manager.localisation.joint_session import (
 )
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.keyframe_map import JointMaps
-from mlsm_manager.localisation.resumption import StoredRun
-from mlsm_manager.localisation.run_continuation import continued
+from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
@@ -141,7 +140,7 @@ class Joint(Estimator):
         A stored run goes on where its solver finds the scan on the map, also if the scan alone says too little.
         """
         start = perf_counter()
-        longer = None if self._session is None else continued(self._session, scan, self.matched)
+        longer = None if self._session is None else resumed_if_it_fits(self._session, scan, self.matched)
         if longer is not None:
             self._expected = None
             return self._taken(scan, longer, start)

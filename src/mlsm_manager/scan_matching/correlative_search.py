@@ -45,14 +45,6 @@ class ScoreField:
         excess = np.maximum(near - broad, 0.0)
         return cls(excess / (1.0 + excess), origin, cell)
 
-    def at(self, points: np.ndarray) -> np.ndarray:
-        """Return the values at points (..., 2), 0 outside the grid."""
-        index = self.index(points)
-        rows, columns = self.values.shape
-        x, y = index[..., 0], index[..., 1]
-        inside = (x >= 0) & (x < columns) & (y >= 0) & (y < rows)
-        return np.where(inside, self.values[np.clip(y, 0, rows - 1), np.clip(x, 0, columns - 1)], 0.0)
-
     def index(self, points: np.ndarray) -> np.ndarray:
         """Return (..., 2) int64 column and row of the cells that hold points (..., 2)."""
         return np.floor((points - self.origin) / self.cell).astype(np.int64)
