@@ -19,7 +19,6 @@ from mlsm_manager.surface_map.ply_file import read_ply
 from node_support.help import CommandLine
 
 _MAPS = "a map (.mlsm, or a .ply of this package)"
-_OUT = f"file to write, ending with one of {' '.join(ENDINGS)}"
 
 
 def run_map_tool() -> None:
@@ -132,58 +131,35 @@ _COMMANDS: Dict[str, Callable[[Namespace], List[str]]] = {
 def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     """Return `command` and what it needs; exits on a bad command line."""
     parser = CommandLine("map_tool", description="Look at, export, crop, merge and compare maps.")
+    one_map, two_maps, out, colors = (argparse.ArgumentParser(add_help=False) for _ in range(4))
+    one_map.add_argument("map", type=Path, metavar="MAP", help=_MAPS)
+    two_maps.add_argument("first", type=Path, metavar="FIRST", help=_MAPS)
+    two_maps.add_argument("second", type=Path, metavar="SECOND", help=_MAPS)
+    out.add_argument("out", type=Path, metavar="OUT", help=f"file to write, ending with one of {' '.join(ENDINGS)}")
+    names = [by.value.lower() for by in ColorBy]
+    colors.add_argument("--color", choices=names, default="height", help="what blocks are coloured by")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
     commands.required = True
     info = commands.add_parser("info", help="say what maps hold")
     info.add_argument("maps", type=Path, nargs="+", metavar="FILE", help=_MAPS)
-    view = commands.add_parser("view", help="show a map in a window; without a screen write a picture")
-    _add_map(view)
-    _add_colors(view)
-    _add_export(commands.add_parser("export", help="write a map in another format"))
-    _add_crop(commands.add_parser("crop", help="keep what lies in a box"))
-    _add_merge(commands.add_parser("merge", help="make one map of two"))
-    _add_two_maps(commands.add_parser("diff", help="say what only one of two maps has"))
-    return parser.parse_args(arguments)
-
-
-def _add_export(parser: argparse.ArgumentParser) -> None:
-    _add_map(parser)
-    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
-    parser.add_argument(
-        "--slice", type=float, nargs=2, default=(float("-inf"), float("inf")), metavar=("LOW", "HIGH"),
+    commands.add_parser(
+        "view", parents=[one_map, colors], help="show a map in a window; without a screen write a picture"
+    )
+    export_parser = commands.add_parser("export", parents=[one_map, out, colors], help="write a map in another format")
+    export_parser.add_argument(
+        "--slice", type=float, nargs=2, default=(-np.inf, np.inf), metavar=("LOW", "HIGH"),
         help="heights between which a .pgm shows what is occupied [m] (default: all)",
     )  # fmt: skip
-    _add_colors(parser)
-
-
-def _add_crop(parser: argparse.ArgumentParser) -> None:
-    _add_map(parser)
-    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
+    crop = commands.add_parser("crop", parents=[one_map, out], help="keep what lies in a box")
     for option, corner in (("--low", "lower"), ("--high", "upper")):
-        parser.add_argument(
+        crop.add_argument(
             option, type=float, nargs="+", required=True, metavar=("X", "Y"),
             help=f"the box's {corner} corner, X Y or X Y Z [m]",
         )  # fmt: skip
-
-
-def _add_merge(parser: argparse.ArgumentParser) -> None:
-    _add_two_maps(parser)
-    parser.add_argument("out", type=Path, metavar="OUT", help=_OUT)
-    parser.add_argument(
+    merge = commands.add_parser("merge", parents=[two_maps, out], help="make one map of two")
+    merge.add_argument(
         "--transform", type=float, nargs=4, default=(0.0, 0.0, 0.0, 0.0), metavar=("X", "Y", "Z", "YAW"),
         help="where the second map's origin lies in the first [m, deg] (default: at its origin)",
     )  # fmt: skip
-
-
-def _add_map(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("map", type=Path, metavar="MAP", help=_MAPS)
-
-
-def _add_two_maps(parser: argparse.ArgumentParser) -> None:
-    parser.add_argument("first", type=Path, metavar="FIRST", help=_MAPS)
-    parser.add_argument("second", type=Path, metavar="SECOND", help=_MAPS)
-
-
-def _add_colors(parser: argparse.ArgumentParser) -> None:
-    names = [by.value.lower() for by in ColorBy]
-    parser.add_argument("--color", choices=names, default="height", help="what blocks are coloured by")
+    commands.add_parser("diff", parents=[two_maps], help="say what only one of two maps has")
+    return parser.parse_args(arguments)

@@ -1,9 +1,8 @@
 """The figures of a report."""
 
 import base64
-from dataclasses import dataclass
 from io import BytesIO
-from typing import List, Optional
+from typing import List, Tuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -32,10 +31,9 @@ def map_from_above(mission: Mission) -> go.Figure:
     """Return the map with all paths; the last two traces are filled by the slider."""
     figure = go.Figure()
     if len(mission.blocks):
-        picture = map_image(mission.blocks)
-        (left, bottom), (right, top) = picture.low, picture.high
+        url, (left, bottom), (right, top) = _map_image(mission.blocks)
         figure.add_layout_image(
-            source=picture.url, xref="x", yref="y", x=left, y=top, sizex=right - left, sizey=top - bottom,
+            source=url, xref="x", yref="y", x=left, y=top, sizex=right - left, sizey=top - bottom,
             sizing="stretch", layer="below",
         )  # fmt: skip
         _add_line(figure, [left, right], [bottom, top], "", "rgba(0,0,0,0)", hidden=True)
@@ -145,7 +143,7 @@ def _add_uncertainty(figure: go.Figure, best: Path, told: Uncertainty) -> None:
         _add_line(figure, places[:, 0], places[:, 1], "doubtful", "rgba(204,51,119,0.35)", width=9)
 
 
-def _ellipses(centers: np.ndarray, covariances: np.ndarray) -> "tuple[np.ndarray, np.ndarray]":
+def _ellipses(centers: np.ndarray, covariances: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return x and y of ellipses at centers (k, 2), with gaps between them."""
     values, vectors = np.linalg.eigh(covariances)
     axes = vectors * (_ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0)))[:, np.newaxis, :]
@@ -166,24 +164,17 @@ def _add_line(
     )
 
 
-def _laid_out(figure: go.Figure, height: int, title: Optional[str] = None) -> go.Figure:
+def _laid_out(figure: go.Figure, height: int) -> go.Figure:
     return figure.update_layout(
-        template="plotly_white", height=height, title=title, margin={"l": 60, "r": 20, "t": 20, "b": 50},
+        template="plotly_white", height=height, margin={"l": 60, "r": 20, "t": 20, "b": 50},
         legend={"orientation": "h", "y": -0.15},
     )  # fmt: skip
 
 
-@dataclass(frozen=True)
-class MapImage:
-    """url: a PNG as a data URL. low, high: (2,) x y [m] of its lower left and upper right corner."""
-
-    url: str
-    low: np.ndarray
-    high: np.ndarray
-
-
-def map_image(blocks: Blocks) -> MapImage:
-    """Return the picture of a map that has at least one block; cells with more points are darker."""
+def _map_image(blocks: Blocks) -> Tuple[str, np.ndarray, np.ndarray]:
+    """Return a PNG as a data URL of a map that has at least one block, and x y [m] of its lower left and upper right
+    corner; a pixel is a cell, and cells with more points are darker.
+    """
     cells = blocks.cells
     first = cells.min(axis=0)
     side = -(-int((cells.max(axis=0) - first).max() + 1) // _MOST_PIXELS)
@@ -192,7 +183,7 @@ def map_image(blocks: Blocks) -> MapImage:
     points = np.zeros((height, width))
     np.add.at(points, (height - 1 - pixels[:, 1], pixels[:, 0]), blocks.count)
     low = first * blocks.resolution
-    return MapImage(_data_url(_drawn(points)), low, low + np.array([width, height]) * side * blocks.resolution)
+    return _data_url(_drawn(points)), low, low + np.array([width, height]) * side * blocks.resolution
 
 
 def _drawn(points: np.ndarray) -> Image.Image:

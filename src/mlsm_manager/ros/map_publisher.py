@@ -53,16 +53,11 @@ def has_octomap_messages() -> bool:
     return find_spec("octomap_msgs") is not None and find_spec("pyoctomap") is not None
 
 
-def octomap_type() -> Any:
-    """Return octomap_msgs.msg.Octomap."""
-    from octomap_msgs.msg import Octomap
-
-    return Octomap
-
-
 def octomap_message(tree: Any, octomap_header: Header) -> Any:
     """Return a pyoctomap.OcTree as octomap_msgs/Octomap in its binary form, free and occupied."""
-    message = octomap_type()(header=octomap_header, binary=True, id="OcTree", resolution=tree.getResolution())
+    from octomap_msgs.msg import Octomap
+
+    message = Octomap(header=octomap_header, binary=True, id="OcTree", resolution=tree.getResolution())
     # The file's header ends with the line "data"; the message holds what follows.
     message.data = np.frombuffer(tree.writeBinary().split(b"\ndata\n", 1)[1], dtype=np.int8).tolist()
     return message
@@ -157,7 +152,9 @@ class MapPublisher:
             _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, localiser, health),
         ]
         if has_octomap_messages():
-            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, octomap_type(), self._octomap, localiser, health))
+            from octomap_msgs.msg import Octomap
+
+            self._whole.append(_WholeMap(topics.MAP_OCTOMAP, Octomap, self._octomap, localiser, health))
         self._tell = on_change(parameters.map_period, self._publish, health)
         # rospy takes connections before it knows the listeners, and tells them of none that came so early.
         if localiser.block_count:

@@ -19,17 +19,7 @@ from node_support.geometry import wrapped
 from node_support.health import Health
 from node_support.parameters import ParameterError
 from node_support.ros.callbacks import every
-from underwater_map_construction.srv import (
-    GetRegion,
-    GetRegionRequest,
-    GetRegionResponse,
-    LoadMap,
-    LoadMapRequest,
-    LoadMapResponse,
-    SaveMap,
-    SaveMapRequest,
-    SaveMapResponse,
-)
+from underwater_map_construction import srv
 
 
 class MapServices:
@@ -50,38 +40,38 @@ class MapServices:
         self._on_replaced = on_replaced
         self._on_fix = on_fix
         prefix = namespace if namespace == "~" else namespace + "/"
-        rospy.Service(f"{prefix}save_map", SaveMap, self._save)
-        rospy.Service(f"{prefix}load_map", LoadMap, self._load)
+        rospy.Service(f"{prefix}save_map", srv.SaveMap, self._save)
+        rospy.Service(f"{prefix}load_map", srv.LoadMap, self._load)
         rospy.Service(f"{prefix}reset_map", Trigger, self._reset)
-        rospy.Service(f"{prefix}get_region", GetRegion, self._get_region)
+        rospy.Service(f"{prefix}get_region", srv.GetRegion, self._get_region)
         rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
 
-    def _save(self, request: SaveMapRequest) -> SaveMapResponse:
+    def _save(self, request: srv.SaveMapRequest) -> srv.SaveMapResponse:
         stored = stored_map(self._localiser, self._parameters)
         try:
             path = self._folder.save(request.name, stored, request.overwrite)
         except (OSError, ValueError) as error:
-            return SaveMapResponse(False, str(error))
-        return SaveMapResponse(True, f"{len(stored.shown)} blocks written to {path}")
+            return srv.SaveMapResponse(False, str(error))
+        return srv.SaveMapResponse(True, f"{len(stored.shown)} blocks written to {path}")
 
-    def _load(self, request: LoadMapRequest) -> LoadMapResponse:
+    def _load(self, request: srv.LoadMapRequest) -> srv.LoadMapResponse:
         try:
             stored = self._folder.load(request.name)
             load_into(self._localiser, stored, self._parameters, same_odometry=False)
         except ValueError as error:
-            return LoadMapResponse(False, f"{error}; the present map stays")
+            return srv.LoadMapResponse(False, f"{error}; the present map stays")
         self._on_replaced()
-        return LoadMapResponse(True, f"{self._localiser.block_count} blocks loaded")
+        return srv.LoadMapResponse(True, f"{self._localiser.block_count} blocks loaded")
 
     def _reset(self, _request: TriggerRequest) -> TriggerResponse:
         count = self._localiser.clear()
         self._on_replaced()
         return TriggerResponse(True, f"{count} blocks deleted")
 
-    def _get_region(self, request: GetRegionRequest) -> GetRegionResponse:
+    def _get_region(self, request: srv.GetRegionRequest) -> srv.GetRegionResponse:
         low, high = (np.array([corner.x, corner.y, corner.z]) for corner in (request.low, request.high))
         blocks = self._localiser.region(low, high)
-        return GetRegionResponse(map_cloud(blocks, rospy.Time.now().to_nsec(), self._parameters.map_frame))
+        return srv.GetRegionResponse(map_cloud(blocks, rospy.Time.now().to_nsec(), self._parameters.map_frame))
 
     def _relocalise(self, _request: TriggerRequest) -> TriggerResponse:
         update = self._localiser.relocalise()

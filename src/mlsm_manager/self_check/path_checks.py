@@ -158,38 +158,33 @@ def halves_agree(
     limit: float = 3.0,
 ) -> Verdict:
     """Return by how many deviations the halves' calibrations (n,) differ at most; `names` (n,) are what they are."""
-    spread = np.sqrt(np.asarray(first_deviations) ** 2 + np.asarray(second_deviations) ** 2)
-    distances = np.abs(np.asarray(first) - np.asarray(second)) / spread
-    worst = int(np.argmax(distances))
-    found = f"{first[worst]:.3g} and {second[worst]:.3g}, {_deviations(distances[worst], limit)}"
+    worst, distance = _most_apart(first, second, np.hypot(first_deviations, second_deviations))
+    found = f"{first[worst]:.3g} and {second[worst]:.3g}, {distance:.1f} standard deviations apart, limit {limit:g}"
     text = f"both halves of the run find the same calibration ({names[worst]} {found})"
-    if distances[worst] > limit:
+    if distance > limit:
         text = f"the halves of the run disagree on {names[worst]} ({found})"
     question = "Do the first and the second half of the run find the same errors of sonar and odometry?"
-    return Verdict("calibration of the halves", float(distances[worst]), limit, text, question=question)
+    return Verdict("calibration of the halves", distance, limit, text, question=question)
 
 
 def as_expected(
-    names: Sequence[str],
-    expected: np.ndarray,
-    expected_deviations: np.ndarray,
-    found: np.ndarray,
-    limit: float = 3.0,
+    names: Sequence[str], expected: np.ndarray, deviations: np.ndarray, found: np.ndarray, limit: float = 3.0
 ) -> Verdict:
     """Return by how many deviations what a run `found` (n,) is from what was `expected` (n,) before it, at most.
 
-    `names` (n,) are what they are; n > 0.
+    `names` (n,) are what they are; n > 0. deviations: (n,) standard ones of what was expected.
     """
-    expected, deviations, found = np.asarray(expected), np.asarray(expected_deviations), np.asarray(found)
-    distances = np.abs(found - expected) / deviations
-    worst = int(np.argmax(distances))
-    before = f"expected {expected[worst]:.3g} +- {deviations[worst]:.3g}, {_deviations(distances[worst], limit)}"
+    worst, distance = _most_apart(expected, found, deviations)
+    before = f"expected {expected[worst]:.3g} +- {deviations[worst]:.3g}, {distance:.1f} standard deviations away, limit {limit:g}"
     text = f"calibration as expected ({names[worst]} {found[worst]:.3g}, {before})"
-    if distances[worst] > limit:
+    if distance > limit:
         text = f"{names[worst]} {found[worst]:.3g} is unlikely for such a device and mounting ({before})"
     question = "Are the errors of sonar and odometry as large as those of such devices, mounted as described?"
-    return Verdict("calibration as expected", float(distances[worst]), limit, text, question=question)
+    return Verdict("calibration as expected", distance, limit, text, question=question)
 
 
-def _deviations(distance: float, limit: float) -> str:
-    return f"{distance:.1f} standard deviations apart, limit {limit:g}"
+def _most_apart(first: np.ndarray, second: np.ndarray, deviations: np.ndarray) -> Tuple[int, float]:
+    """Return where two values (n,) are the most standard deviations (n,) apart, and how many."""
+    distances = np.abs(np.subtract(first, second)) / deviations
+    worst = int(np.argmax(distances))
+    return worst, float(distances[worst])

@@ -100,12 +100,6 @@ class Blocks:
         return self.take(((places >= low) & (places <= high)).all(axis=1))
 
 
-def concatenated_blocks(first: Blocks, second: Blocks) -> Blocks:
-    """Return the blocks of both, which have one resolution."""
-    rows, crossed = np.concatenate([first.rows, second.rows]), np.concatenate([first.crossed, second.crossed])
-    return Blocks(rows, first.resolution, crossed)
-
-
 class BlockSource(Protocol):
     """What gives the blocks in a box: a map, or a copy of its blocks."""
 

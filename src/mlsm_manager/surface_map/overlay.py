@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks, concatenated_blocks
+from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
@@ -62,4 +62,5 @@ class Overlay:
         new = np.setdiff1d(cell_keys(cells), self._cells)
         held, _, _ = self._map.find(cells_of_keys(new))
         self._cells = np.union1d(self._cells, new)
-        self._held = concatenated_blocks(self._held, held)
+        rows, crossed = ((self._held.rows, held.rows), (self._held.crossed, held.crossed))
+        self._held = Blocks(np.concatenate(rows), held.resolution, np.concatenate(crossed))

@@ -68,7 +68,7 @@ def test_a_head_that_is_mounted_turned_is_told():
     assert verdict.fires
     assert verdict.line() == (
         "DOUBTFUL: odometry_direction 0.34 is unlikely for such a device and mounting "
-        "(expected 0 +- 0.1, 3.4 standard deviations apart, limit 3)"
+        "(expected 0 +- 0.1, 3.4 standard deviations away, limit 3)"
     )
 
 

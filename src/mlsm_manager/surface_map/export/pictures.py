@@ -15,21 +15,11 @@ from mlsm_manager.surface_map.tiles import THINNEST
 from node_support.files import write_whole
 
 Limits = Tuple[float, float]
-
-TYPE_COLORS = {
-    BlockType.HORIZONTAL: (0.75, 0.16, 0.10),
-    BlockType.VERTICAL: (1.0, 0.87, 0.40),
-}
+TYPE_COLORS = {BlockType.HORIZONTAL: (0.75, 0.16, 0.10), BlockType.VERTICAL: (1.0, 0.87, 0.40)}
 _RAMP = np.array(
-    [
-        (0.19, 0.07, 0.23),
-        (0.27, 0.52, 0.97),
-        (0.10, 0.89, 0.71),
-        (0.64, 0.99, 0.24),
-        (0.98, 0.73, 0.22),
-        (0.79, 0.16, 0.0),
-    ]
-)
+    [[0.19, 0.07, 0.23], [0.27, 0.52, 0.97], [0.10, 0.89, 0.71],
+     [0.64, 0.99, 0.24], [0.98, 0.73, 0.22], [0.79, 0.16, 0.00]]
+)  # fmt: skip
 """From low to high, six points of the colour map "turbo" (Mikhailov 2019), whose steps the eye tells apart."""
 _INNER_SHARE = (2.0, 98.0)
 """Percent: a few echoes far off do not take the colours from all others."""
@@ -59,7 +49,7 @@ def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -
     The age of a block is the number of beams that crossed it since a point last fell into it.
     """
     if by is ColorBy.TYPE:
-        return np.array([TYPE_COLORS[kind] for kind in BlockType if kind in TYPE_COLORS])[blocks.type]
+        return np.array(list(TYPE_COLORS.values()))[blocks.type]
     low, high = limits or color_limits(blocks, by)
     return ramp((_values(blocks, by) - low) / (high - low) if high > low else np.zeros(len(blocks)))
 
