@@ -175,7 +175,8 @@ def as_expected(
     `names` (n,) are what they are; n > 0. deviations: (n,) standard ones of what was expected.
     """
     worst, distance = _most_apart(expected, found, deviations)
-    before = f"expected {expected[worst]:.3g} +- {deviations[worst]:.3g}, {distance:.1f} standard deviations away, limit {limit:g}"
+    before = f"expected {expected[worst]:.3g} +- {deviations[worst]:.3g}"
+    before += f", {distance:.1f} standard deviations away, limit {limit:g}"
     text = f"calibration as expected ({names[worst]} {found[worst]:.3g}, {before})"
     if distance > limit:
         text = f"{names[worst]} {found[worst]:.3g} is unlikely for such a device and mounting ({before})"
