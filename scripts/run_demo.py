@@ -157,12 +157,9 @@ def leave_results(watch: Watch, seconds: float, output: Path) -> None:
     outlines = load_sdf(ROOT / "worlds/basin.sdf").world.outlines()
     path = Path2d(np.array(watch.path)[:, 1:], "the vehicle's path", "#2a9d4a")
     draw_map(
-        output / "map.png",
-        f"The basin as {watch.number('mlsm_core', 'clouds in')} scans show it",
-        blocks,
-        outlines,
+        output / "map.png", f"The basin as {watch.number('mlsm_core', 'clouds in')} scans show it", blocks, outlines,
         [path],
-    )
+    )  # fmt: skip
     write_whole(output / "summary.json", (json.dumps(summary(watch, seconds), indent=2) + "\n").encode())
 
 

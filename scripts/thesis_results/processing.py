@@ -116,14 +116,9 @@ def processed(raw: Cloud, place: np.ndarray, lines: LineDetectorParameters) -> P
     thresholded = thresholder(raw)
     cleaned = OutlierRemover(OutlierRemoverParameters())(thresholded)
     return Processed(
-        place,
-        raw,
-        thresholded,
-        cleaned,
-        LineDetector(lines)(cleaned),
-        otsu.newest_threshold,
+        place, raw, thresholded, cleaned, LineDetector(lines)(cleaned), otsu.newest_threshold,
         thresholder.newest_threshold,
-    )
+    )  # fmt: skip
 
 
 def draw_stages(pictures: Pictures, name: str, scan: Processed, reach: float, what: str) -> str:

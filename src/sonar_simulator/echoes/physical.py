@@ -58,12 +58,9 @@ class PhysicalParameters(ParameterSet):
     salinity: float = parameter(35.0, "salinity of the water; 0 in a tank", unit="per mille", low=0.0, high=42.0)
     pulse_length_us: float = parameter(100.0, "length of the pulse", unit="us", low=1.0, high=1000.0)
     source_level_db: float = parameter(
-        105.0,
-        "level of the echo from a surface 1 m away that fills the beam and reflects everything",
-        unit="dB",
-        low=0.0,
-        high=250.0,
-    )
+        105.0, "level of the echo from a surface 1 m away that fills the beam and reflects everything", unit="dB",
+        low=0.0, high=250.0,
+    )  # fmt: skip
     noise_level_db: float = parameter(0.0, "noise level of receiver and water", unit="dB", low=-300.0, high=100.0)
     volume_scattering_db: float = parameter(
         -60.0, "backscatter of a metre of water, as if it were a surface", unit="dB", low=-300.0, high=0.0
@@ -90,12 +87,9 @@ class PhysicalParameters(ParameterSet):
     surface_mirror: bool = parameter(False, "the water's surface, z = 0, is one of the mirrors")
     surface_loss_db: float = parameter(1.0, "loss at each reflection off the waves", unit="dB", low=0.0, high=60.0)
     vehicle_target_db: float = parameter(
-        -100.0,
-        "target strength of the vehicle itself, which reflects echoes once more",
-        unit="dB",
-        low=-100.0,
+        -100.0, "target strength of the vehicle itself, which reflects echoes once more", unit="dB", low=-100.0,
         high=20.0,
-    )
+    )  # fmt: skip
 
 
 class Physical:

@@ -51,14 +51,11 @@ class Contacts:
         ones = np.ones_like(ranges)
         ahead = np.broadcast_to(np.array([1.0, 0.0, 0.0]), (*ranges.shape, 3))
         return cls(
-            ranges=ranges,
-            cosines=ones if cosines is None else np.broadcast_to(cosines, ranges.shape),
+            ranges=ranges, cosines=ones if cosines is None else np.broadcast_to(cosines, ranges.shape),
             material=np.zeros(ranges.shape, np.intp) if material is None else np.broadcast_to(material, ranges.shape),
             directions=ahead if directions is None else np.broadcast_to(directions, (*ranges.shape, 3)),
-            shares=ones / max(1, ranges.shape[1]),
-            losses=ones,
-            materials=materials,
-        )
+            shares=ones / max(1, ranges.shape[1]), losses=ones, materials=materials,
+        )  # fmt: skip
 
     @staticmethod
     def joined(parts: Sequence["Contacts"]) -> "Contacts":
@@ -106,14 +103,10 @@ class BeamTracer:
         world, shape = self._caster.world, directions.shape[:2]
         cosines = np.abs(np.einsum("ij,ij->i", leg.directions, world.normals[leg.faces]))
         return Contacts(
-            ranges=leg.ranges.reshape(shape),
-            cosines=np.minimum(cosines, 1.0).reshape(shape),
-            material=world.face_material[leg.faces].reshape(shape),
-            directions=directions,
-            shares=np.broadcast_to(shares, shape),
-            losses=leg.left.reshape(shape),
-            materials=world.materials,
-        )
+            ranges=leg.ranges.reshape(shape), cosines=np.minimum(cosines, 1.0).reshape(shape),
+            material=world.face_material[leg.faces].reshape(shape), directions=directions,
+            shares=np.broadcast_to(shares, shape), losses=leg.left.reshape(shape), materials=world.materials,
+        )  # fmt: skip
 
     def _leading(self, origins: np.ndarray, rotations: np.ndarray, limits: np.ndarray) -> Contacts:
         points, faces = self._nearest.find(origins, rotations, self._planes, limits)

@@ -47,11 +47,9 @@ class RayCaster:
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return distances as `distances` does, and the (n,) faces of the world that are hit, -1 where none is."""
         found = self._scene.run(
-            np.ascontiguousarray(origins, dtype=np.float32),
-            np.ascontiguousarray(directions, dtype=np.float32),
-            query="INTERSECT",
-            output=True,
-        )
+            np.ascontiguousarray(origins, dtype=np.float32), np.ascontiguousarray(directions, dtype=np.float32),
+            query="INTERSECT", output=True,
+        )  # fmt: skip
         distances = found["tfar"].astype(np.float64)
         distances[distances > _NOTHING] = np.inf
         return distances, found["primID"]

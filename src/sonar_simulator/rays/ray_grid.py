@@ -86,11 +86,9 @@ def rays_of_scan(layout: ScanLayout, ranges: np.ndarray, intensities: np.ndarray
     retro = np.asarray(intensities, dtype=np.float64).reshape(rows, columns) if len(intensities) == grid.size else None
     half = 0.5 * vertical_opening
     return Rays(
-        _without_misses(grid, layout.range_max),
-        np.linspace(-half, half, rows) if rows > 1 else np.zeros(1),
-        np.linspace(layout.angle_min, layout.angle_max, columns),
-        retro,
-    )
+        _without_misses(grid, layout.range_max), np.linspace(-half, half, rows) if rows > 1 else np.zeros(1),
+        np.linspace(layout.angle_min, layout.angle_max, columns), retro,
+    )  # fmt: skip
 
 
 def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: int, nothing_range: float) -> Rays:
@@ -115,11 +113,9 @@ def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: 
     elevations = np.arcsin(points[:, 2] / distances).reshape(shape)
     retro = None if intensities is None else np.asarray(intensities, dtype=np.float64).reshape(shape)
     return Rays(
-        _without_misses(distances.reshape(shape), nothing_range),
-        np.median(elevations, axis=1),
-        np.median(np.unwrap(bearings.reshape(shape), axis=1), axis=0),
-        retro,
-    )
+        _without_misses(distances.reshape(shape), nothing_range), np.median(elevations, axis=1),
+        np.median(np.unwrap(bearings.reshape(shape), axis=1), axis=0), retro,
+    )  # fmt: skip
 
 
 def _row_count(bearings: np.ndarray) -> int:
@@ -163,12 +159,9 @@ def contacts_of_grid(
     directions = np.stack([level * np.cos(bearings), level * np.sin(bearings), rising], axis=-1)
     material, materials = _materials(ranges.shape, retro)
     return Contacts.of_ranges(
-        ranges.reshape(1, -1),
-        directions.reshape(1, -1, 3),
-        _cosines(ranges, directions).reshape(1, -1),
-        material.reshape(1, -1),
-        materials,
-    )
+        ranges.reshape(1, -1), directions.reshape(1, -1, 3), _cosines(ranges, directions).reshape(1, -1),
+        material.reshape(1, -1), materials,
+    )  # fmt: skip
 
 
 def _cosines(ranges: np.ndarray, directions: np.ndarray) -> np.ndarray:

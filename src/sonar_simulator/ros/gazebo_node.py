@@ -109,13 +109,9 @@ class GazeboSonar:
         self._filter = self._make_filter()
         self._tilt = JointAngle(self._parameters.sensor_joint, self.health)
         rospy.Subscriber(
-            topics.RAYS,
-            rospy.AnyMsg,
-            guarded(self.health, self._take_scan),
-            queue_size=10,
-            buff_size=_SCAN_BUFFER_BYTES,
-            tcp_nodelay=True,
-        )
+            topics.RAYS, rospy.AnyMsg, guarded(self.health, self._take_scan), queue_size=10,
+            buff_size=_SCAN_BUFFER_BYTES, tcp_nodelay=True,
+        )  # fmt: skip
 
     def _make_filter(self) -> Optional[TransformFilter]:
         if self._parameters.head is HeadMode.SWEEP:

@@ -154,13 +154,9 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--parameters", type=Path, help="yaml file of the simulator's parameters (default: the world's)"
     )
     parser.add_argument(
-        "--set",
-        nargs="+",
-        action="extend",
-        default=[],
-        metavar="KEY=VALUE",
+        "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE",
         help="any parameter; GROUP.KEY=VALUE for those in groups",
-    )
+    )  # fmt: skip
     parser.add_argument("--robot", type=Path, help="URDF that says where the sonar is mounted (default: Charl-e)")
     parser.add_argument("--compression", choices=COMPRESSIONS, default="none", help="of the bag (default: %(default)s)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
@@ -233,13 +229,9 @@ def _run(options: Namespace) -> None:
     duration = setup.simulation.duration
     with tqdm(total=round(duration), unit="s", disable=options.quiet or None, desc=options.out.name) as bar:
         beams = write_bag(
-            options.out.absolute(),
-            setup,
-            settings,
-            robot,
-            options.compression,
+            options.out.absolute(), setup, settings, robot, options.compression,
             lambda now: bar.update(round(now) - bar.n),
-        )
+        )  # fmt: skip
         bar.update(bar.total - bar.n)
     seconds = time.monotonic() - start
     if not options.quiet:

@@ -91,14 +91,9 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
     commanded = CommandedVehicle(settings.vehicle, script.start)
     is_scripted = parameters.drive is Drive.SCRIPT
     simulation = Simulation(
-        script if is_scripted else commanded,
-        _odometry(settings, script.pose(0.0), measurements),
-        sonar,
-        _head(settings),
-        T_base_sonar,
-        servo,
-        script.tilt_commands if is_scripted else (),
-    )
+        script if is_scripted else commanded, _odometry(settings, script.pose(0.0), measurements), sonar,
+        _head(settings), T_base_sonar, servo, script.tilt_commands if is_scripted else (),
+    )  # fmt: skip
     return Setup(simulation, world, sonar, servo, commanded, T_base_sonar, script.pose(0.0))
 
 

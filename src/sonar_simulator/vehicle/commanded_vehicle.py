@@ -23,12 +23,9 @@ class VehicleParameters(ParameterSet):
     heave_speed: float = parameter(0.4, "greatest speed up and down", unit="m/s", low=0.0, high=20.0)
     turn_rate_deg: float = parameter(30.0, "greatest turn rate", unit="deg/s", low=0.0, high=360.0)
     response_time: float = parameter(
-        0.6,
-        "time constant of the speed; 80 % of a new command is reached after three of them",
-        unit="s",
-        low=0.02,
+        0.6, "time constant of the speed; 80 % of a new command is reached after three of them", unit="s", low=0.02,
         high=60.0,
-    )
+    )  # fmt: skip
     command_timeout: float = parameter(
         0.5, "simulated time without a command after which the vehicle stops", unit="s", low=0.01, high=3600.0
     )

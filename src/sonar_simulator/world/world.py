@@ -131,13 +131,9 @@ class World:
             face_material.append(np.full(len(triangles), materials.setdefault(shape.material, len(materials))))
             count += len(corners)
         return cls(
-            name,
-            np.concatenate(vertices),
-            np.concatenate(faces).astype(np.int32),
-            tuple(shapes),
-            np.concatenate(face_material),
-            tuple(materials),
-        )
+            name, np.concatenate(vertices), np.concatenate(faces).astype(np.int32), tuple(shapes),
+            np.concatenate(face_material), tuple(materials),
+        )  # fmt: skip
 
     @cached_property
     def normals(self) -> np.ndarray:

@@ -91,11 +91,9 @@ def test_points_that_are_no_rays_are_refused(points):
 
 
 CIRCLE = Rays(
-    np.arange(2 * 720.0).reshape(2, 720) + 1.0,
-    np.array([-0.1, 0.1]),
-    np.linspace(-math.pi, math.pi, 720, endpoint=False),
-    None,
-)
+    np.arange(2 * 720.0).reshape(2, 720) + 1.0, np.array([-0.1, 0.1]),
+    np.linspace(-math.pi, math.pi, 720, endpoint=False), None,
+)  # fmt: skip
 
 
 @given(st.floats(-math.pi, math.pi))
