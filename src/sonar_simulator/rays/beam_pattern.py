@@ -1,8 +1,8 @@
 """The rays of a beam: a fan, a fan with side lobes, and a round cone."""
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 
@@ -10,29 +10,34 @@ import numpy as np
 _SIDES = 16
 
 
-class RayPattern(Protocol):
-    """Rays inside a beam that is a convex pyramid; the beam's frame has x along its axis and z up."""
+class RayPattern(ABC):
+    """Rays inside a beam that is a convex pyramid; the beam's frame has x along its axis and z up.
 
-    @property
-    def rays(self) -> int:
-        """Number of rays in one beam."""
+    rays: their number in one beam.
+    """
+
+    rays: int
 
     @property
     def rays_inside(self) -> int:
         """Number of rays, from the first, that are between the planes."""
+        return self.rays
 
+    @abstractmethod
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam, drawn anew for each beam."""
 
-    def shares(self) -> np.ndarray:
-        """Return (rays,) the share of the beam's solid angle that each ray represents."""
-
+    @abstractmethod
     def planes(self) -> np.ndarray:
         """Return (k, 3) unit normals, inward, of the planes through the sonar that bound the beam."""
 
+    def shares(self) -> np.ndarray:
+        """Return (rays,) the share of the beam's solid angle that each ray represents."""
+        return np.full(self.rays, 1.0 / self.rays)
+
 
 @dataclass(frozen=True)
-class BeamPattern:
+class BeamPattern(RayPattern):
     """A fan: a pyramid of rows x columns rays, one in each stratum of equal angles (thesis 4.1.1, 6.4.3).
 
     vertical_opening, horizontal_opening: full angles of the beam, rad, below pi.
@@ -48,11 +53,6 @@ class BeamPattern:
         """Number of rays in one beam."""
         return self.rows * self.columns
 
-    @property
-    def rays_inside(self) -> int:
-        """Number of rays between the planes: all."""
-        return self.rays
-
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam.
 
@@ -65,10 +65,6 @@ class BeamPattern:
         slopes = np.stack([np.ones_like(bearing), np.tan(bearing), np.tan(elevation)], axis=-1)
         slopes /= np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
         return slopes.reshape(beams, self.rays, 3)
-
-    def shares(self) -> np.ndarray:
-        """Return (rays,) equal shares."""
-        return np.full(self.rays, 1.0 / self.rays)
 
     def planes(self) -> np.ndarray:
         """Return (4, 3) inward normals: right, left, lower and upper side."""
@@ -85,7 +81,7 @@ class BeamPattern:
 
 
 @dataclass(frozen=True)
-class FanWithSideLobes:
+class FanWithSideLobes(RayPattern):
     """The rays of `fan`, followed by `side_rays` more over all bearings at the fan's elevations.
 
     Only the fan bounds the beam: what only side lobes hear is not part of it.
@@ -124,7 +120,7 @@ class FanWithSideLobes:
 
 
 @dataclass(frozen=True)
-class ConePattern:
+class ConePattern(RayPattern):
     """Rays spread evenly over a cone of full angle `opening`, rad (thesis 6.4.1, 6.4.2).
 
     The cone is a pyramid with 16 sides, like a mesh of a cone; each flat side touches the round cone from outside.
@@ -133,11 +129,6 @@ class ConePattern:
     opening: float
     rays: int
 
-    @property
-    def rays_inside(self) -> int:
-        """Number of rays between the planes: all."""
-        return self.rays
-
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam: a sunflower, rotated anew for each beam."""
         number = np.arange(self.rays)
@@ -145,10 +136,6 @@ class ConePattern:
         radius = math.tan(self.opening / 2.0) * np.sqrt((number + rng.random((beams, self.rays))) / self.rays)
         slopes = np.stack([np.ones_like(turn), radius * np.cos(turn), radius * np.sin(turn)], axis=-1)
         return slopes / np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
-
-    def shares(self) -> np.ndarray:
-        """Return (rays,) equal shares."""
-        return np.full(self.rays, 1.0 / self.rays)
 
     def planes(self) -> np.ndarray:
         """Return (16, 3) inward normals; four of them bound the cone below, above, right and left."""

@@ -57,8 +57,21 @@ class Start(ParameterSet):
 
 
 @dataclass(frozen=True)
-class Move(ParameterSet):
-    """One entry of a script: a displacement along the axes of the world, with a turn, beginning and ending at rest."""
+class Entry(ParameterSet):
+    """One entry of a script."""
+
+    def displacement(self) -> np.ndarray:
+        """Return the displacement x, y, z [m] and yaw [rad]."""
+        return np.zeros(4)
+
+    def duration(self) -> float:
+        """Return the time that it takes, s."""
+        return 0.0
+
+
+@dataclass(frozen=True)
+class Move(Entry):
+    """A displacement along the axes of the world, with a turn, beginning and ending at rest."""
 
     x: float = parameter(0.0, "displacement", unit="m")
     y: float = parameter(0.0, "displacement", unit="m")
@@ -84,14 +97,10 @@ class Move(ParameterSet):
 
 
 @dataclass(frozen=True)
-class Wait(ParameterSet):
-    """One entry of a script: waiting."""
+class Wait(Entry):
+    """Waiting."""
 
     wait: float = parameter(0.0, "time to stay", unit="s", low=0.0)
-
-    def displacement(self) -> np.ndarray:
-        """Return the displacement x, y, z [m] and yaw [rad]: none."""
-        return np.zeros(4)
 
     def duration(self) -> float:
         """Return the duration of the wait, s."""
@@ -99,18 +108,10 @@ class Wait(ParameterSet):
 
 
 @dataclass(frozen=True)
-class Tilt(ParameterSet):
-    """One entry of a script: the sonar's servo starts to turn, and the script continues at once."""
+class Tilt(Entry):
+    """The sonar's servo starts to turn, and the script continues at once."""
 
     tilt_deg: float = parameter(0.0, "angle of the servo, positive down", unit="deg", low=-180.0, high=180.0)
-
-    def displacement(self) -> np.ndarray:
-        """Return the displacement x, y, z [m] and yaw [rad]: none."""
-        return np.zeros(4)
-
-    def duration(self) -> float:
-        """Return the time that it takes, s: none."""
-        return 0.0
 
 
 class TiltCommand(NamedTuple):
@@ -165,14 +166,6 @@ class VehicleScript:
     def pose(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_world_base at `time` [s]; x forward, y left, z up."""
         return _pose(self._motion(time, self._index(time))[0])
-
-    def twist(self, time: float) -> np.ndarray:
-        """Return the (6,) velocity at `time` s in the body frame: linear x y z, m/s, angular x y z, rad/s."""
-        return _twist(*self._motion(time, self._index(time)))
-
-    def is_still(self, time: float) -> bool:
-        """Return whether the vehicle is at rest between moves at `time` s; the slow ends of a move do not count."""
-        return self._is_still(time, self._index(time))
 
     def _index(self, time: float) -> int:
         return int(np.searchsorted(self._ends, time, side="right"))

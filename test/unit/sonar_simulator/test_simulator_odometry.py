@@ -35,7 +35,7 @@ def _estimates(odometry, rate=20.0, way=WAY):
 def test_without_errors_odometry_is_the_truth():
     for time, estimate in zip(np.arange(0.0, WAY.duration, 0.05), _estimates(_odometry())):
         np.testing.assert_allclose(estimate.T_odom_base, WAY.pose(time), atol=1e-9)
-        np.testing.assert_allclose(estimate.twist, WAY.twist(time), atol=1e-12)
+        np.testing.assert_allclose(estimate.twist, WAY.state(time).twist, atol=1e-12)
 
 
 def test_with_30_percent_error_4_m_of_odometry_are_5_2_m_of_way_and_depth_and_heading_are_true():

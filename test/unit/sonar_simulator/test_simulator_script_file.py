@@ -16,7 +16,9 @@ THESIS = load_script(ROOT / "yaml" / "thesis_moves.yaml")
 def _whole_still_turns(script):
     """Return the numbers of the head's 16 s turns in which the vehicle never moves."""
     turns = range(int(script.duration // 16.0))
-    return [turn for turn in turns if all(script.is_still(time) for time in 16.0 * turn + np.linspace(0, 16, 121))]
+    return [
+        turn for turn in turns if all(script.state(time).is_still for time in 16.0 * turn + np.linspace(0, 16, 121))
+    ]
 
 
 @pytest.mark.parametrize(("name", "scans"), [("basin", 12), ("harbour", 10), ("tank", 4)])

@@ -35,25 +35,25 @@ def test_the_twist_is_the_derivative_of_the_pose_seen_from_the_body(time):
     before, after = SCRIPT.pose(time - step), SCRIPT.pose(time + step)
     linear = SCRIPT.pose(time)[:3, :3].T @ (after[:3, 3] - before[:3, 3]) / (2.0 * step)
     angular = yaw_of(np.linalg.inv(before) @ after) / (2.0 * step)
-    np.testing.assert_allclose(SCRIPT.twist(time), [*linear, 0.0, 0.0, angular], atol=1e-3)
+    np.testing.assert_allclose(SCRIPT.state(time).twist, [*linear, 0.0, 0.0, angular], atol=1e-3)
 
 
 @given(TIMES)
 def test_pose_and_twist_are_continuous(time):
     step = 1e-6
     np.testing.assert_allclose(SCRIPT.pose(time + step), SCRIPT.pose(time), atol=1e-5)
-    np.testing.assert_allclose(SCRIPT.twist(time + step), SCRIPT.twist(time), atol=1e-5)
+    np.testing.assert_allclose(SCRIPT.state(time + step).twist, SCRIPT.state(time).twist, atol=1e-5)
 
 
 def test_speed_is_the_greatest_speed_of_a_move():
     script = VehicleScript.from_yaml_data([{"x": 3.0, "y": 4.0, "speed": 0.5}])
-    speeds = [np.linalg.norm(script.twist(time)[:3]) for time in np.linspace(0.0, script.duration, 2001)]
+    speeds = [np.linalg.norm(script.state(time).twist[:3]) for time in np.linspace(0.0, script.duration, 2001)]
     assert max(speeds) == pytest.approx(0.5)
 
 
 def test_turn_rate_is_the_greatest_rate_of_a_turn():
     script = VehicleScript.from_yaml_data([{"yaw_deg": -90.0, "turn_rate_deg": 20.0}])
-    rates = [script.twist(time)[5] for time in np.linspace(0.0, script.duration, 2001)]
+    rates = [script.state(time).twist[5] for time in np.linspace(0.0, script.duration, 2001)]
     assert min(rates) == pytest.approx(-math.radians(20.0))
 
 
@@ -71,8 +71,13 @@ def test_a_tilt_is_commanded_when_the_entries_before_it_are_done_and_takes_no_ti
 
 
 def test_a_vehicle_is_still_while_it_waits_and_outside_the_script_only():
-    assert [SCRIPT.is_still(time) for time in (-1.0, 0.0, 1.9, 2.0, 2.5)] == [True, True, True, False, False]
-    assert [SCRIPT.is_still(SCRIPT.duration + late) for late in (-1.5, -0.5, 0.0, 9.0)] == [False, True, True, True]
+    assert [SCRIPT.state(time).is_still for time in (-1.0, 0.0, 1.9, 2.0, 2.5)] == [True, True, True, False, False]
+    assert [SCRIPT.state(SCRIPT.duration + late).is_still for late in (-1.5, -0.5, 0.0, 9.0)] == [
+        False,
+        True,
+        True,
+        True,
+    ]
 
 
 @pytest.mark.parametrize(
