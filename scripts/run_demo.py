@@ -19,7 +19,7 @@ from nav_msgs.msg import Odometry
 from std_msgs.msg import Float32
 
 from mlsm_manager.offline.picture import draw_map
-from mlsm_manager.offline.picture_contents import Path2d
+from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.surface_map.ply_file import read_ply
 from node_support.files import write_whole
 from sonar_simulator.world.world_file import load_sdf
@@ -155,7 +155,8 @@ def leave_results(watch: Watch, seconds: float, output: Path) -> None:
         raise DemoError(answer.message)
     blocks = read_ply(output / "map.ply")
     outlines = load_sdf(ROOT / "worlds/basin.sdf").world.outlines()
-    path = Path2d(np.array(watch.path)[:, 1:], "the vehicle's path", "#2a9d4a")
+    poses = np.array(watch.path)
+    path = Trajectory("the vehicle's path", "#2a9d4a", poses[:, 0], poses[:, 1:])
     draw_map(
         output / "map.png", f"The basin as {watch.number('mlsm_core', 'clouds in')} scans show it", blocks, outlines,
         [path],

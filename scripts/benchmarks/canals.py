@@ -12,8 +12,8 @@ from benchmarks.paths import live_figures, solved_live
 from benchmarks.twin_conditions import TwinParameters, lasting, reported
 from benchmarks.twin_water import RESOLUTION, Water, heard, water_of
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.suited_parameters import EchoShape
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam

@@ -12,7 +12,7 @@ import numpy as np
 
 from benchmarks.harness import ROOT, Row, ratio_text
 from benchmarks.map_figures import RESOLUTION
-from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from recordings.reader import Request
 from sonar_processing.beams.beam import PlacedBeam

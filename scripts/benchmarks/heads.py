@@ -12,7 +12,7 @@ from benchmarks.paths import PathFigures, batch_figures, live_figures, solved_li
 from benchmarks.scans import KINDS
 from benchmarks.tours import Tour, simulated
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.echo_shape import EchoShape
+from mlsm_manager.offline.suited_parameters import EchoShape
 
 
 def mean_figures(tour: Tour, draws: int) -> Tuple[PathFigures, PathFigures]:

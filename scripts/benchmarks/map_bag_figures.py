@@ -6,10 +6,9 @@ import numpy as np
 
 from benchmarks.harness import Row, cpu_seconds, mapped, missing_row, recorded
 from mlsm_manager.localisation.estimator import Estimator
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
-from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
-from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.recording import read_recording, scans_of
+from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
 
 WHOLE, PART = "marina_whole_blind.bag", "marina_first.bag"
 _WANTED = {"": 500, "--refine": 150, "--refine --check": 150}

@@ -8,10 +8,10 @@ import numpy as np
 
 from benchmarks.harness import benchmark_parser, print_table
 from mlsm_manager.localisation.parameters import EstimatorName
-from mlsm_manager.offline.echo_shape import echo_shape_of, suited
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.suited_parameters import echo_shape_of, suited
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam

@@ -8,11 +8,9 @@ from mlsm_manager.joint_solver.measured.odometry_log import as_complex
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted
-from mlsm_manager.offline.echo_length import echo_sigma
-from mlsm_manager.offline.echo_shape import EchoShape, suited
-from mlsm_manager.offline.odometry_kind import with_odometry
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.suited_parameters import EchoShape, echo_sigma, suited, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 
 Truth = Callable[[np.ndarray], np.ndarray]

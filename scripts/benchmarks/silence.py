@@ -16,10 +16,9 @@ from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of
-from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.recording import Recording, read_recording
 from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.suited_parameters import EchoShape, echo_shape_of
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, matrices
 from recordings.reader import Request

@@ -12,10 +12,9 @@ from benchmarks.paths import batch_figures, live_figures, solved_live
 from benchmarks.twin_conditions import TWINS, TwinParameters, reported, true_path
 from benchmarks.twin_water import Water, ebbed, heard, made_water, with_ship
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.echo_shape import echo_shape_of
-from mlsm_manager.offline.evaluation import positions_at
-from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.offline.recording import Recording, Truth, read_recording
+from mlsm_manager.offline.run_files import positions_at
+from mlsm_manager.offline.suited_parameters import echo_shape_of
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from recordings.reader import Request

@@ -11,8 +11,8 @@ from benchmarks.paths import batch_figures, live_figures, solved_live
 from benchmarks.tours import Tour, simulated
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.echo_shape import EchoShape
 from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.suited_parameters import EchoShape
 from mlsm_manager.scan_matching.scan import Track
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour", "harbour_tour", "basin_tour")

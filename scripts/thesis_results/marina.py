@@ -13,8 +13,8 @@ import numpy as np
 from benchmarks.harness import ROOT, recorded, run_node
 from matplotlib.axes import Axes
 
-from mlsm_manager.offline.evaluation import aligned_truth, positions_at
 from mlsm_manager.offline.recording import Truth
+from mlsm_manager.offline.run_files import aligned_truth, positions_at
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import read_map
 from thesis_results.page import joined, prose, table

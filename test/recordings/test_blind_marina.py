@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.echo_shape import EchoShape, suited
-from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.suited_parameters import EchoShape, suited
 from recordings.reader import Request
 
 ROOT = Path(__file__).resolve().parents[2]

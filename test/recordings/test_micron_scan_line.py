@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.recording import read_recording, scans_of
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import Request
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters

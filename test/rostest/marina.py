@@ -19,9 +19,8 @@ from scipy.spatial import cKDTree
 from sensor_msgs.msg import PointCloud2
 from tf2_msgs.msg import TFMessage
 
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
-from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from node_support.geometry import composed, wrapped
 from recordings.reader import Request

@@ -11,18 +11,22 @@ import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.echo_length import echo_sigma
-from mlsm_manager.offline.echo_shape import echo_shape_of, suited
-from mlsm_manager.offline.findings import Found
-from mlsm_manager.offline.odometry_kind import OdometryFound, may_strafe, odometry_of, with_odometry
-from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.refinement import Refined, refine
-from mlsm_manager.offline.refitting import refitted_verdicts
+from mlsm_manager.offline.findings import Findings
+from mlsm_manager.offline.recording import Recording, read_recording, scans_of
+from mlsm_manager.offline.refinement import Refined, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED, FURTHER_COLORS, ODOMETRY, REFINED, Run
 from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
+from mlsm_manager.offline.suited_parameters import (
+    OdometryFound,
+    echo_shape_of,
+    echo_sigma,
+    may_strafe,
+    odometry_of,
+    suited,
+    with_odometry,
+)
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.verdict import Verdict
@@ -39,7 +43,7 @@ class MappedBag:
     """What was made of a recording and of those added to its map.
 
     odometry: how the vehicle knows its motion. parameters: those of the run, with the calibration that was found.
-    refined and found are None where nothing was refined, or no solver ran.
+    refined and findings are None where nothing was refined, or no solver ran.
     """
 
     title: str
@@ -48,7 +52,7 @@ class MappedBag:
     parameters: ReplayParameters
     replayed: Replayed
     refined: Optional[Refined]
-    found: Optional[Found]
+    findings: Optional[Findings]
     sessions: List[Session]
     run: Run
 
@@ -71,13 +75,13 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     _tell_of_refused(replayed, options)
     refined = _refined(recording, replayed, parameters) if options.refine else None
     refitted = _refitted(replayed, refined) if options.check else []
-    found = None if replayed.solver is None else Found.of(replayed, refined, [signs.turns(), *refitted])
-    known = parameters if found is None else found.calibration.applied(parameters)
+    findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted])
+    known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known)
-    run = run if found is None else replace(run, trust=found.trust)
+    run = run if findings is None else replace(run, trust=findings.trust)
     title = " ".join(bag.name for bag in options.bags)
-    return MappedBag(title, recording, odometry, known, replayed, refined, found, sessions, run)
+    return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
 
 
 def poses_of(replayed: Replayed) -> Dict[str, np.ndarray]:
@@ -176,6 +180,6 @@ def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session]
     if refined is not None:
         poses[REFINED] = refined.poses
         stored = replace(stored, layers=refined.layers)
-    ways = [session.way(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
-    further = [way for way in ways if len(way.times)]
+    paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
+    further = [path for path in paths if len(path.times)]
     return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, further=further)

@@ -1,18 +1,255 @@
-"""What the joint solver found out in a run, besides the path: the calibration, and whether the run can be trusted."""
+"""What the joint solver found in a run besides the path: the calibration, and whether the run can be trusted."""
 
-from dataclasses import dataclass
-from typing import Any, Dict, Optional, Sequence
+from dataclasses import dataclass, fields
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
-from mlsm_manager.joint_solver.solve.batch_solver import Closed
-from mlsm_manager.offline.calibration import Calibration
+import numpy as np
+
+from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
+from mlsm_manager.joint_solver.motion.motion_models import HELD_DEVIATION, OdometryModel
+from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
+from mlsm_manager.joint_solver.placing.turns import Turns
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, PartResult, solved_part
+from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, RUN_COLUMNS, State
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
-from mlsm_manager.offline.trust import Trust, trust
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.report.mission import Uncertainty
+from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.path_checks import (
+    against_odometry,
+    as_expected,
+    halves_agree,
+    per_minute,
+    position_uncertainty,
+)
 from mlsm_manager.self_check.verdict import Verdict
+from node_support.parameters import describe
+from sonar_processing.beams.parameters import BeamCorrection
+
+_OF_RUN = {"range_scale_error": RANGE_SCALE, "sonar_delay": DELAY}
 
 
 @dataclass(frozen=True)
-class Found:
+class Calibration:
+    """names, values, deviations: (n,) what was found. range_scale_error: true range over reported range minus 1.
+
+    sonar_delay: s by which beams are later than their stamps. odometry_scale: true distance over reported distance
+    minus 1, odometry_direction: rad from reported to true motion, both where the odometry reports distances.
+    """
+
+    names: Tuple[str, ...]
+    values: np.ndarray
+    deviations: np.ndarray
+
+    @classmethod
+    def expected(cls, solver: LiveSolver) -> "Calibration":
+        """Return what was known before the run."""
+        columns, parameters = solver.odometry.calibrated, solver.parameters
+        of_node = list(columns.values())
+        values = np.append(parameters.run_mean, solver.odometry.first_node()[of_node])
+        deviations = np.append(parameters.run_deviations, solver.odometry.first_deviations()[of_node])
+        deviations = np.maximum(deviations, HELD_DEVIATION)
+        return cls((*_OF_RUN, *columns), values, deviations)
+
+    @classmethod
+    def of_live(cls, solver: LiveSolver) -> "Calibration":
+        """Return what the newest estimate of a run knows; the solver must have taken a scan."""
+        return cls.of_estimate(solver, solver.estimates[-1])
+
+    @classmethod
+    def of_estimate(cls, solver: LiveSolver, estimate: LiveEstimate) -> "Calibration":
+        """Return what one of the estimates of `solver` knows."""
+        columns = solver.odometry.calibrated
+        of_node, of_run = list(columns.values()), list(_OF_RUN.values())
+        of_nodes = np.sqrt(np.diag(estimate.covariance)[of_node])
+        deviations = np.append(_of_run(estimate.run_deviations, solver), of_nodes)
+        return cls((*_OF_RUN, *columns), np.append(estimate.run[of_run], estimate.node[of_node]), deviations)
+
+    @classmethod
+    def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
+        """Return what the fit of a whole run found; scale and direction are those of the last node."""
+        live, of_run = cls.of_live(solver), list(_OF_RUN.values())
+        deviations = _of_run(np.sqrt(np.diag(batch.run_covariance)), solver)
+        values = np.append(batch.state.run[of_run], batch.state.nodes[-1, list(solver.odometry.calibrated.values())])
+        return cls(live.names, values, np.append(deviations, live.deviations[len(of_run) :]))
+
+    @classmethod
+    def of_part(cls, solver: LiveSolver, part: PartResult) -> "Calibration":
+        """Return what the fit of a part of a run found; scale and direction are those of the last node."""
+        columns, of_run = solver.odometry.calibrated, list(_OF_RUN.values())
+        deviations, of_node = np.sqrt(np.diag(part.covariance)), list(columns.values())
+        known = np.append(_of_run(deviations[-RUN_COLUMNS:], solver), deviations[of_node])
+        return cls((*_OF_RUN, *columns), np.append(part.run[of_run], part.node[of_node]), known)
+
+    @property
+    def by_name(self) -> Dict[str, Tuple[float, float]]:
+        """Value and deviation of each of `names`."""
+        return {name: (float(value), float(own)) for name, value, own in zip(self.names, self.values, self.deviations)}
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return values and deviations by name, rounded for people."""
+        return {
+            name: {"value": round(float(value), 5), "deviation": round(float(deviation), 5)}
+            for name, value, deviation in zip(self.names, self.values, self.deviations)
+        }
+
+    def applied(self, parameters: ReplayParameters) -> ReplayParameters:
+        """Return `parameters` with what was found as what is known before the next run, in the sonar's own terms."""
+        value = dict(zip(self.names, self.values.tolist()))
+        deviation = dict(zip(self.names, self.deviations.tolist()))
+        before = parameters.part(BeamCorrection)
+        value["range_scale"] = before.range_scale * (1.0 + value.pop("range_scale_error"))
+        value["sonar_delay"] = before.sonar_delay + value["sonar_delay"]
+        value["range_scale_deviation"] = deviation["range_scale_error"]
+        value["sonar_delay_deviation"] = deviation["sonar_delay"]
+        return parameters.changed(_allowed(value))
+
+
+def _of_run(deviations: np.ndarray, solver: LiveSolver) -> np.ndarray:
+    """Return deviations (2,) as _OF_RUN; a range scale that the run could not tell is as uncertain as before."""
+    result = deviations[list(_OF_RUN.values())].copy()
+    result[0] = np.hypot(result[0], solver.parameters.world_scale_deviation)
+    return result
+
+
+def _allowed(values: Dict[str, float]) -> Dict[str, float]:
+    """Return `values` within their ranges, so that a run that went astray can still be told."""
+    ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in values}
+    return {name: float(np.clip(value, ranges[name].low, ranges[name].high)) for name, value in values.items()}
+
+
+# A window's worth of scans: fewer say too little of scale and delay.
+_FEWEST_SCANS = 20
+
+
+@dataclass(frozen=True)
+class Deviations:
+    """How certain the path is. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map."""
+
+    times: np.ndarray
+    covariances: np.ndarray
+
+    @property
+    def radii(self) -> np.ndarray:
+        """(k,) m, root of the sum of both variances."""
+        return np.sqrt(np.trace(self.covariances, axis1=1, axis2=2))
+
+
+@dataclass(frozen=True)
+class Trust:
+    """verdicts: of all checks. deviations: of the path that is told."""
+
+    verdicts: List[Verdict]
+    deviations: Deviations
+
+    @property
+    def line(self) -> str:
+        """One line for people."""
+        firing = [verdict for verdict in self.verdicts if verdict.fires]
+        if not firing:
+            return f"trust: all {len(self.verdicts)} checks are fine"
+        return "trust: DOUBTFUL: " + "; ".join(verdict.text for verdict in firing)
+
+    @property
+    def uncertainty(self) -> Uncertainty:
+        """What picture and report show of it."""
+        return Uncertainty(self.deviations.times, self.deviations.covariances, self.doubtful)
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """(k, 2) s, beginnings and ends of the stretches that made a check fire."""
+        return np.concatenate([np.empty((0, 2)), *(v.doubtful for v in self.verdicts if v.fires)])
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return the checks and the deviation per minute for summary.json."""
+        checks = {
+            verdict.name: {
+                "value": None if np.isnan(verdict.value) else round(verdict.value, 3),
+                "limit": verdict.limit,
+                "fires": verdict.fires,
+                "meaning": verdict.text,
+            }
+            for verdict in self.verdicts
+        }
+        minutes = per_minute(self.deviations.times, self.deviations.radii)
+        told = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
+        return {"checks": checks, "deviation_per_minute": told}
+
+
+def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> Trust:
+    """Return what the checks say of a run of the joint solver; of the refined path where there is one.
+
+    further: what other checks say.
+    """
+    solver = replayed.solver
+    parts, apart = solver.parameters.parts_per_turn, solver.islands.apart
+    turns = Turns.of(solver.estimates, apart, parts)
+    heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
+    path = replayed.corrected if refined is None else refined.poses
+    deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
+    verdicts = [
+        *_against_odometry(replayed, path, solver.odometry),
+        *_going_on(solver, solver.state if refined is None else refined.batch.state, turns.times),
+        recent_agreement(heard.times, heard.agreements),
+        position_uncertainty(deviations.times, deviations.radii),
+        *surfaces_tell(
+            float(solver.log.node_times[0]), turns.times, turns.surfaces, solver.odometry.distance_deviation
+        ),
+        *in_one_map(turns.times, turns.apart),
+    ]
+    found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
+    before = Calibration.expected(solver)
+    verdicts.append(as_expected(before.names, before.values, before.deviations, found.values))
+    halves = _halves(solver)
+    verdicts += [] if halves is None else [halves]
+    return Trust([*verdicts, *further], deviations)
+
+
+def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:
+    """Compare a path (m, 3) with the odometry's; nothing where that reports no distances."""
+    if np.isinf(odometry.distance_deviation):
+        return ()
+    return against_odometry(
+        replayed.times, replayed.odometry, path,
+        scale_deviation=odometry.distance_deviation, position_walk=odometry.position_walk,
+    )  # fmt: skip
+
+
+def _going_on(solver: LiveSolver, state: State, ends: np.ndarray) -> Tuple[Verdict, ...]:
+    """Ask whether scans lie on those before them, where the motion between them is unknown."""
+    if not np.isinf(solver.odometry.distance_deviation):
+        return ()
+    shares = shares_heard_before(solver.log, solver.odometry, state, solver.parameters, 0)
+    return (scans_go_on(ends, shares),)
+
+
+def _live_deviations(solver: LiveSolver) -> Deviations:
+    covariances = [estimate.pose_covariance[:2, :2] for estimate in solver.estimates]
+    return Deviations(np.array([estimate.time for estimate in solver.estimates]), np.array(covariances))
+
+
+def _batch_deviations(refined: Refined) -> Deviations:
+    return Deviations(refined.batch.node_times, refined.batch.pose_covariances[:, :2, :2])
+
+
+def _halves(solver: LiveSolver) -> Optional[Verdict]:
+    """Compare the calibration of each half of the run, made without the other one.
+
+    What was known after the first half came from that half alone; the second is fitted anew.
+    """
+    parts = solver.parameters.parts_per_turn
+    middle = solver.log.scan_count // parts // 2
+    if middle < _FEWEST_SCANS:
+        return None
+    first = Calibration.of_estimate(solver, solver.estimates[middle * parts - 1])
+    second = Calibration.of_part(solver, solved_part(solver, middle * parts))
+    return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
+
+
+@dataclass(frozen=True)
+class Findings:
     """calibration, trust: of the fit of the whole run where there is one. closing: which places it goes back to."""
 
     calibration: Calibration
@@ -20,7 +257,7 @@ class Found:
     closing: Optional[Closed] = None
 
     @classmethod
-    def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> "Found":
+    def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> "Findings":
         """Return what was found in a run that the joint solver has followed; `further`: what other checks say."""
         solver = replayed.solver
         live = Calibration.of_live(solver)

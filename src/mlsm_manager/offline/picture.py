@@ -13,13 +13,15 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Ellipse, PathPatch
 from matplotlib.path import Path as Outline
 
-from mlsm_manager.offline.picture_contents import Doubts, Path2d
+from mlsm_manager.report.mission import Path as Trajectory
+from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from node_support.files import write_whole
 
 _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
 _DOUBT_COLOR = "#cc3377"
 _ELLIPSE_DEVIATIONS = 2.0
+_MOST_ELLIPSES = 40  # more would hide the path
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
 _LINE_STYLES = ("-", "--", ":", "-.")
 
@@ -29,10 +31,11 @@ def draw_map(
     title: str,
     blocks: Blocks,
     outlines: Sequence[np.ndarray],
-    paths: Sequence[Path2d],
-    doubts: Optional[Doubts] = None,
+    paths: Sequence[Trajectory],
+    best: Optional[Trajectory] = None,
+    uncertainty: Optional[Uncertainty] = None,
 ) -> None:
-    """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m], paths, and how certain the last one is."""
+    """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m], paths, and how certain the best one is."""
     figure = Figure(figsize=(14, 8), dpi=110)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(1, 1, 1)
@@ -41,9 +44,9 @@ def draw_map(
         axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
     _draw_blocks(axes, blocks)
     for path, style in zip(paths, cycle(_LINE_STYLES)):
-        axes.plot(*path.points.T, style, color=path.color, linewidth=1.6, label=path.label, zorder=5)
-    if doubts is not None:
-        _draw_doubts(axes, doubts)
+        axes.plot(*path.poses[:, :2].T, style, color=path.color, linewidth=1.6, label=path.name, zorder=5)
+    if best is not None and uncertainty is not None:
+        _draw_uncertainty(axes, best, uncertainty)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
     axes.grid(True, color="#dddddd", linewidth=0.5, zorder=0)
@@ -55,17 +58,20 @@ def draw_map(
     write_whole(file, picture.getvalue())
 
 
-def _draw_doubts(axes: Axes, doubts: Doubts) -> None:
-    ellipses = []
-    for center, covariance in zip(doubts.centers, doubts.covariances):
+def _draw_uncertainty(axes: Axes, path: Trajectory, uncertainty: Uncertainty) -> None:
+    shown, ellipses = slice(None, None, max(1, len(uncertainty.times) // _MOST_ELLIPSES)), []
+    times = uncertainty.times[shown]
+    centers = np.column_stack([np.interp(times, path.times, path.poses[:, axis]) for axis in (0, 1)])
+    for center, covariance in zip(centers, uncertainty.covariances[shown]):
         values, vectors = np.linalg.eigh(covariance)
         width, height = 2.0 * _ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0))
         angle = np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0]))
         ellipses.append(Ellipse(tuple(center), width, height, angle=angle))
     axes.add_collection(PatchCollection(ellipses, facecolor="none", edgecolor=_DOUBT_COLOR, linewidth=0.8, zorder=6))
     axes.plot([], [], "o", markerfacecolor="none", color=_DOUBT_COLOR, label="two standard deviations")
-    for number, stretch in enumerate(doubts.stretches):
+    for number, (start, end) in enumerate(uncertainty.doubtful):
         label = "doubtful" if number == 0 else None
+        stretch = path.poses[(path.times >= start) & (path.times <= end), :2]
         axes.plot(*stretch.T, color=_DOUBT_COLOR, linewidth=6.0, alpha=0.35, label=label, zorder=4)
 
 

@@ -1,19 +1,23 @@
-"""Smooths a whole run after it is over: all scans and the calibration at once, and the map drawn anew."""
+"""Fits a whole run after it is over, draws its map anew, and fits again to see whether the path depends on settings."""
 
-from dataclasses import dataclass
-from typing import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import List, Mapping, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placing.path import solved_path
-from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed
+from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.unknowns.state import POSE, State
 from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer
 
@@ -44,3 +48,52 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: Ma
     surfaces.settle(SolvedPlacement(solver.log, solver.odometry, closing.batch.state))
     poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
     return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)
+
+
+_NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5
+"""Factors of settings that nobody knows better than that."""
+_MORE_SCANS = 2
+_MANY_SCANS = 40  # in a group, from which on it is made smaller
+_TURNS = 1.0  # of the direction in which the second start lies beside the path, along the whole run
+
+
+def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
+    """Return what further fits of the run that `solver` followed say of `batch`, its fit with its own settings."""
+    deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
+    start = displaced(batch.state, deviations, solver.parameters.cut)
+    others = [solved(solver, parameters, batch.state) for parameters in other_settings(solver.parameters)]
+    second = solved(solver, start=start)
+    told = _path(solver, batch.state)
+    paths = np.stack([told, *(_path(solver, other.state) for other in others)])
+    again = np.stack([told, _path(solver, start), _path(solver, second.state)])
+    return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
+
+
+def other_settings(parameters: SolverParameters) -> List[SolverParameters]:
+    """Return a handful of parameters, each of which differs from `parameters` in one setting of the comparisons."""
+    more = _MORE_SCANS if parameters.scans_per_group < _MANY_SCANS else -_MORE_SCANS
+    changes = (
+        {"cut": _NARROWER * parameters.cut},
+        {"echo_deviation": _WIDER * parameters.echo_deviation},
+        {"weight": _HALF * parameters.weight},
+        {"scans_per_group": parameters.scans_per_group + more},
+    )
+    return [replace(parameters, **change) for change in changes]
+
+
+def displaced(state: State, deviations: np.ndarray, most: float) -> State:
+    """Return a state whose nodes lie one told deviation (n,) [m] beside those of `state`, but at most `most` [m].
+
+    The direction turns slowly along the run, so that scans of one time still agree with each other.
+    """
+    angles = 2.0 * np.pi * _TURNS * np.linspace(0.0, 1.0, len(deviations))
+    moved = state.copy()
+    moved.nodes[:, :2] += np.minimum(deviations, most)[:, np.newaxis] * np.column_stack(
+        [np.cos(angles), np.sin(angles)]
+    )
+    return moved
+
+
+def _path(solver: LiveSolver, state: State) -> np.ndarray:
+    nodes = np.arange(len(state.nodes))
+    return solver.log.node_poses(nodes) + state.nodes[:, POSE]

@@ -1,12 +1,24 @@
-"""Parameters of map_bag: those of the echo extractor, the sensor model and the localiser."""
+"""Parameters of map_bag, and live.yaml: those with which the live nodes do what map_bag did."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Dict, List, Mapping, Tuple, Type
 
-from mlsm_manager.localisation.parameters import EstimatorName, LocaliserParameters
-from node_support.parameters import with_defaults
+import yaml
+
+from mlsm_manager.localisation.parameters import (
+    EstimatorName,
+    LocaliserParameters,
+    MapInput,
+    MatchInput,
+    MlsmCoreParameters,
+)
+from node_support.files import write_whole
+from node_support.parameters import ParameterSet, with_defaults
 from recordings.reader import ReadingParameters
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters
+from sonar_processing.scans.parameters import SonarToCloudParameters
 
 
 @dataclass(frozen=True)
@@ -32,3 +44,76 @@ class ReplayParameters(LocaliserParameters, ReadingParameters, BeamCorrection, E
     def echoes(self) -> EchoExtractorParameters:
         """Return how echoes are found."""
         return self.part(EchoExtractorParameters)
+
+
+NODES: Dict[str, Type[ParameterSet]] = {
+    "sonar_to_cloud": SonarToCloudParameters,
+    "echo_extractor": EchoExtractorParameters,
+    "mlsm_core": MlsmCoreParameters,
+}
+
+
+@dataclass(frozen=True)
+class _CloudParameters(ReadingParameters, BeamCorrection):
+    """What sonar_to_cloud and a replay know by the same name and meaning."""
+
+
+_SHARED: Dict[str, Type[ParameterSet]] = {**NODES, "sonar_to_cloud": _CloudParameters}
+_ONLY_LIVE = {"dead_reckoning"}
+"""Nodes of which a profile's yaml file says something too, and that a replay has no use for."""
+_COMMENT = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take it as parameters:=FILE.\n"
+
+
+def live_values(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> Dict[str, Dict[str, Any]]:
+    """Return for each node the parameters with which it does what a replay with `parameters` did."""
+    values = {name: _common(parameters.to_mapping(), name) for name in NODES}
+    cloud = SonarToCloudParameters(target_frame=odom_frame)
+    values["sonar_to_cloud"].update(
+        target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
+    )
+    values["mlsm_core"].update(
+        size_x_meters=0.0,
+        size_y_meters=0.0,
+        map_frame="map" if odom_frame != "map" else "corrected_map",
+        odom_frame=odom_frame,
+        base_frame=base_frame,
+        match_input=MatchInput.ECHOES.value,
+        map_input=MapInput.MATCHED.value,
+        start_matching=True,
+    )
+    return {name: NODES[name].nested(own) for name, own in values.items()}
+
+
+def replay_values(values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
+    """Return values by the names of ReplayParameters, and a remark on each key of an older version.
+
+    values: may hold some of them by node, as live.yaml does. Keys of the live nodes that a replay does not know are
+    left out. Raises ParameterError for what a node would refuse.
+    """
+    plain = {key: value for key, value in values.items() if key not in {*NODES, *_ONLY_LIVE}}
+    found, remarks = ReplayParameters.by_name(plain)
+    for name in NODES:
+        if name in values:
+            NODES[name].from_group(name, values[name])
+            own, told = NODES[name].by_name(values[name])
+            found.update(_common(own, name))
+            remarks += told
+    return found, remarks
+
+
+def write_live(path: Path, parameters: ReplayParameters, odom_frame: str, base_frame: str) -> None:
+    """Write live.yaml whole or not at all; raises OSError."""
+    write_whole(path, live_text(parameters, odom_frame, base_frame).encode())
+
+
+def live_text(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> str:
+    """Return the text of live.yaml."""
+    values = live_values(parameters, odom_frame, base_frame)
+    return _COMMENT + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
+
+
+def _common(values: Mapping[str, Any], node: str) -> Dict[str, Any]:
+    """Return those of `values` that both the node and a replay know by the same name and meaning."""
+    replayed = {field.name for field in fields(ReplayParameters)}
+    names = [field.name for field in fields(_SHARED[node]) if field.name in replayed]
+    return {name: values[name] for name in names if name in values}

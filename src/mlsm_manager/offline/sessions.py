@@ -13,7 +13,7 @@ from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import CORRECTED
-from mlsm_manager.report.mission import Path as Way
+from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
@@ -45,12 +45,12 @@ class Session:
             "found_after_scans": self.scans_until_found,
         }
 
-    def way(self, color: str) -> Way:
-        """Return the way of the vehicle since the first scan was found in the map; empty where none was."""
+    def trajectory(self, color: str) -> Trajectory:
+        """Return the vehicle's path since the first scan was found in the map; empty where none was."""
         found, replayed = self.scans_until_found, self.replayed
         start = np.inf if found is None else replayed.updates[found].scan.reference_time + _SHOWN_AFTER
         known = replayed.times >= start
-        return Way(f"{CORRECTED}, {self.bag.name}", color, replayed.times[known], replayed.corrected[known])
+        return Trajectory(f"{CORRECTED}, {self.bag.name}", color, replayed.times[known], replayed.corrected[known])
 
     @property
     def scans_until_found(self) -> Optional[int]:

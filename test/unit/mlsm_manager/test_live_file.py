@@ -14,8 +14,14 @@ from roslaunch.xmlloader import XmlLoader
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import MapInput
-from mlsm_manager.offline.live_file import NODES, live_text, live_values, replay_values, write_live
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay_parameters import (
+    NODES,
+    ReplayParameters,
+    live_text,
+    live_values,
+    replay_values,
+    write_live,
+)
 from node_support.parameters import ParameterError, describe
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -90,8 +90,11 @@ def test_each_trajectory_is_a_tum_file_too(basin):
 def test_what_it_found_is_what_another_run_knows_beforehand(basin, tmp_path):
     assert run(BASIN, "--out", tmp_path, "--parameters", basin / "live.yaml").returncode == 0
     first, second = summary_of(basin)["calibration"], summary_of(tmp_path)["calibration"]
-    assert second["range_scale"]["deviation"] <= first["range_scale"]["deviation"]
-    assert abs(second["range_scale"]["value"]) <= abs(first["range_scale"]["value"]) + first["range_scale"]["deviation"]
+    assert second["range_scale_error"]["deviation"] <= first["range_scale_error"]["deviation"]
+    assert (
+        abs(second["range_scale_error"]["value"])
+        <= abs(first["range_scale_error"]["value"]) + first["range_scale_error"]["deviation"]
+    )
 
 
 def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path):

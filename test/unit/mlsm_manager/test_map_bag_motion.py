@@ -3,7 +3,7 @@
 import pytest
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.map_bag_arguments import map_bag_arguments
+from mlsm_manager.offline.map_bag import map_bag_arguments
 from recordings.motion.vehicle_motion import MotionSource
 
 

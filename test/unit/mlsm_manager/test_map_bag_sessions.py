@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from map_bag_runs import BASIN, run, summary_of
 
-from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.sessions import executor_for, prepared, prepared_in_parallel
 from mlsm_manager.surface_map.map_file import read_map

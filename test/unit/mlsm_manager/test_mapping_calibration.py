@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 import yaml
 
-from mlsm_manager.offline.calibration import Calibration
-from mlsm_manager.offline.live_file import live_text, replay_values
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.findings import Calibration
+from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text, replay_values
 
-NAMES = ("range_scale", "sonar_delay", "odometry_scale", "odometry_direction")
+NAMES = ("range_scale_error", "sonar_delay", "odometry_scale", "odometry_direction")
 FOUND = Calibration(NAMES, np.array([0.02, 0.5, 0.01, -0.07]), np.array([0.008, 0.05, 0.009, 0.03]))
 
 

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.offline.echo_length import echo_sigma
-from mlsm_manager.offline.echo_shape import EchoShape, echo_shape_of, suited
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.suited_parameters import EchoShape, echo_shape_of, echo_sigma, suited
 from sonar_processing.beams.beam import Beam
 from sonar_processing.filters.echo_extractor import ExtractionMode
 

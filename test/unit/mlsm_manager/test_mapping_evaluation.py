@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.offline.evaluation import position_error
 from mlsm_manager.offline.recording import Truth
+from mlsm_manager.offline.run_files import position_error
 from recordings.bags.bag import RecordingError
 
 TIMES = np.arange(0.0, 11.0)

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from map_bag_runs import BASIN
 
-from mlsm_manager.offline.bag_recording import read_recording
-from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs

@@ -9,9 +9,8 @@ from dead_reckoning.parameters import DeadReckoningParameters
 from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
-from mlsm_manager.offline.live_file import replay_values
-from mlsm_manager.offline.odometry_kind import odometry_of, with_odometry
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
+from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Track
 from node_support.health import Health
 

@@ -9,7 +9,7 @@ from made_models import solver_parameters
 
 from mlsm_manager.joint_solver.solve.batch_solver import solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.offline.refitting import displaced, other_settings, refitted_verdicts
+from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
 from node_support.geometry import inverse, transformed
 
 pytestmark = pytest.mark.long

@@ -7,7 +7,7 @@ from made_harbour import SONAR_IN_BASE, TURN, tour
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted, profile_values, strafes
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
-from mlsm_manager.offline.odometry_kind import may_strafe
+from mlsm_manager.offline.suited_parameters import may_strafe
 from node_support.errors import RefusedInput
 
 pytestmark = pytest.mark.long

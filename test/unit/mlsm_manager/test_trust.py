@@ -4,7 +4,7 @@ import json
 
 import numpy as np
 
-from mlsm_manager.offline.trust import Deviations, Trust
+from mlsm_manager.offline.findings import Deviations, Trust
 from mlsm_manager.self_check.verdict import Verdict
 
 FINE = Verdict("depth", 0.5, 1.0, "m")

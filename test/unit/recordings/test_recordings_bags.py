@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
 from rosbags.rosbag1 import Reader
 
-from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import Bag, RecordingError
 from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
 from recordings.bags.ros1_reader import Ros1Reader

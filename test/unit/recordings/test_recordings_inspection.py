@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from made_bags import write_mcap
 
-from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
 from recordings.bags.topic_roles import Role
 from recordings.convert_bag import convert_bag

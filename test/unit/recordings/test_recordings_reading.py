@@ -9,7 +9,7 @@ import pytest
 from imagenex_852_driver.log_file import LogWriter
 from imagenex_852_driver.log_record import LoggedPing
 from imagenex_852_driver.protocol.reply import Reply, ReplyKind
-from mlsm_manager.offline.bag_recording import read_recording
+from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import ReadingParameters, Request, read

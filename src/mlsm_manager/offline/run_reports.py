@@ -1,0 +1,133 @@
+"""What map_bag says of a run: summary.json, its last lines on the terminal, and report.html."""
+
+from argparse import Namespace
+from typing import Any, Dict, List
+
+import numpy as np
+
+from mlsm_manager.joint_solver.placing.drawing import drawn
+from mlsm_manager.localisation.updates import ScanUpdate
+from mlsm_manager.offline.bag_mapping import MappedBag
+from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, REFINED, REPORT, Run, trajectories_of
+from mlsm_manager.report.mission import Mission, ScanRecord
+from mlsm_manager.scan_matching.scan import Scan
+from node_support.geometry import composed, inverse, transformed
+
+# Loops that are printed; summary.json has all.
+_MOST_LOOPS = 5
+
+
+def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: float) -> Dict[str, Any]:
+    """Return what summary.json holds. errors: of each trajectory. seconds: how long the run took."""
+    parameters = mapped.parameters
+    return {
+        **mapped.run.counts,
+        "odometry": {"profile": mapped.odometry.kind.value.lower(), "reason": mapped.odometry.reason},
+        "beams_without_transform": mapped.recording.unplaced,
+        "seconds": round(seconds, 2),
+        "times_real_time": round(mapped.recording.seconds / seconds, 1),
+        "echoes": {"mode": parameters.mode.value, "match_resolution": parameters.match_resolution},
+        **({} if mapped.findings is None else mapped.findings.to_mapping()),
+        **({"found_again": mapped.replayed.found_again} if mapped.replayed.found_again else {}),
+        **({"sessions": [session.to_mapping() for session in mapped.sessions]} if mapped.sessions else {}),
+        **errors,
+    }
+
+
+def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
+    """Return what map_bag prints at its end."""
+    alone = summary["scans"] - summary["matched"] - summary["rejected"]
+    lines = [
+        f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
+        f"{alone} with nothing to match; {summary['blocks']} blocks; {summary['seconds']} s, "
+        f"{summary['times_real_time']} times real time",
+        f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
+    ]
+    for name in (ODOMETRY, CORRECTED, REFINED):
+        if name in summary:
+            error = summary[name]
+            lines.append(f"{name}: mean {error['mean']} m, sd {error['sd']} m, max {error['max']} m")
+    for session in summary.get("sessions", []):
+        found = session["found_after_scans"]
+        place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
+        lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
+    lines += [f"found again after a silence of the sonar at {line}" for line in summary.get("found_again", [])]
+    if "loops" in summary:
+        lines += [f"loop: {line}" for line in summary["loops"]["found"][:_MOST_LOOPS]]
+    if "trust" in summary:
+        lines.append(summary["trust"])
+    files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]
+    if (options.out / REPORT).exists():
+        files.append(REPORT)
+    return [*lines, f"in {options.out}: {' '.join(files)}"]
+
+
+def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Mission:
+    """Return what a report tells; the first recording's path and scans, the map of all. errors: of each trajectory."""
+    run, findings = mapped.run, mapped.findings
+    return Mission(
+        title=mapped.title,
+        paths=trajectories_of(run, mapped.recording),
+        scans=_scan_records(mapped),
+        blocks=run.blocks,
+        verdicts=[] if findings is None else findings.trust.verdicts,
+        calibration={} if findings is None else findings.calibration.by_name,
+        facts=_facts(mapped.recording, run),
+        parameters=mapped.parameters.to_mapping(),
+        uncertainty=None if findings is None else findings.trust.uncertainty,
+        errors=errors,
+        further=run.further,
+    )
+
+
+def _facts(recording: Recording, run: Run) -> Dict[str, str]:
+    minutes = recording.seconds / 60.0
+    best = list(run.poses.values())[-1]
+    length = float(np.hypot(*np.diff(best[:, :2], axis=0).T).sum())
+    counts = run.counts
+    return {
+        "duration": f"{minutes:.1f} minutes",
+        "way": f"{length:.0f} m",
+        "beams": f"{len(recording.beams)}, and {recording.unplaced} that could not be placed",
+        "scans": f"{counts['scans']}: {counts['matched']} matched, {counts['rejected']} rejected",
+        "map": f"{counts['blocks']} blocks, cells of {run.blocks.resolution:g} m",
+    }
+
+
+def _scan_records(mapped: MappedBag) -> List[ScanRecord]:
+    stamps = np.array([placed.beam.stamp_ns for placed in mapped.recording.beams]) * 1e-9
+    pace = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
+    records, before = [], 0
+    for update in mapped.replayed.updates:
+        after = int(np.searchsorted(stamps, update.scan.reference_time, side="right"))
+        points = _in_map(update.scan, mapped)
+        missing = _missing(stamps[before:after], pace)
+        records.append(ScanRecord(update.scan.reference_time, points, after - before, missing, _rejection(update)))
+        before = after
+    return records
+
+
+def _missing(stamps: np.ndarray, pace: float) -> int:
+    """Return how many beams did not come, where the head sends one every `pace` seconds."""
+    if not 0.0 < pace < np.inf:
+        return 0
+    return int(np.maximum(np.round(np.diff(stamps) / pace) - 1.0, 0.0).sum())
+
+
+def _rejection(update: ScanUpdate) -> str:
+    if update.accepted:
+        return ""
+    return update.result.reason or update.result.status.value if update.result is not None else "no match was made"
+
+
+def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:
+    """Return the points (n, 2) of a scan where the best path says that they are."""
+    solver, run = mapped.replayed.solver, mapped.run
+    if solver is not None:
+        state = solver.state if mapped.refined is None else mapped.refined.batch.state
+        return drawn(solver.log, solver.odometry, state, scan.points, scan.times)[:, :2]
+    best = list(run.poses.values())[-1]
+    poses = np.column_stack([np.interp(scan.times, run.times, best[:, 0]), np.interp(scan.times, run.times, best[:, 1]),
+                             np.interp(scan.times, run.times, np.unwrap(best[:, 2]))])  # fmt: skip
+    return transformed(composed(poses, inverse(scan.track.at(scan.times))), scan.points)[:, :2]
