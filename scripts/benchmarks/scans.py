@@ -97,7 +97,7 @@ class ScanMaker:
         """Return beam number, range [m] and height of the echoes heard from `poses` (b, 3) at head `angles` (b,)."""
         sonar = Sonar(self._caster, self._pattern, self._model, np.random.default_rng(seed))
         matrices = np.array([pose_matrix((x, y, DEPTH), (0.0, 0.0, yaw)) for x, y, yaw in poses])
-        echoes = extract_echoes(sonar.pings(matrices, angles), sonar.range_resolution, self._extraction)
+        echoes, _ = extract_echoes(sonar.pings(matrices, angles), sonar.range_resolution, self._extraction)
         return echoes.beams, (echoes.bins + 0.5) * sonar.range_resolution, echoes.heights
 
 

@@ -3,7 +3,7 @@
 import time
 from collections import Counter, deque
 from dataclasses import dataclass
-from typing import Callable, Deque, Dict, List, Optional
+from typing import Callable, Deque, Dict, List, Optional, Tuple
 
 from sonar_processing.beams.beam import Beam
 
@@ -19,14 +19,6 @@ class WaitingBeam:
     beam: Beam
     is_moving: bool
     since: float
-
-
-@dataclass(frozen=True)
-class Departure:
-    """A beam that leaves the queue; `obstacle` says why it cannot be placed, empty when it can."""
-
-    waiting: WaitingBeam
-    obstacle: str
 
 
 class BeamQueue:
@@ -63,8 +55,8 @@ class BeamQueue:
         self._waiting.append(WaitingBeam(beam, is_moving, self._clock()))
         return self._waiting.popleft() if self._oldest_waited_too_long() else None
 
-    def pop(self, obstacle: Callable[[Beam], str]) -> List[Departure]:
-        """Return and forget the beams that need not wait any more, the oldest first.
+    def pop(self, obstacle: Callable[[Beam], str]) -> List[Tuple[WaitingBeam, str]]:
+        """Return and forget the beams that need not wait any more, the oldest first, each with why it cannot be placed.
 
         These are all that can be placed now; those older than one of the same frame that can, since tf knows nothing
         more of the past; and those that have waited too long. `obstacle` says why a beam cannot be placed, or "".
@@ -76,7 +68,7 @@ class BeamQueue:
         departing = [entry for entry, leave in zip(entries, leaves) if leave]
         while self._waiting and self._oldest_waited_too_long():
             departing.append(self._waiting.popleft())
-        return [Departure(entry, obstacle(entry.beam)) for entry in departing]
+        return [(entry, obstacle(entry.beam)) for entry in departing]
 
     @staticmethod
     def _newest_placeable(entries: List[WaitingBeam], obstacle: Callable[[Beam], str]) -> Dict[str, int]:

@@ -16,7 +16,7 @@ from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
-from sonar_processing.filters.echo_peaks import find_peaks, leading_edges, points_along_runs
+from sonar_processing.filters.echo_peaks import Peaks, find_peaks, leading_edges, points_along_runs
 from sonar_processing.filters.threshold import otsu_threshold
 
 FEWEST_BEAMS = 10  # Fewer directions tell no quantile over them
@@ -71,34 +71,17 @@ class EchoExtractorParameters(ParameterSet):
     spacing: float = parameter(0.5, "DENSE: distance between the points of an echo", unit="m", low=0.01, high=100.0)
 
 
-@dataclass(frozen=True)
-class Echoes:
-    """Echoes of one polar scan.
-
-    beams: (n,) int, row of the scan. bins: (n,) float64, position along the beam: bin i has its centre at i, which is
-    at range (i + 0.5) * range_resolution. heights: (n,) float32, strength by which the echo stands out of the ring.
-    threshold: the height that separated echoes from speckle.
-    """
-
-    beams: np.ndarray
-    bins: np.ndarray
-    heights: np.ndarray
-    threshold: float
-
-    def __len__(self) -> int:
-        return len(self.beams)
-
-
 DEFAULTS = EchoExtractorParameters()
 
 
 def extract_echoes(
     strengths: np.ndarray, range_resolution: float, parameters: EchoExtractorParameters = DEFAULTS
-) -> Echoes:
-    """Return the echoes of a polar scan.
+) -> Tuple[Peaks, float]:
+    """Return the echoes of a polar scan, and the height that separated them from speckle.
 
     strengths: (beams, bins), any numeric type, the beams of one turn in any order; range_resolution: length of a bin,
-    m. Raises RefusedInput for a scan of too few beams to tell a ring from echoes.
+    m. A height is the strength by which an echo stands out of the ring. Raises RefusedInput for a scan of too few beams
+    to tell a ring from echoes.
     """
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
     first_bin = max(math.ceil(parameters.min_range / range_resolution - 0.5), 0)
@@ -114,7 +97,7 @@ def extract_echoes(
         peaks = leading_edges(response, peaks)
     elif parameters.mode is ExtractionMode.DENSE:
         peaks = points_along_runs(response, threshold, parameters.spacing / range_resolution)
-    return Echoes(peaks.beams, peaks.bins, peaks.heights, threshold)
+    return peaks, threshold
 
 
 def matched_filter(strengths: np.ndarray, sigma: float, first_bin: int = 0) -> np.ndarray:
@@ -176,8 +159,7 @@ class EchoExtractor:
             raise RefusedInput("clouds refused", "not organised; subscribe the echo extractor to sonar/scan/polar")
         rows = cloud.points.reshape(cloud.height, -1, 4)
         strengths = np.nan_to_num(rows[..., 3], nan=0.0, posinf=0.0, neginf=0.0)
-        echoes = extract_echoes(strengths, bin_length(rows), self.parameters)
-        self.newest_threshold = echoes.threshold
+        echoes, self.newest_threshold = extract_echoes(strengths, bin_length(rows), self.parameters)
         points = places(rows, echoes.beams, echoes.bins)
         points[:, 3] = echoes.heights
         stamps = cloud.time_stamps.reshape(cloud.height, -1)[echoes.beams, 0]

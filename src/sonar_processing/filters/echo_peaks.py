@@ -18,6 +18,9 @@ class Peaks:
     bins: np.ndarray
     heights: np.ndarray
 
+    def __len__(self) -> int:
+        return len(self.beams)
+
     def select(self, keep: np.ndarray) -> "Peaks":
         """Return those where `keep` (n,) holds."""
         return Peaks(self.beams[keep], self.bins[keep], self.heights[keep])

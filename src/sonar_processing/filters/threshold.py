@@ -51,39 +51,6 @@ class ThresholderParameters(ParameterSet):
     )
 
 
-@dataclass(frozen=True)
-class StrengthCounts:
-    """The finite points of a cloud by strength.
-
-    levels: (256,) int64, how many of the strengths above 0 lie in each integer level, those above 255 in the last.
-    silent: number of the other points. lowest, highest: of all strengths, infinite without a point. weakest: of those
-    above 0.
-    """
-
-    levels: np.ndarray
-    silent: int
-    lowest: float
-    highest: float
-    weakest: float
-
-    @property
-    def is_empty(self) -> bool:
-        """Whether the cloud has no finite point."""
-        return self.lowest > self.highest
-
-    @property
-    def echoes_differ(self) -> bool:
-        """Whether there are different strengths above 0."""
-        return self.weakest < self.highest
-
-    @property
-    def all_levels(self) -> np.ndarray:
-        """(256,) int64: `levels` with the silent points in level 0."""
-        levels = self.levels.copy()
-        levels[0] += self.silent
-        return levels
-
-
 class Thresholder:
     """Removes the points whose strength is not above the threshold."""
 
@@ -103,14 +70,16 @@ class Thresholder:
         """
         points, stamps = np.ascontiguousarray(cloud.points), np.ascontiguousarray(cloud.time_stamps)
         counts, ends = self._loops.count_strengths(points, stamps)
-        strengths = StrengthCounts(counts[:-1], int(counts[-1]), *ends.tolist())
-        self.newest_threshold = None if strengths.is_empty else self._threshold(strengths)
+        self.newest_threshold = self._threshold(counts, *ends.tolist()) if counts.any() else None
         if self.newest_threshold is None:
             return cloud.take(np.empty(0, dtype=np.int64))
         return cloud.take(self._loops.strong_points(points, stamps, np.float32(self.newest_threshold)))
 
-    def _threshold(self, counts: StrengthCounts) -> float:
+    def _threshold(self, counts: np.ndarray, lowest: float, highest: float, weakest: float) -> float:
         """Return the threshold of a cloud with a finite point.
+
+        counts: (257,) int64, how many strengths above 0 lie in each integer level, and the number of the others.
+        lowest, highest: of all strengths. weakest: of those above 0.
 
         OTSU and OTSU+PROPORTIONAL separate strong echoes from weak ones. Where all strengths above 0 are the same,
         somebody has separated them already (a recording of detections): then their threshold is 0, or min_threshold if
@@ -120,17 +89,17 @@ class Thresholder:
         if parameters.mode is ThresholdMode.FIXED:
             value = parameters.fixed_threshold
         elif parameters.mode is ThresholdMode.PROPORTIONAL:
-            value = parameters.max_proportion * counts.highest + parameters.min_proportion * counts.lowest
-        elif parameters.mode is ThresholdMode.OTSU:
-            value = self._otsu(counts)
+            value = parameters.max_proportion * highest + parameters.min_proportion * lowest
         else:
-            value = parameters.otsu_multiplier * self._otsu(counts)
+            factor = 1.0 if parameters.mode is ThresholdMode.OTSU else parameters.otsu_multiplier
+            value = factor * self._otsu(counts) if weakest < highest else 0.0
         return max(value, parameters.min_threshold)
 
-    def _otsu(self, counts: StrengthCounts) -> float:
-        if not counts.echoes_differ:
-            return 0.0
-        return _threshold_of_levels(counts.levels if self.parameters.otsu_nonzero else counts.all_levels)
+    def _otsu(self, counts: np.ndarray) -> float:
+        levels, silent = counts[:-1].copy(), counts[-1]
+        if not self.parameters.otsu_nonzero:
+            levels[0] += silent
+        return _threshold_of_levels(levels)
 
 
 def otsu_threshold(strengths: np.ndarray) -> float:

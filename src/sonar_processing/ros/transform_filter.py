@@ -19,7 +19,7 @@ from node_support.health import Health
 from node_support.ros.callbacks import guarded
 from node_support.ros.transforms import JUMP_BACK, TfBuffer
 from sonar_processing.beams.beam import Beam, PlacedBeam
-from sonar_processing.beams.beam_queue import BeamQueue, Departure
+from sonar_processing.beams.beam_queue import BeamQueue, WaitingBeam
 from sonar_processing.beams.parameters import MountingParameters
 
 _PATIENCE = 0.5  # s: whoever knows the frame and has started sends it at once, because /tf_static is latched
@@ -159,25 +159,25 @@ class TransformFilter(message_filters.SimpleFilter):
             jumped, self._jumped = self._jumped, False
             if self._mount is not None and self._mount.is_wanted:
                 self._mount.look_at(self._queue.frames(), self._transforms)
-            placed = [self._placed(departure) for departure in self._queue.pop(self._obstacle)]
+            placed = [self._placed(*departure) for departure in self._queue.pop(self._obstacle)]
         if jumped:
             self._on_time_jump()
         for beam in placed:
             if beam is not None:
                 self.signalMessage(beam)
 
-    def _placed(self, departure: Departure) -> Optional[PlacedBeam]:
+    def _placed(self, waiting: WaitingBeam, obstacle: str) -> Optional[PlacedBeam]:
         """Return the beam with its place, None (counted) where tf does not know it."""
-        beam = departure.waiting.beam
-        if departure.obstacle:
-            self._drop(beam, departure.obstacle)
+        beam = waiting.beam
+        if obstacle:
+            self._drop(beam, obstacle)
             return None
         try:
             T_target_sonar = self._transforms.matrix(self._target_frame, beam.frame_id, beam.stamp_ns)
         except RefusedInput as refused:
             self._health.problem(refused.kind, str(refused))
             return None
-        return PlacedBeam(beam, T_target_sonar, departure.waiting.is_moving)
+        return PlacedBeam(beam, T_target_sonar, waiting.is_moving)
 
     def _drop(self, beam: Beam, reason: str) -> None:
         self._health.problem("beams without transform", f"from {beam.frame_id} to {self._target_frame}: {reason}")

@@ -1,15 +1,15 @@
 """Buoys and upright pipes: circles in a horizontal scan (thesis 6.5.5)."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, Iterator, List, Optional
+from typing import Callable, Iterator, List, Optional, Tuple
 
 import numpy as np
+from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
 from node_support.parameters import ParameterError, parameter
 from sonar_processing.beams.parameters import beam_width_parameter
 from sonar_processing.cloud import Cloud
-from sonar_processing.shapes.circle_fit import CircleFit, CircleSight, fitted_circle
 from sonar_processing.shapes.echoes import (
     Sightings,
     beam_echoes,
@@ -39,6 +39,10 @@ _LINE_ECHOES = 6
 _HOLLOW = 0.25
 # Radii tried for a pair of echoes; more tell nothing new, and clouds with few pairs need not be searched for long.
 _RADII_PER_PAIR = 100
+# Of the fit: rays across a beam's width; standard deviations of a range [m] and, across, of a bearing [m].
+_RAYS = 9
+_RANGE_DEVIATION = 0.1
+_BEARING_DEVIATION = 0.15
 
 
 @dataclass(frozen=True)
@@ -180,10 +184,10 @@ class CircleDetector:
         found = []
         for inliers in self._groups(seen):
             fit = self._fit(seen.only(inliers)) if self._is_own_thing(seen, inliers, weak) else None
-            if fit is None:
-                continue
-            members = echoes.members[np.isin(echoes.owner, known[is_strong][inliers])]
-            found.append(Circle(fit.center, fit.radius, members, len(inliers), fit.residual))
+            if fit is not None:
+                center, radius, residual = fit
+                members = echoes.members[np.isin(echoes.owner, known[is_strong][inliers])]
+                found.append(Circle(center, radius, members, len(inliers), residual))
         return found
 
     def _is_own_thing(self, seen: Sightings, inliers: np.ndarray, weak: Sightings) -> bool:
@@ -218,16 +222,15 @@ class CircleDetector:
             return None
         return left[model.inliers(circle)]
 
-    def _fit(self, seen: Sightings) -> Optional[CircleFit]:
-        """Return the circle of a group, or None where a line explains it better or the ranges contradict it."""
-        parameters, weights = self.parameters, seen.weights.astype(float)
+    def _fit(self, seen: Sightings) -> Optional[Tuple[np.ndarray, float, float]]:
+        """Return a group's circle as fitted_circle does; None where a line explains it better or its ranges do not."""
+        parameters = self.parameters
         if len(np.unique(seen.beams)) < parameters.min_inliers or hollow_depth(seen) > _HOLLOW:
             return None
-        sight = CircleSight(seen.points, seen.origins, weights, parameters.beam_width)
-        fit = fitted_circle(sight, parameters.min_radius, parameters.max_radius)
-        if fit.residual > parameters.max_residual:
+        fit = fitted_circle(seen, parameters)
+        if fit[-1] > parameters.max_residual:
             return None
-        is_line = len(weights) >= _LINE_ECHOES and line_residual(seen.points, weights) <= fit.residual
+        is_line = len(seen.weights) >= _LINE_ECHOES and line_residual(seen.points, seen.weights) <= fit[-1]
         return None if is_line else fit
 
 
@@ -244,3 +247,53 @@ def line_residual(points: np.ndarray, weights: np.ndarray) -> float:
     """Return the root mean square distance [m] of points (n, 2) from the line that fits them best."""
     line = fitted_line(points, weights)
     return float(np.sqrt(np.mean((points @ line[:2] - line[2]) ** 2)))
+
+
+def fitted_circle(seen: Sightings, parameters: CircleDetectorParameters) -> Tuple[np.ndarray, float, float]:
+    """Return center (2,), radius and residual [m] of the circle that explains ranges and bearings best.
+
+    A buoy at 10 m is as wide as two or three beams. Each beam that grazes it is drawn on its own axis, beside the
+    buoy, so that points do not lie on the circle; what a beam measures is the mean range of the part of the circle
+    that it covers. That is compared, and the bearing: the mean of the beams' bearings, weighted by their echoes.
+    What the echoes leave open (the radius, for far things) stays near the middle of the allowed radii. The residual is
+    the root mean square difference of ranges.
+    """
+    min_radius, max_radius = parameters.min_radius, parameters.max_radius
+    middle, half = (min_radius + max_radius) / 2.0, max((max_radius - min_radius) / 2.0, 1e-6)
+    origin = seen.weights @ seen.origins / seen.weights.sum()
+    point = seen.weights @ seen.points / seen.weights.sum()
+    outward = (point - origin) / max(np.linalg.norm(point - origin), 1e-9)
+    sideways = np.array([-outward[1], outward[0]])
+
+    def residuals(unknown: np.ndarray) -> np.ndarray:
+        center = point + unknown[0] * outward + unknown[1] * sideways
+        ranges = range_differences(seen.points, seen.origins, center, unknown[2], parameters.beam_width)
+        return np.concatenate(
+            [ranges / _RANGE_DEVIATION, [unknown[1] / _BEARING_DEVIATION, (unknown[2] - middle) / half]]
+        )
+
+    low, high = [-max_radius, -max_radius, middle - half], [3.0 * max_radius, max_radius, middle + half]
+    solution = least_squares(residuals, [0.8 * middle, 0.0, middle], bounds=(low, high)).x
+    center = point + solution[0] * outward + solution[1] * sideways
+    differences = range_differences(seen.points, seen.origins, center, solution[2], parameters.beam_width)
+    return center, float(solution[2]), float(np.sqrt(np.mean(differences**2)))
+
+
+def range_differences(
+    points: np.ndarray, origins: np.ndarray, center: np.ndarray, radius: float, beam_width: float
+) -> np.ndarray:
+    """Return (n,) measured range minus the mean range of the part of the circle that the beam covers, m.
+
+    points: (n, 2) of the echoes; origins: (n, 2) of the sonar, x y [m]. A ray that passes the circle counts as if it
+    met it where they are nearest.
+    """
+    measured, to_center = points - origins, center - origins
+    ranges = np.hypot(measured[:, 0], measured[:, 1])
+    bearings = np.arctan2(measured[:, 1], measured[:, 0]) - np.arctan2(to_center[:, 1], to_center[:, 0])
+    rays = bearings[:, np.newaxis] + np.linspace(-0.5, 0.5, _RAYS) * beam_width
+    distance = np.hypot(to_center[:, 0], to_center[:, 1])[:, np.newaxis]
+    beside = distance * np.sin(rays)
+    hits = np.abs(beside) < radius
+    hits |= np.abs(beside) <= np.abs(beside).min(axis=1, keepdims=True)
+    near_side = distance * np.cos(rays) - np.sqrt(np.maximum(radius**2 - beside**2, 0.0))
+    return ranges - (near_side * hits).sum(axis=1) / hits.sum(axis=1)

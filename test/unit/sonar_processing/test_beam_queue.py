@@ -46,7 +46,7 @@ def unknown(_: Beam) -> str:
 def popped(queue: BeamQueue, first: int, last: int) -> List[str]:
     """Pop while tf knows the beams from first to last; return number and obstacle of those that leave."""
     found = queue.pop(lambda one: "" if first <= one.stamp_ns <= last else "unknown")
-    return [f"{one.waiting.beam.stamp_ns} {one.obstacle}".rstrip() for one in found]
+    return [f"{waiting.beam.stamp_ns} {obstacle}".rstrip() for waiting, obstacle in found]
 
 
 def test_beams_leave_in_order_as_soon_as_they_can_be_placed(queue: BeamQueue) -> None:
@@ -80,7 +80,7 @@ def test_what_cannot_be_placed_leaves_after_a_while_but_for_a_revolution(queue: 
     fill(queue, range(NEWER_BEAMS + 30))
     assert queue.pop(unknown) == []
     clock.now += PATIENCE + 0.1
-    assert [one.obstacle for one in queue.pop(unknown)] == ["unknown to tf"] * 30
+    assert [obstacle for _, obstacle in queue.pop(unknown)] == ["unknown to tf"] * 30
     assert len(queue) == NEWER_BEAMS
 
 

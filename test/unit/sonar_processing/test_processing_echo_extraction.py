@@ -26,7 +26,7 @@ WALL = 150.0 + 0.05 * (np.arange(BEAMS) - 30.0) ** 2
 
 
 def _echoes(image, **values):
-    return extract_echoes(image, RESOLUTION, EchoExtractorParameters(**values))
+    return extract_echoes(image, RESOLUTION, EchoExtractorParameters(**values))[0]
 
 
 def test_an_echo_is_found_between_the_bins():
@@ -87,8 +87,8 @@ def test_contrast_keeps_echoes_out_of_a_scan_of_speckle_alone():
 
 
 def test_a_scan_of_nothing_has_no_echo():
-    echoes = _echoes(np.zeros((BEAMS, 400), np.uint8))
-    assert (len(echoes), echoes.threshold) == (0, 10.0)
+    echoes, threshold = extract_echoes(np.zeros((BEAMS, 400), np.uint8), RESOLUTION)
+    assert (len(echoes), threshold) == (0, 10.0)
 
 
 def test_a_smaller_share_of_the_threshold_keeps_a_weak_wall_beside_a_strong_one():

@@ -7,8 +7,7 @@ from hypothesis import strategies as st
 
 from node_support.parameters import ParameterError
 from sonar_processing.cloud import Cloud
-from sonar_processing.shapes.circle_fit import CircleSight, range_differences
-from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
+from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters, range_differences
 from sonar_processing.shapes.echoes import beam_echoes
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import iterations_wanted
@@ -43,8 +42,7 @@ def _seen_circle(center, radius, step=0.0175, width=0.0436):
     axis, reach = math.atan2(center[1], center[0]), math.asin(radius / np.linalg.norm(center)) + width / 2.0 - 0.002
     bearings = axis + np.arange(-reach + step / 3.0, reach, step)
     units = np.column_stack([np.cos(bearings), np.sin(bearings)])
-    sight = CircleSight(units, np.zeros_like(units), np.ones(len(units)), width)
-    return units * (1.0 - range_differences(sight, center, radius))[:, np.newaxis]
+    return units * (1.0 - range_differences(units, np.zeros_like(units), center, radius, width))[:, np.newaxis]
 
 
 def test_bins_of_one_beam_make_one_echo_at_their_middle():
