@@ -1,4 +1,4 @@
-"""A vehicle with a compass whose sonar hears nothing for a while: it is found again, or nobody claims to know where."""
+"""A vehicle whose sonar hears nothing for a while: it is found again, or nobody claims to know where."""
 
 import numpy as np
 import pytest
@@ -8,7 +8,11 @@ from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal
 from mlsm_manager.joint_solver.compare.islands import MAP
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.localisation.clouds import Cloud
 from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.scan_matching.scan import Scan
 
 pytestmark = pytest.mark.long
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
@@ -116,3 +120,109 @@ def test_islands_of_another_number_of_scans_are_refused(canal):
     stored = {**solver.stored(), "islands": solver.islands.numbers[1:]}
     with pytest.raises(ValueError, match="islands"):
         LiveSolver.resumed(PARAMETERS, SONAR_IN_BASE, canal[0].scans, stored)
+
+
+WEST, EAST = 6, 2  # scans before the silence and after it
+EDGE = 5.0
+"""m: before the silence the sonar hears what is west of it, afterwards what is east of it."""
+
+
+def run_in(known):
+    """Return the session and the true path; known: (n, 2) m, blocks of the map that the run begins in."""
+    made = tour(WEST + SILENT + EAST, path=ahead)
+    first = made.truth.at(np.zeros(1))[0] * [1.0, 1.0, 0.0]
+    session = JointSession.begun(PARAMETERS, SONAR_IN_BASE, first, np.array([0.3, 0.3, 0.02]), known)
+    for scan in made.scans[:WEST]:
+        session.add(with_heading_only(selected(scan, scan.points[:, 0] < EDGE)))
+    for scan in made.scans[-EAST:]:
+        session.add(with_heading_only(selected(scan, scan.points[:, 0] > EDGE)))
+    return session, made.truth
+
+
+def selected(scan, rows):
+    return Scan(scan.points[rows], scan.times[rows], scan.moving[rows], scan.track, scan.reference_time)
+
+
+def blocks_of(corners, spacing=0.5):
+    """Return points (n, 2) along the walls between `corners` (k, 2)."""
+    sides = np.roll(corners, -1, axis=0) - corners
+    steps = [np.arange(0.0, 1.0, spacing / np.hypot(*side))[:, np.newaxis] for side in sides]
+    return np.concatenate([corner + step * side for corner, step, side in zip(corners, steps, sides)])
+
+
+@pytest.fixture(scope="module")
+def loaded():
+    return run_in(blocks_of(HARBOUR))
+
+
+def test_the_vehicle_is_found_where_only_the_loaded_map_was_heard(loaded):
+    session, _ = loaded
+    assert not session.solver.islands.is_apart
+
+
+def test_it_is_found_at_the_right_place(loaded):
+    session, truth = loaded
+    path = session.path(session.solver.log.node_times[-EAST:])
+    assert np.hypot(*(path - truth.at(session.solver.log.node_times[-EAST:]))[:, :2].T).max() < 1.0
+
+
+def test_without_the_loaded_map_its_place_is_unknown():
+    session, _ = run_in(np.empty((0, 2)))
+    assert session.solver.islands.is_apart
+
+
+BEFORE, SILENCE, SINCE = 10, 5, 3
+CARRIED = 150.0
+"""s: the vehicle is carried in the silence to where it would have been so much later, farther than it goes itself."""
+
+
+def carried(times):
+    """Return the poses (m, 3) at `times` (m,)."""
+    return ahead(np.where(times > (BEFORE + 1.5) * TURN, times + CARRIED, times))
+
+
+class Carried:
+    """localiser: after the tour. expected: (3,) where the vehicle is. blocks: of the map before the silence."""
+
+    def __init__(self):
+        made = tour(BEFORE + SILENCE + SINCE, path=carried)
+        profile = {**profile_values(OdometryKind.HEADING), "start_matching": True}
+        self.localiser = MlsmCoreParameters().changed(profile).build_localiser(SONAR_IN_BASE)
+        self.take(made.scans[:BEFORE])
+        self.blocks = self.localiser.blocks
+        self.take(made.scans[-SINCE:])
+        begin, end = made.truth.at(np.array([0.0, made.scans[-1].reference_time]))
+        self.expected = end - begin * [1.0, 1.0, 0.0]
+
+    def take(self, scans):
+        """Give scans, and clouds of the same echoes, to the localiser."""
+        for scan in scans:
+            scan = with_heading_only(scan)
+            self.localiser.take_scan(scan)
+            self.localiser.take_cloud(Cloud.of_scan(scan))
+
+
+@pytest.fixture(scope="module")
+def carried_run():
+    return Carried()
+
+
+def far_from(blocks, others):
+    """Return how many of `blocks` are more than 2 m from all `others`."""
+    distance = np.linalg.norm(blocks.mean[:, np.newaxis, :2] - others.mean[:, :2], axis=-1)
+    return int((distance.min(axis=1) > 2.0).sum())
+
+
+def test_1_what_it_hears_after_the_silence_lies_apart(carried_run):
+    assert far_from(carried_run.localiser.blocks, carried_run.blocks) > 50
+
+
+def test_2_it_is_found_in_the_map_from_before(carried_run):
+    found = carried_run.localiser.relocalise()
+    assert found.accepted
+    assert found.forgotten == SINCE
+    np.testing.assert_allclose(found.result.pose[:2], carried_run.expected[:2], atol=0.3)
+
+
+def test_3_what_lay_apart_is_not_in_the_map_any_more(carried_run):
+    assert far_from(carried_run.localiser.blocks, carried_run.blocks) == 0

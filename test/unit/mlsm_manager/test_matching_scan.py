@@ -1,12 +1,15 @@
-"""Tracks, scans and planar poses."""
+"""A scan, its odometry, and the path of the vehicle during it and from scan to scan."""
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_scans import at_velocity
+from made_scans import at_velocity, harbour, scan_of, still
+from scipy.spatial import cKDTree
 
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan_path import STATES, PlanarMotion
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, inverse, transformed, wrapped
 
@@ -102,3 +105,100 @@ def test_points_from_before_the_track_begins_are_left_out():
     np.testing.assert_array_equal(scan.points, points[2:])
     np.testing.assert_array_equal(scan.times, times[2:])
     assert len(scan.moving) == 2
+
+
+STATE = st.tuples(
+    *[st.floats(-20.0, 20.0)] * 2, st.floats(-3.0, 3.0), *[st.floats(-0.3, 0.3)] * 2, st.floats(-0.03, 0.03),
+    *[st.floats(-0.3, 0.3)] * 2,
+).map(np.array)  # fmt: skip
+VELOCITIES = st.tuples(*[st.floats(-0.5, 0.5)] * 2, st.sampled_from([-0.03, 0.0, 0.02]))
+
+
+@given(VELOCITIES, STATE)
+def test_the_derivative_of_the_path_is_what_differences_say(velocity, theta):
+    motion = PlanarMotion(scan_of(harbour(), at_velocity(velocity)))
+    expected = np.empty((len(motion.beam_times), 3, STATES))
+    for state in range(STATES):
+        change = np.zeros(STATES)
+        change[state] = 1e-6
+        expected[:, :, state] = (motion.path(theta + change) - motion.path(theta - change)) / 2e-6
+    np.testing.assert_allclose(motion.jacobian(theta), expected, atol=1e-6)
+
+
+@given(VELOCITIES, STATE)
+def test_the_derivative_of_the_points_is_what_differences_say(velocity, theta):
+    motion = PlanarMotion(scan_of(harbour(), at_velocity(velocity)))
+    path = motion.path(theta)
+    found = motion.point_jacobian(motion.arms(motion.points(path), path), theta)
+    for state in range(STATES):
+        change = np.zeros(STATES)
+        change[state] = 1e-6
+        difference = motion.points(motion.path(theta + change)) - motion.points(motion.path(theta - change))
+        np.testing.assert_allclose(found[:, :, state], difference / 2e-6, atol=1e-5)
+
+
+@given(VELOCITIES)
+def test_without_odometry_the_rates_are_the_twist(velocity):
+    """pose(t) = pose exp(t twist), from the end backwards; the path is made of chords between the beams."""
+    truth = at_velocity(velocity)
+    motion = PlanarMotion(scan_of(harbour(), still()))
+    path = motion.path(np.concatenate([truth(16.0), velocity, [0.0, 0.0]]))
+    np.testing.assert_allclose(path, truth(motion.beam_times), atol=1e-3)
+
+
+@given(VELOCITIES)
+def test_an_odometry_that_is_right_needs_no_state_but_the_pose(velocity):
+    truth = at_velocity(velocity)
+    motion = PlanarMotion(scan_of(harbour(), truth))
+    theta = np.concatenate([truth(16.0), np.zeros(5)])
+    np.testing.assert_allclose(motion.path(theta), truth(motion.beam_times), atol=1e-3)
+    distances, _ = cKDTree(harbour()).query(motion.points(motion.path(theta)))
+    np.testing.assert_allclose(distances, 0.0, atol=1e-3)
+
+
+def test_scale_and_direction_change_the_odometrys_displacements():
+    odometry = at_velocity((0.2, 0.0, 0.0))
+    motion = PlanarMotion(scan_of(harbour(), odometry))
+    theta = np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.5, np.pi / 2.0])
+    np.testing.assert_allclose(motion.path(theta)[0], [0.0, -1.5 * 0.2 * 16.0, 0.0], atol=1e-9)
+
+
+@given(VELOCITIES)
+def test_the_belief_follows_the_odometry(velocity):
+    truth = at_velocity(velocity)
+    track = scan_of(harbour(), truth, start=16.0).track
+    before = Belief(16.0, np.concatenate([truth(16.0), np.zeros(5)]), np.zeros((STATES, STATES)))
+    after = predicted(before, track, 32.0, OdometryErrors())
+    np.testing.assert_allclose(after.theta[:3], truth(32.0), atol=1e-9)
+
+
+def test_the_farther_the_vehicle_went_the_less_sure_its_place_is():
+    track = scan_of(harbour(), at_velocity((0.3, 0.0, 0.0)), start=16.0).track
+    errors = OdometryErrors(scale_deviation=0.2, speed_deviation=0.0)
+    before = Belief(0.0, np.zeros(STATES), errors.covariance())
+    deviations = [np.sqrt(predicted(before, track, time, errors).covariance[0, 0]) for time in (8.0, 16.0, 32.0)]
+    np.testing.assert_allclose(deviations, [0.2 * 0.3 * time for time in (8.0, 16.0, 32.0)], rtol=1e-3)
+
+
+def test_a_scale_that_was_found_corrects_the_way_from_then_on():
+    track = scan_of(harbour(), at_velocity((0.2, 0.0, 0.0))).track
+    theta = np.zeros(STATES)
+    theta[6] = 0.3
+    after = predicted(Belief(0.0, theta, np.zeros((STATES, STATES))), track, 16.0, OdometryErrors())
+    np.testing.assert_allclose(after.theta[0], 1.3 * 0.2 * 16.0, rtol=0.01)
+
+
+def test_an_error_of_the_speed_fades_and_what_fades_becomes_unknown():
+    track = scan_of(harbour(), still()).track
+    errors = OdometryErrors(rate_correlation_time=16.0)
+    theta = np.array([0.0, 0.0, 0.0, 0.1, 0.0, 0.0, 0.0, 0.0])
+    after = predicted(Belief(0.0, theta, np.zeros((STATES, STATES))), track, 16.0, errors)
+    np.testing.assert_allclose(after.theta[3], 0.1 / np.e)
+    np.testing.assert_allclose(after.covariance[3, 3], errors.speed_deviation**2 * (1.0 - np.exp(-2.0)))
+
+
+def test_a_belief_makes_a_prior_that_expects_the_same_pose():
+    scan = scan_of(harbour(), still((3.0, 4.0, 0.5)), still((1.0, 0.0, 0.2)))
+    theta = np.concatenate([[3.0, 4.0, 0.5], np.zeros(5)])
+    prior = prior_of(Belief(16.0, theta, np.eye(STATES)), scan.reference_pose)
+    np.testing.assert_allclose(prior.pose(scan), [3.0, 4.0, 0.5], atol=1e-12)

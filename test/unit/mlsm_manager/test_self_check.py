@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, surfaces_tell
+from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
@@ -18,7 +18,8 @@ from mlsm_manager.self_check.path_checks import (
 from mlsm_manager.self_check.verdict import Verdict, merged
 
 TIMES = np.arange(0.0, 2000.0, 1.0)
-TURNS = np.arange(10) * 14.0
+TURN_SECONDS = 14.0
+TURNS = np.arange(10) * TURN_SECONDS
 STRAIGHT = np.column_stack([0.25 * TIMES, np.zeros(len(TIMES))])
 
 
@@ -187,3 +188,35 @@ def test_scans_apart_make_it_fire_and_are_the_doubtful_ones():
 def test_a_single_scan_apart_is_told():
     (verdict,) = in_one_map(TURNS[:1], np.ones(1, dtype=bool))
     assert verdict.fires
+
+
+def run_of(lying, share=0.2):
+    """Return the verdict on 30 scans of which `lying` (n,) have `share` of their points on those before."""
+    shares = np.full(30, 0.9)
+    shares[lying] = share
+    return scans_go_on(TURN_SECONDS * np.arange(30), shares)
+
+
+def test_four_scans_of_twenty_beside_the_others_are_no_reason_to_doubt():
+    assert not run_of([10, 14, 18, 22], share=0.0).fires
+
+
+def test_a_third_of_the_scans_beside_the_others_is():
+    verdict = run_of(np.arange(10, 19))
+    assert verdict.fires
+    assert verdict.doubtful[0, 0] <= 10 * TURN_SECONDS
+    assert verdict.doubtful[-1, 1] >= 18 * TURN_SECONDS
+
+
+def test_the_figure_falls_with_the_shares_of_the_scans_that_fit_worst():
+    values = [run_of(np.arange(10, 19), share).value for share in (0.8, 0.6, 0.4)]
+    np.testing.assert_allclose(values, [0.8, 0.6, 0.4])
+
+
+def test_few_scans_say_too_little():
+    assert "too little" in scans_go_on(TURN_SECONDS * np.arange(10), np.full(10, 0.1)).line()
+
+
+def test_scans_without_points_are_left_out():
+    shares = np.where(np.arange(50) % 2, np.nan, 0.9)
+    assert not scans_go_on(TURN_SECONDS * np.arange(50), shares).fires

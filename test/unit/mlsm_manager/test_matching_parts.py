@@ -1,4 +1,4 @@
-"""How honest the covariance of a fix is: errors are compared with it, in scans whose noise nobody told the matcher."""
+"""What matching is made of: distributions of a map, the covariance of a fix, and when scan and map are of one place."""
 
 import numpy as np
 import pytest
@@ -6,9 +6,76 @@ from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, sti
 from scipy.stats import chi2
 
 from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.distributions import LocalDistributions
+from mlsm_manager.scan_matching.judgement import agreement
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
 
-pytestmark = pytest.mark.long
+
+def directions(distributions):
+    """Return for each block the angle [rad] of its longer axis from x, between -pi/2 and pi/2."""
+    _, vectors = np.linalg.eigh(distributions.covariance)
+    return np.arctan(vectors[:, 1, 1] / vectors[:, 0, 1])
+
+
+def test_a_wall_of_few_noisy_echoes_keeps_its_direction():
+    """Three neighbours, a metre apart and scattered by 0.4 m, often lie across the wall."""
+    wrong = []
+    for seed in range(5):
+        echoes = wall((-30, 25), (30, 25), spacing=1.0)
+        echoes = echoes + np.random.default_rng(seed).normal(0.0, 0.4, echoes.shape)
+        wrong.append(np.quantile(np.abs(directions(LocalDistributions(map_of(echoes)))), 0.9))
+    assert np.mean(wrong) < 0.1
+
+
+def test_points_slide_along_a_wall_up_to_its_mapped_end():
+    distributions = LocalDistributions(map_of(wall((-10, 5), (10, 5))))
+    assert (distributions.covariance[:, 0, 0] > 5.0**2).all()
+    assert (distributions.covariance[:, 1, 1] < 0.3**2).all()
+
+
+def test_a_buoy_holds_a_point_on_all_sides():
+    around = 0.2 * np.column_stack([np.cos(np.arange(6.0)), np.sin(np.arange(6.0))])
+    distributions = LocalDistributions(map_of(np.array([8.0, 3.0]) + around))
+    assert (np.linalg.eigvalsh(distributions.covariance)[:, 1] < 1.0).all()
+
+
+HERE = np.zeros(2)
+
+
+def agreed(points, on_map, blocks):
+    return agreement(points, np.broadcast_to(on_map, len(points)), HERE, blocks)
+
+
+def test_a_scan_of_the_mapped_place_agrees_wholly():
+    assert agreed(harbour(0.2), True, harbour()) == pytest.approx(1.0)
+
+
+def test_echoes_beside_what_the_map_has_in_their_direction_count_against_it():
+    mapped, boat = wall((-20, 10), (20, 10)), wall((-8, 6), (8, 6))
+    points = np.vstack([mapped, boat])
+    assert agreed(points, np.arange(len(points)) < len(mapped), mapped) == pytest.approx(len(mapped) / len(points))
+
+
+def test_echoes_in_a_direction_in_which_the_map_has_nothing_yet_say_nothing():
+    mapped, unknown = wall((-20, 10), (20, 10)), wall((-20, -10), (20, -10))
+    points = np.vstack([mapped, unknown])
+    assert agreed(points, np.arange(len(points)) < len(mapped), mapped) == pytest.approx(1.0)
+
+
+def test_a_mapped_surface_counts_against_it_when_echoes_come_from_behind():
+    behind, before = wall((-20, 12), (20, 12)), wall((-4, 6), (4, 6))
+    assert agreed(behind, True, np.vstack([behind, before])) < 0.85
+
+
+def test_a_mapped_surface_behind_a_nearer_echo_says_nothing():
+    near, hidden = wall((-20, 6), (20, 6)), wall((-8, 12), (8, 12))
+    assert agreed(near, True, np.vstack([near, hidden])) == pytest.approx(1.0)
+
+
+def test_a_mapped_surface_in_a_direction_without_any_echo_says_nothing():
+    heard, silent = wall((-20, 10), (20, 10)), wall((-5, -10), (5, -10))
+    assert agreed(heard, True, np.vstack([heard, silent])) == pytest.approx(1.0)
+
 
 SCANS = 40
 DEVIATIONS = np.array([0.5, 0.5, 0.05, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])
@@ -41,6 +108,7 @@ def normalised_square(result, truth):
     return difference @ np.linalg.solve(result.covariance[:3, :3], difference)
 
 
+@pytest.mark.long
 @pytest.mark.newest_only("a statistic of many fixes; the tests below compute single ones")
 @pytest.mark.parametrize("noise", NOISES)
 def test_fixes_err_as_much_as_their_covariance_says_whatever_the_noise(noise):
@@ -59,6 +127,7 @@ def test_a_scan_without_noise_is_not_infinitely_sure():
     assert deviations[2] > 1e-4
 
 
+@pytest.mark.long
 def test_a_vehicle_that_stands_still_does_not_become_surer_than_the_map():
     """The map was laid by scans like these; were their errors independent, 36 would make a sixth of the deviation."""
     rng = np.random.default_rng(0)
