@@ -98,7 +98,7 @@ def _suited_parameters(recording: Recording, odometry: OdometryFound, options: N
 def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
     """Return which odometry the recording is mapped with: the one that was said, or else the one that it looks like."""
     if options.odometry is not None:
-        return OdometryFound(options.odometry, "it was said so")
+        return OdometryFound(options.odometry, "--odometry or a parameter says so")
     return odometry_of(recording.track)
 
 
@@ -116,7 +116,9 @@ def _scans(recording: Recording, parameters: ReplayParameters, options: Namespac
             scans.append(scan)
             bar.update(beams)
     if not scans:
-        raise RecordingError(f"{options.bags[0]}: {len(recording.beams)} beams make no whole turn of the head")
+        raise RecordingError(
+            f"{options.bags[0]}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one"
+        )
     return scans
 
 

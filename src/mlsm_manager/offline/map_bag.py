@@ -184,7 +184,7 @@ def _check_motion(parser: argparse.ArgumentParser, options: argparse.Namespace) 
     """Refuse what is said of the motion where it contradicts itself; nothing known means odometry none."""
     none, declared = OdometryKind.NONE.value.lower(), options.declared
     if declared is MotionSource.STANDING and options.odometry == none:
-        parser.error("--standing says that the vehicle did not move; of one that moved give --unknown-motion instead")
+        parser.error("--standing is for a vehicle that did not move; for one that moved, give --unknown-motion instead")
     if declared is MotionSource.UNKNOWN:
         if options.odometry not in (None, none):
             parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")

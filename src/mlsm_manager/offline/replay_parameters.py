@@ -6,6 +6,7 @@ from typing import Any, Dict, List, Mapping, Tuple, Type
 
 import yaml
 
+from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind
 from mlsm_manager.localisation.parameters import (
     EstimatorName,
     LocaliserParameters,
@@ -20,19 +21,16 @@ from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
+# The speed of sound between cold fresh and warm salt water; stamps that are taken when a beam arrives.
+_UNKNOWN_SONAR = {"range_scale_deviation": 0.02, "sonar_delay_deviation": 1.0}
+_DVL = {setting.key: setting.value for setting in PROFILES[OdometryKind.DVL] if setting.key != "estimator"}
+
 
 @dataclass(frozen=True)
 @with_defaults(
+    **_UNKNOWN_SONAR,
+    **_DVL,
     estimator=EstimatorName.JOINT,
-    range_scale_deviation=0.02,
-    sonar_delay_deviation=1.0,
-    scale_deviation=0.01,
-    direction_deviation=0.1,
-    speed_deviation=0.025,
-    turn_rate_deviation=0.00007,
-    rate_correlation_time=12.0,
-    motion_correlation_time=10000.0,
-    heading_deviation=0.0175,
     max_position_deviation=3.0,
     min_agreement=0.0,
     min_gain_over_second=0.0,

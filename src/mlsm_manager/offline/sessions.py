@@ -64,7 +64,7 @@ def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Prepared:
     recording = read(bag).corrected(parameters.part(BeamCorrection))
     scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
     if not scans:
-        raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head")
+        raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one")
     return recording, scans
 
 

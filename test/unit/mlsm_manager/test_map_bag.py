@@ -112,7 +112,7 @@ def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path
 def test_an_odometry_that_was_said_overrules_what_the_recording_looks_like(tmp_path):
     done = run(BASIN, "--out", tmp_path, "--odometry", "thrusters")
     assert done.returncode == 0, done.stderr
-    assert "odometry: thrusters, because it was said so" in done.stdout
+    assert "odometry: thrusters, because --odometry or a parameter says so" in done.stdout
     assert yaml.safe_load((tmp_path / "live.yaml").read_text())["mlsm_core"]["odometry"] == "THRUSTERS"
 
 

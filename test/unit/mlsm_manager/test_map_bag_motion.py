@@ -33,7 +33,7 @@ def test_standing_leaves_the_odometry_to_the_recording():
 
 def test_a_moving_vehicle_is_not_said_to_stand(capsys):
     line = refusal(capsys, "--standing", "--odometry", "none")
-    assert "--standing says that the vehicle did not move" in line
+    assert "--standing is for a vehicle that did not move" in line
     assert line.endswith("give --unknown-motion instead")
 
 

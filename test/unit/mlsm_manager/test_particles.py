@@ -8,12 +8,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FARTHEST, Echoes
-from mlsm_manager.hovering.particle_filter import on_path
-from mlsm_manager.hovering.particle_weights import (
+from mlsm_manager.hovering.particle_filter import (
     FADING,
     groups_of,
     likelihoods_of,
     nearby_of,
+    on_path,
     pulled,
     pulls_of,
     weighed,

@@ -9,8 +9,7 @@ from hypothesis import strategies as st
 from made_harbour import CANAL, SONAR_IN_BASE, along_canal, tour
 
 from mlsm_manager.hovering.echoes import Echoes
-from mlsm_manager.hovering.particle_filter import on_path
-from mlsm_manager.hovering.particle_weights import likelihoods_of, nearby_of
+from mlsm_manager.hovering.particle_filter import likelihoods_of, nearby_of, on_path
 from mlsm_manager.hovering.particles import Particles
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
