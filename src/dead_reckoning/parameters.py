@@ -47,25 +47,19 @@ class DeadReckoningParameters(StampParameters):
     velocity_fading: float = parameter(
         40.0,
         "an estimate falls to a third within this time once the next one is overdue; as long as the profile `heading` "
-        "takes a change of speed to last",
-        unit="s",
-        low=0.1,
-        high=3600.0,
-    )
+        "takes a change of speed to last", unit="s", low=0.1, high=3600.0,
+    )  # fmt: skip
     command_timeout: float = parameter(
-        1.0,
-        "the vehicle is taken as still when its command is older; drivers repeat commands several times a second",
-        unit="s",
-        low=0.05,
-        high=3600.0,
-    )
+        1.0, "the vehicle is taken as still when its command is older; drivers repeat commands several times a second",
+        unit="s", low=0.05, high=3600.0,
+    )  # fmt: skip
     heading_type: HeadingType = parameter(
         HeadingType.IMU,
         "messages on the topic imu: IMU (sensor_msgs/Imu with an orientation), COMPASS_DEGREES or COMPASS_RADIANS "
         "(std_msgs/Float64, clockwise from north, as MAVROS's compass_hdg); with a compass the vehicle "
         "counts as level and the compass as aligned with it",
         tunable=False,
-    )
+    )  # fmt: skip
     longest_gap: float = parameter(2.0, "warn when no heading comes for longer", unit="s", low=0.01, high=3600.0)
     depth_type: DepthType = parameter(
         DepthType.NONE,
@@ -73,7 +67,7 @@ class DeadReckoningParameters(StampParameters):
         "below the surface), ALTITUDE (std_msgs/Float64, m above the surface, as MAVROS's rel_alt), PRESSURE "
         "(sensor_msgs/FluidPressure); NONE: the vehicle stays at one depth",
         tunable=False,
-    )
+    )  # fmt: skip
     surface_pressure: float = parameter(
         101325.0, "pressure at the surface, which depends on weather and altitude", unit="Pa", low=3e4, high=2e5
     )

@@ -29,20 +29,16 @@ class MountingParameters(ParameterSet):
         tunable=False, may_be_empty=True,
     )  # fmt: skip
     mount_x: float = parameter(
-        0.0,
-        "how far the sonar is ahead of the origin of mounted_in",
-        unit="m",
-        low=-_FARTHEST,
-        high=_FARTHEST,
+        0.0, "how far the sonar is ahead of the origin of mounted_in", unit="m", low=-_FARTHEST, high=_FARTHEST,
         tunable=False,
-    )
+    )  # fmt: skip
     mount_y: float = parameter(
         0.0, "how far it is to the left", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False
     )  # fmt: skip
     mount_z: float = parameter(0.0, "how far it is above", unit="m", low=-_FARTHEST, high=_FARTHEST, tunable=False)
     mount_yaw: float = parameter(
-        0.0, "direction of the sonar's +x, counter-clockwise from the bow", unit="rad",
-        low=-2.0 * math.pi, high=2.0 * math.pi, tunable=False,
+        0.0, "direction of the sonar's +x, counter-clockwise from the bow",
+        unit="rad", low=-2.0 * math.pi, high=2.0 * math.pi, tunable=False,
     )  # fmt: skip
     upside_down: bool = parameter(
         False, "the sonar hangs upside down, so that its head turns the other way round", tunable=False

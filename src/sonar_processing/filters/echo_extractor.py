@@ -43,12 +43,9 @@ class EchoExtractorParameters(ParameterSet):
         "which points of an echo are kept: its peak, its beginning, or points all along it",
     )
     pulse_sigma: float = parameter(
-        0.15,
-        "standard deviation of an echo along range, the width of the matched filter",
-        unit="m",
-        low=0.001,
-        high=10.0,
-    )
+        0.15, "standard deviation of an echo along range, the width of the matched filter",
+        unit="m", low=0.001, high=10.0,
+    )  # fmt: skip
     ring_quantile: float = parameter(
         0.4, "quantile over the directions that makes the ring of floor echoes: 0.3 among walls, 0.5 in open water; "
         "0: no ring, for sectors",

@@ -33,13 +33,9 @@ class OutlierRemoverParameters(ParameterSet):
         high=100.0,
     )
     min_radius: float = parameter(
-        1.0,
-        "RADIUS: distance within which neighbours are counted",
-        unit="m",
-        low=0.001,
-        high=1000.0,
+        1.0, "RADIUS: distance within which neighbours are counted", unit="m", low=0.001, high=1000.0,
         thesis_name="minRadius",
-    )
+    )  # fmt: skip
     min_neighbors: int = parameter(
         20, "RADIUS: a point with fewer neighbours is removed", low=1, high=10000, thesis_name="minNeighbors"
     )

@@ -42,13 +42,9 @@ class ThresholderParameters(ParameterSet):
         0.5, "share of the weakest echo in PROPORTIONAL", low=0.0, high=1.0, thesis_name="minThresholdProportion"
     )
     min_threshold: float = parameter(
-        0.0,
-        "the threshold is never below this",
-        unit="echo strength",
-        low=0.0,
-        high=255.0,
+        0.0, "the threshold is never below this", unit="echo strength", low=0.0, high=255.0,
         thesis_name="minThresholdValue",
-    )
+    )  # fmt: skip
 
 
 class Thresholder:

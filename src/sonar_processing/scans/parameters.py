@@ -69,8 +69,8 @@ class ScanParameters(ParameterSet):
         LaserPick.STRONGEST, "the bin that LASER and the laser scan take: the strongest, or the first strong enough"
     )
     laser_strongest_above: float = parameter(
-        0.0, "STRONGEST: a beam whose strongest bin is not above this has no point", unit="echo strength",
-        low=0.0, high=255.0,
+        0.0, "STRONGEST: a beam whose strongest bin is not above this has no point",
+        unit="echo strength", low=0.0, high=255.0,
     )  # fmt: skip
     laser_first_above: float = parameter(
         50.0, "FIRST: the nearest bin above this is taken", unit="echo strength", low=0.0, high=255.0

@@ -54,33 +54,22 @@ class CircleDetectorParameters(RansacParameters):
     max_radius: float = parameter(0.6, "largest radius of a circle", unit="m", low=0.01, high=100.0)
     min_inliers: int = parameter(2, "echoes that make a circle, each of another beam", low=2, high=10000)
     clearance: float = parameter(
-        0.7,
-        "least distance of a circle from all other echoes; what is nearer is taken for a piece of a wall",
-        unit="m",
-        low=0.0,
-        high=100.0,
-    )
+        0.7, "least distance of a circle from all other echoes; what is nearer is taken for a piece of a wall",
+        unit="m", low=0.0, high=100.0,
+    )  # fmt: skip
     line_distance: float = parameter(
-        0.2,
-        "an echo this near to a line through echoes of the neighbouring beams belongs to a wall",
-        unit="m",
-        low=0.0,
-        high=100.0,
-    )
+        0.2, "an echo this near to a line through echoes of the neighbouring beams belongs to a wall",
+        unit="m", low=0.0, high=100.0,
+    )  # fmt: skip
     max_residual: float = parameter(
-        0.2,
-        "largest root mean square difference between a circle's ranges and the measured ones",
-        unit="m",
-        low=0.0,
-        high=100.0,
-    )
+        0.2, "largest root mean square difference between a circle's ranges and the measured ones",
+        unit="m", low=0.0, high=100.0,
+    )  # fmt: skip
     max_footprint: float = parameter(
         1.65,
         "largest width that two neighbouring beams cover at a circle; beyond it a circle may be the end of a wall",
-        unit="m",
-        low=0.0,
-        high=100.0,
-    )
+        unit="m", low=0.0, high=100.0,
+    )  # fmt: skip
     beam_width: float = beam_width_parameter()
 
     def check(self) -> None:

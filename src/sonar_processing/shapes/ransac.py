@@ -23,12 +23,9 @@ class RansacParameters(StampParameters):
         0.5, "an echo this near to a shape belongs to it", unit="m", low=0.001, high=100.0, thesis_name="RANSACDistance"
     )
     probability: float = parameter(
-        0.999,
-        "the search ends early once it would have found a better shape with this probability; 1: never early",
-        low=0.0,
-        high=1.0,
-        thesis_name="RANSACProbability",
-    )
+        0.999, "the search ends early once it would have found a better shape with this probability; 1: never early",
+        low=0.0, high=1.0, thesis_name="RANSACProbability",
+    )  # fmt: skip
     max_iterations: int = parameter(
         5000, "hypotheses for one shape, at most", low=1, high=1000000, thesis_name="RANSACMaxIterations"
     )
