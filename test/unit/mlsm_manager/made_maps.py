@@ -36,3 +36,14 @@ def content(stored):
     }
     arrays = {name: (array.tobytes(), array.shape) for name, array in stored.arrays.items()}
     return layers, arrays, stored.frame, stored.made, dict(stored.calibration)
+
+
+def partition(blocks):
+    """Return what tells one partition of points from another: cell, bottom, top, n and kind of every block, sorted."""
+    rows = zip(blocks.cells.tolist(), blocks.bottom, blocks.height, blocks.count, blocks.type)
+    return sorted((tuple(cell), bottom, height, n, kind) for cell, bottom, height, n, kind in rows)
+
+
+def in_order(blocks):
+    """Return the order of blocks by cell, then by bottom."""
+    return np.lexsort((blocks.bottom, blocks.cells[:, 1], blocks.cells[:, 0]))

@@ -1,13 +1,12 @@
 """Maps in other programs' formats, read back by those programs' own readers."""
 
-import re
 import shutil
-import subprocess
 
 import numpy as np
 import pytest
 import yaml
 from made_maps import random_map
+from octomap_reading import RESOLUTION, cells_of_tree, cells_of_vrml, voxels
 from PIL import Image
 
 from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd
@@ -27,8 +26,6 @@ from mlsm_manager.surface_map.map_file import ExportError, Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.ply_file import write_ply
 
-RESOLUTION = 0.5
-
 
 def _blocks(*places):
     surface_map = MultiLevelSurfaceMap(RESOLUTION)
@@ -46,10 +43,6 @@ def free():
     return random_map(1).blocks
 
 
-def _voxel_set(blocks):
-    return {tuple(voxel) for voxel in block_voxels(blocks)[0].tolist()}
-
-
 def test_octomap_reads_the_same_cells_free_and_occupied(tmp_path, occupied, free):
     pyoctomap = pytest.importorskip("pyoctomap")
     for ending in (".bt", ".ot"):
@@ -61,28 +54,14 @@ def test_octomap_reads_the_same_cells_free_and_occupied(tmp_path, occupied, free
         else:
             tree = pyoctomap.OcTree(0.1).read(str(path))
         assert tree.getResolution() == RESOLUTION
-        leaves = {True: set(), False: set()}
-        for leaf in tree.begin_leafs():
-            leaves[tree.isNodeOccupied(leaf)] |= _cells_of_leaf(leaf.getCoordinate(), leaf.getSize())
-        assert leaves[True] == _voxel_set(occupied)
-        assert leaves[False] == _voxel_set(free) - _voxel_set(occupied)
-
-
-def _cells_of_leaf(center, size):
-    """Return all cells that a leaf covers; pruned leaves cover 8, 64 and so on."""
-    side = round(size / RESOLUTION)
-    first = np.rint((np.array(center) - size / 2.0) / RESOLUTION).astype(int)
-    return {(first[0] + x, first[1] + y, first[2] + z) for x in range(side) for y in range(side) for z in range(side)}
+        assert cells_of_tree(tree) == {True: voxels(occupied), False: voxels(free) - voxels(occupied)}
 
 
 @pytest.mark.skipif(shutil.which("bt2vrml") is None, reason="needs apt's octomap-tools")
 def test_the_packaged_octomap_reads_the_same_occupied_cells(tmp_path, occupied, free):
     pytest.importorskip("pyoctomap")
     write_octree(tmp_path / "map.bt", occupied, free)
-    subprocess.run(["bt2vrml", "map.bt"], cwd=str(tmp_path), check=True, stdout=subprocess.DEVNULL)
-    boxes = re.findall(r"translation (\S+) (\S+) (\S+).*?size (\S+)", (tmp_path / "map.bt.wrl").read_text(), re.S)
-    cells = set().union(*(_cells_of_leaf(list(map(float, box[:3])), float(box[3])) for box in boxes))
-    assert cells == _voxel_set(occupied)
+    assert cells_of_vrml(tmp_path) == voxels(occupied)
 
 
 def test_the_more_points_the_surer_a_cell_of_the_tree():
@@ -93,14 +72,10 @@ def test_the_more_points_the_surer_a_cell_of_the_tree():
 
 
 def test_a_map_wider_than_a_tree_is_refused():
-    with pytest.raises(ExportError, match="reaches beyond 16384 m"):
-        block_voxels(_far_blocks())
-
-
-def _far_blocks():
     surface_map = MultiLevelSurfaceMap(RESOLUTION, limit=1e6)
     surface_map.insert(np.array([[20000.0, 0.0, 0.0, 1.0]]))
-    return surface_map.blocks
+    with pytest.raises(ExportError, match="reaches beyond 16384 m"):
+        block_voxels(surface_map.blocks)
 
 
 def test_open3d_reads_what_a_pcd_holds(tmp_path, occupied):

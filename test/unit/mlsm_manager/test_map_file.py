@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_maps import content, random_map, random_points, stored_map
-from map_comparison import in_order, partition
+from made_maps import content, in_order, partition, random_map, random_points, stored_map
 
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import Blocks

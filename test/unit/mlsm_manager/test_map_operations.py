@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_maps import random_points
-from map_comparison import in_order, partition
+from made_maps import in_order, partition, random_points
 
 from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap

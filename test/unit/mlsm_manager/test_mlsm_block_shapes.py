@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_blocks import blocks_of
-from made_boxes import boxes_by_list
+from made_blocks import blocks_of, boxes_by_list
 
 from mlsm_manager.surface_map.blocks import BlockType
 from mlsm_manager.surface_map.tiles import THINNEST, TILE_BITS, box_lists

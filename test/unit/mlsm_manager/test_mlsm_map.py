@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from map_comparison import partition
+from made_maps import partition
 
 from mlsm_manager.surface_map import cell_index, insertion, point_groups
 from mlsm_manager.surface_map.blocks import BlockType, cells_of

@@ -6,13 +6,11 @@ import genpy
 import numpy as np
 import pytest
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
-from made_blocks import blocks_of
-from made_boxes import boxes_by_list
+from made_blocks import blocks_of, boxes_by_list
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
-from mlsm_manager.surface_map.blocks import BlockType
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
 from mlsm_manager.surface_map.tiles import TILE_BITS
 
@@ -97,10 +95,6 @@ def test_an_emptied_map_deletes_all_that_was_shown():
 def test_no_two_markers_of_a_message_share_namespace_and_id():
     names = [(m.ns, m.id) for m in _read(BlockMarkers().whole(blocks_of(MIXED), HEADER))]
     assert len(set(names)) == len(names) > 3
-
-
-def test_surfaces_that_points_make_have_a_colour():
-    assert set(COLORS) == {BlockType.HORIZONTAL, BlockType.VERTICAL}
 
 
 def test_blocks_are_coloured_one_by_one_when_asked():

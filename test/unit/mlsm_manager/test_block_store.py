@@ -1,0 +1,218 @@
+"""What a map keeps its blocks in: the hash table of cells, arrays that grow, and copies that are made in pieces."""
+
+import threading
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from mlsm_manager.surface_map import block_store
+from mlsm_manager.surface_map.block_store import finished
+from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex, cell_keys
+from mlsm_manager.surface_map.large_array import LargeArray
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+
+CLUSTERED = st.integers(-40, 40)
+FAR = st.sampled_from([-(10**8), -(2**31) + 1, -65536, -1, 0, 1, 65536, 10**8, 2**31 - 1])
+CELLS = st.one_of(st.tuples(CLUSTERED, CLUSTERED), st.tuples(FAR, FAR), st.tuples(CLUSTERED, FAR))
+
+
+def _keys(cells):
+    return cell_keys(np.array(cells, dtype=np.int64).reshape(-1, 2))
+
+
+@given(st.lists(st.lists(CELLS, unique=True, max_size=60), max_size=8))
+def test_it_finds_what_a_dict_finds(batches):
+    index, expected = CellIndex(0), {}
+    for batch in batches:
+        slots = index.slots(_keys(batch))
+        assert index.heads[slots].tolist() == [expected.get(cell, NO_BLOCK) for cell in batch]
+        numbers = np.arange(len(batch)) + len(expected)
+        index.heads[slots] = numbers
+        expected.update(zip(batch, numbers.tolist()))
+
+
+def test_a_large_table_grows_in_pieces_and_loses_nothing():
+    rng = np.random.RandomState(3)
+    keys = np.unique(_keys(rng.randint(-(2**31) + 1, 2**31 - 1, (200_000, 2), dtype=np.int64)))
+    rng.shuffle(keys)
+    index, sizes = CellIndex(0), []
+    for start in range(0, len(keys), 1000):
+        part = keys[start : start + 1000]
+        slots = index.slots(part)
+        index.heads[slots] = np.arange(start, start + len(part))
+        sizes.append(index.nbytes)
+    assert index.find(keys).tolist() == list(range(len(keys)))
+    growth = np.diff(sizes) / sizes[:-1]
+    assert growth[100:].max() < 0.1
+
+
+def test_a_table_that_takes_many_cells_at_once_finds_them_all():
+    keys = _keys([(x, y) for x in range(300) for y in range(300)])
+    index = CellIndex(0)
+    slots = index.slots(keys)
+    index.heads[slots] = np.arange(len(keys))
+    assert index.find(keys).tolist() == list(range(len(keys)))
+
+
+def test_cells_have_slots_of_their_own():
+    slots = CellIndex(0).slots(_keys([(x * 1024, y * 1024) for x in range(50) for y in range(50)]))
+    assert len(set(slots.tolist())) == 2500
+
+
+@given(st.lists(CELLS, unique=True, max_size=60))
+def test_different_cells_have_different_keys_that_sort_by_x_then_y(cells):
+    keys = _keys(sorted(cells))
+    assert (keys[1:] > keys[:-1]).all()
+
+
+def test_no_cells_need_no_slots():
+    assert CellIndex(0).slots(_keys([])).tolist() == []
+
+
+def test_a_crowded_table_does_not_grow_before_it_must():
+    index = CellIndex(0)
+    before = index.nbytes
+    for x in range(600):
+        index.slots(_keys([(x, -x)]))
+    assert index.nbytes == before
+
+
+def test_an_expected_number_of_cells_is_reserved_at_once():
+    index = CellIndex(14400)
+    before = index.nbytes
+    index.slots(_keys([(x, y) for x in range(120) for y in range(120)]))
+    assert index.nbytes == before
+
+
+def test_known_cells_take_no_more_memory():
+    index = CellIndex(0)
+    keys = _keys([(x, 0) for x in range(10)])
+    index.slots(keys)
+    before = index.nbytes
+    for _ in range(200):
+        index.slots(keys)
+    assert index.nbytes == before
+
+
+SMALL, LARGE = 1000, 1_000_000
+
+
+@pytest.mark.parametrize("length", [SMALL, LARGE])
+@pytest.mark.parametrize(("shape", "dtype"), [((3,), np.float64), ((), np.int32)])
+def test_what_was_written_stays_when_it_grows(length, shape, dtype):
+    array = LargeArray(length, shape, dtype)
+    written = np.arange(length * int(np.prod(shape, dtype=int)), dtype=dtype).reshape(length, *shape)
+    array.values[:] = written
+    for longer in (length + 1, 3 * length, 40 * length):
+        array.reserve(longer)
+        assert len(array.values) >= longer
+        np.testing.assert_array_equal(array.values[:length], written)
+
+
+def test_it_at_least_doubles_and_never_shrinks():
+    array = LargeArray(SMALL, (), np.int32)
+    array.reserve(SMALL + 1)
+    assert len(array.values) == 2 * SMALL
+    array.reserve(SMALL)
+    assert len(array.values) == 2 * SMALL
+
+
+def test_whoever_holds_an_old_array_keeps_what_was_in_it():
+    array = LargeArray(LARGE, (2,), np.float64)
+    array.values[:] = 1.0
+    held = array.values
+    array.reserve(2 * LARGE)
+    array.values[:] = 2.0
+    assert held.shape == (LARGE, 2)
+    assert (held == 1.0).all()
+
+
+def test_a_large_array_can_be_written_into_everywhere_after_it_grew():
+    array = LargeArray(LARGE, (), np.float64)
+    array.reserve(5 * LARGE)
+    array.values[:] = 7.0
+    assert array.values.sum() == 7.0 * len(array.values)
+
+
+@pytest.fixture(autouse=True)
+def small_pieces(monkeypatch):
+    monkeypatch.setattr(block_store, "_PIECE", 7)
+
+
+def map_of(seed, count=60):
+    surface_map = MultiLevelSurfaceMap(0.5)
+    surface_map.insert(np.random.RandomState(seed).uniform(-4.0, 4.0, (count, 4)))
+    return surface_map
+
+
+def changed(surface_map, rng):
+    """Insert points into old blocks and new cells, take blocks away, and count crossings."""
+    surface_map.insert(rng.uniform(-5.0, 5.0, (20, 4)))
+    _, rows, _ = surface_map.find(surface_map.blocks.cells[:5])
+    surface_map.remove(np.unique(rows))
+    _, rows, _ = surface_map.find(surface_map.blocks.cells[-5:])
+    rows = np.unique(rows)
+    surface_map.count_crossings(rows, np.ones(len(rows), dtype=np.uint16))
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**31), steps=st.integers(0, 6))
+def test_changes_between_two_pieces_are_not_in_the_copy(seed, steps):
+    surface_map, rng = map_of(seed), np.random.RandomState(seed)
+    before, copy = surface_map.blocks, surface_map.begin_copy()
+    for _ in range(steps):
+        copy.step()
+        changed(surface_map, rng)
+    blocks = finished(copy, threading.RLock())
+    np.testing.assert_array_equal(blocks.rows, before.rows)
+    np.testing.assert_array_equal(blocks.crossed, before.crossed)
+
+
+def test_the_map_that_changed_meanwhile_has_its_changes():
+    copied, other = map_of(1), map_of(1)
+    copy = copied.begin_copy()
+    for surface_map in (copied, other):
+        changed(surface_map, np.random.RandomState(2))
+    finished(copy, threading.RLock())
+    np.testing.assert_array_equal(copied.blocks.rows, other.blocks.rows)
+
+
+def test_two_copies_at_the_same_time_are_each_as_old_as_they_are():
+    surface_map, rng = map_of(3), np.random.RandomState(4)
+    wanted, copies = [], []
+    for _ in range(2):
+        wanted.append(surface_map.blocks)
+        copies.append(surface_map.begin_copy())
+        changed(surface_map, rng)
+    for copy, blocks in zip(copies, wanted):
+        np.testing.assert_array_equal(finished(copy, threading.RLock()).rows, blocks.rows)
+
+
+def test_an_empty_map_has_an_empty_copy():
+    assert len(finished(MultiLevelSurfaceMap(0.5).begin_copy(), threading.RLock())) == 0
+
+
+def test_the_lock_is_free_between_two_pieces():
+    """Somebody who waits for it changes the map before the copy is complete."""
+    surface_map, lock = map_of(5, count=4000), threading.RLock()
+    before, copy, seen = surface_map.blocks, surface_map.begin_copy(), []
+    wants_the_lock = threading.Event()
+
+    def change():
+        wants_the_lock.set()
+        with lock:
+            surface_map.insert(np.zeros((1, 4)))
+            seen.append(copy.is_complete)
+
+    lock.acquire()
+    changing = threading.Thread(target=change)
+    changing.start()
+    wants_the_lock.wait()
+    copy.step()
+    lock.release()
+    copied = finished(copy, lock)
+    changing.join()
+    assert seen == [False]
+    np.testing.assert_array_equal(copied.rows, before.rows)
