@@ -1,12 +1,14 @@
 """Writes the commented default yaml and the documentation's table of a `ParameterSet`."""
 
 import dataclasses
+import textwrap
 from enum import Enum
 from typing import List, Mapping, Tuple, Type
 
 from node_support.parameters import EXPERT, ParameterSet, describe
 
 _FOR_EXPERTS = "hardly ever changed: each with the reason for its default"
+_YAML_WIDTH = 110
 _YAML_TYPES = {float: "float", int: "int", bool: "bool", str: "string"}
 
 
@@ -40,8 +42,9 @@ def _yaml_key(field: dataclasses.Field, live: bool) -> List[str]:
     mark = " *" if described.tunable and live else ""
     thesis = f"; thesis: {described.thesis_name}" if described.thesis_name else ""
     reason = [f"#   default: {described.expert}"] if described.expert else []
-    lines = ["", f"# {described.text}{mark}", f"#   {described.allowed(field.type)}{thesis}", *reason]
-    return [*lines, f"{field.name}: {_yaml_value(field.default)}"]
+    text = [f"# {line}" for line in textwrap.wrap(described.text + mark, _YAML_WIDTH)]
+    allowed = f"#   {described.allowed(field.type)}{thesis}"
+    return ["", *text, allowed, *reason, f"{field.name}: {_yaml_value(field.default)}"]
 
 
 def _by_audience(parameters: Type[ParameterSet]) -> Tuple[List[dataclasses.Field], List[dataclasses.Field]]:

@@ -199,7 +199,9 @@ class Joint(Estimator):
         start = perf_counter()
         session = self._session
         if session is None:
-            session = self._maps.begun(self.parameters, self._sonar_in_base, self.correction.copy(), self._start)
+            known = self.matched.blocks.mean[:, :2]
+            correction = self.correction.copy()
+            session = JointSession.begun(self.parameters, self._sonar_in_base, correction, self._start, known)
         session.add(scan)
         return self._taken(scan, session, start)
 

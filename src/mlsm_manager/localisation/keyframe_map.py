@@ -20,6 +20,9 @@ from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
 
+_MOST_STORED = 500
+"""Scans of a run that are stored with each save: some hours, and some tens of megabytes."""
+
 
 @dataclass(frozen=True)
 class Drawn:
@@ -170,10 +173,6 @@ class KeyframeMap:
         self._overlay.hide(self._free.outworn(self._map))
 
 
-_MOST_STORED = 500
-"""Scans of a run that are stored with each save: some hours, and some tens of megabytes."""
-
-
 class JointMaps:
     """shown: the map of clouds that is shown and saved. matched: the map of echoes in which a lost vehicle is searched.
 
@@ -206,14 +205,6 @@ class JointMaps:
             session.T_map_odom, session.solver.log.sonar_in_base, session.scans, session.solver.stored(),
             self.shown.moving, self.shown.covered, self.matched.covered,
         ).arrays()  # fmt: skip
-
-    def begun(
-        self, parameters: SolverParameters, sonar_in_base: np.ndarray, T_map_odom: np.ndarray,
-        start: Optional[np.ndarray],
-    ) -> JointSession:  # fmt: skip
-        """Return a new run among the surfaces of the matched map; see JointSession.begun."""
-        known = self.matched.map.blocks.mean[:, :2]
-        return JointSession.begun(parameters, sonar_in_base, T_map_odom, start, known)
 
     def resumed(self, run: StoredRun, parameters: SolverParameters) -> JointSession:
         """Return a stored run that goes on, and draw it in these maps, which were stored with it.

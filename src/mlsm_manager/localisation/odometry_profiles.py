@@ -25,7 +25,7 @@ from mlsm_manager.joint_solver.parameters import NodeSearch
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from node_support.parameters import ParameterSet, parameter
+from node_support.parameters import parameter
 
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.
 _FOR_EVER = 1e6
@@ -50,8 +50,8 @@ COMPASS_ONLY = (OdometryKind.HEADING, OdometryKind.HOVERING)
 
 
 @dataclass(frozen=True)
-class OdometryChoice(ParameterSet):
-    """What the joint solver needs to know of the odometry besides OdometryErrors."""
+class OdometryChoice(OdometryErrors):
+    """What the odometry measures and how wrong it may be."""
 
     odometry: OdometryKind = parameter(
         OdometryKind.DVL,
@@ -98,9 +98,9 @@ class OdometryChoice(ParameterSet):
         10.0, "NONE: how long a turn rate lasts", unit="s", low=1.0, high=1e5, tunable=False, expert="a turn",
     )  # fmt: skip
 
-    def odometry_model(self, errors: OdometryErrors) -> OdometryModel:
-        """Return the model of the motion."""
-        return _MODELS[self.odometry](self, errors)
+    def odometry_model(self) -> OdometryModel:
+        """Return the model of the motion for the joint solver."""
+        return _MODELS[self.odometry](self)
 
     def node_search(self, parts_per_turn: int) -> Optional[NodeSearch]:
         """Return what finds the nodes of parts of a turn, of which echoes alone tell; None where it is not needed."""
@@ -112,61 +112,59 @@ class OdometryChoice(ParameterSet):
         return ParticleFilter()
 
 
-def _compass(choice: OdometryChoice, errors: OdometryErrors) -> Compass:
-    compass = errors.heading_deviation > 0.0
+def _compass(own: OdometryChoice) -> Compass:
+    compass = own.heading_deviation > 0.0
     return Compass(
-        heading_deviation=errors.heading_deviation if compass else _NO_COMPASS,
-        heading_correlation_time=choice.heading_correlation_time if compass else _FOR_EVER,
-        heading_walk=max(errors.turn_rate_deviation * np.sqrt(2.0 * errors.rate_correlation_time), _LEAST_WALK),
+        heading_deviation=own.heading_deviation if compass else _NO_COMPASS,
+        heading_correlation_time=own.heading_correlation_time if compass else _FOR_EVER,
+        heading_walk=max(own.turn_rate_deviation * np.sqrt(2.0 * own.rate_correlation_time), _LEAST_WALK),
     )
 
 
-def _positions(choice: OdometryChoice, errors: OdometryErrors) -> Dict[str, Any]:
+def _positions(own: OdometryChoice) -> Dict[str, Any]:
     """Return the walks that errors add up to which last `rate_correlation_time`, and `motion_correlation_time`."""
     return {
-        "compass": _compass(choice, errors),
-        "position_walk": max(errors.speed_deviation * np.sqrt(2.0 * errors.rate_correlation_time), 1e-3),
-        "direction": choice.odometry_direction,
-        "direction_deviation": errors.direction_deviation,
-        "direction_walk": min(errors.direction_deviation * np.sqrt(2.0 / errors.motion_correlation_time), 1.0),
-        "scale": choice.odometry_scale,
-        "scale_deviation": errors.scale_deviation,
+        "compass": _compass(own),
+        "position_walk": max(own.speed_deviation * np.sqrt(2.0 * own.rate_correlation_time), 1e-3),
+        "direction": own.odometry_direction,
+        "direction_deviation": own.direction_deviation,
+        "direction_walk": min(own.direction_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0),
+        "scale": own.odometry_scale,
+        "scale_deviation": own.scale_deviation,
     }
 
 
-def _speeds(choice: OdometryChoice, errors: OdometryErrors) -> Speeds:
+def _speeds(own: OdometryChoice) -> Speeds:
     return Speeds(
-        start_speed_deviation=choice.start_speed_deviation,
-        speed_deviation=max(errors.speed_deviation, 1e-3),
-        speed_correlation_time=max(errors.rate_correlation_time, 1.0),
-        travel_walk=choice.travel_walk,
-        slip_deviation=choice.slip_deviation,
-        slip_correlation_time=choice.slip_correlation_time,
+        start_speed_deviation=own.start_speed_deviation,
+        speed_deviation=max(own.speed_deviation, 1e-3),
+        speed_correlation_time=max(own.rate_correlation_time, 1.0),
+        travel_walk=own.travel_walk,
+        slip_deviation=own.slip_deviation,
+        slip_correlation_time=own.slip_correlation_time,
     )
 
 
-def _dvl(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    return DvlFactors(DvlOdometry(**_positions(choice, errors)))
+def _dvl(own: OdometryChoice) -> OdometryModel:
+    return DvlFactors(DvlOdometry(**_positions(own)))
 
 
-def _thrusters(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    scale_walk = min(errors.scale_deviation * np.sqrt(2.0 / errors.motion_correlation_time), 1.0)
-    current = {"current_deviation": choice.current_deviation, "current_walk": choice.current_walk}
-    return ThrusterFactors(ThrusterOdometry(**_positions(choice, errors), scale_walk=scale_walk, **current))
+def _thrusters(own: OdometryChoice) -> OdometryModel:
+    scale_walk = min(own.scale_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0)
+    current = {"current_deviation": own.current_deviation, "current_walk": own.current_walk}
+    return ThrusterFactors(ThrusterOdometry(**_positions(own), scale_walk=scale_walk, **current))
 
 
-def _heading(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    return HeadingFactors(HeadingOdometry(_speeds(choice, errors), _compass(choice, errors)))
+def _heading(own: OdometryChoice) -> OdometryModel:
+    return HeadingFactors(HeadingOdometry(_speeds(own), _compass(own)))
 
 
-def _none(choice: OdometryChoice, errors: OdometryErrors) -> OdometryModel:
-    deviation = max(errors.turn_rate_deviation, 1e-5)
-    return UnaidedFactors(
-        UnaidedOdometry(_speeds(choice, errors), deviation, choice.turn_rate_correlation_time, _TURN_NOISE)
-    )
+def _none(own: OdometryChoice) -> OdometryModel:
+    deviation = max(own.turn_rate_deviation, 1e-5)
+    return UnaidedFactors(UnaidedOdometry(_speeds(own), deviation, own.turn_rate_correlation_time, _TURN_NOISE))
 
 
-_MODELS: Dict[OdometryKind, Callable[[OdometryChoice, OdometryErrors], OdometryModel]] = {
+_MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {
     OdometryKind.DVL: _dvl,
     OdometryKind.THRUSTERS: _thrusters,
     OdometryKind.HEADING: _heading,

@@ -38,8 +38,8 @@ class EstimatorName(Enum):
 
 
 @dataclass(frozen=True)
-class JointParameters(OdometryChoice, JointSolverParameters):
-    """Which estimator finds the poses, and what the joint one needs besides OdometryErrors."""
+class EstimatorParameters(OdometryChoice, JointSolverParameters):
+    """Which estimator finds the poses, and what the joint one needs to know."""
 
     estimator: EstimatorName = parameter(
         EstimatorName.SCAN_BY_SCAN,
@@ -84,8 +84,7 @@ class MapParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class LocaliserParameters(
-    ThesisMatcherParameters, DistributionMatcherParameters, JointParameters, OdometryErrors, CarvingParameters,
-    MapParameters,
+    ThesisMatcherParameters, DistributionMatcherParameters, EstimatorParameters, CarvingParameters, MapParameters
 ):  # fmt: skip
     """All that a localiser is made from."""
 
@@ -105,14 +104,14 @@ class LocaliserParameters(
         return SolverParameters(
             **{field.name: getattr(self, field.name) for field in fields(JointSolverParameters)},
             range_scale_deviation=self.range_scale_deviation,
-            odometry=self.odometry_model(self.part(OdometryErrors)),
+            odometry=self.odometry_model(),
             node_search=self.node_search(self.parts_per_turn),
         )
 
     @property
     def longest_turn(self) -> float:
         """How long a turn of the head may take [s]: in each part of it the vehicle is at about one speed."""
-        measured = not np.isinf(self.odometry_model(self.part(OdometryErrors)).distance_deviation)
+        measured = not np.isinf(self.odometry_model().distance_deviation)
         alone = self.estimator is not EstimatorName.JOINT
         return np.inf if measured or alone else self.rate_correlation_time * self.parts_per_turn
 
