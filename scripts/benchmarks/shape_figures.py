@@ -1,17 +1,15 @@
-"""Walls and buoys found in simulated scans of the basin, against the world; and the time of the search."""
+"""Walls and buoys found in simulated scans of the basin, against the world."""
 
 import math
-from dataclasses import dataclass
-from functools import reduce
-from typing import List, Optional, Sequence
+from typing import List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
 from benchmarks.harness import Row
 from benchmarks.scans import BUOYS, WALLS, BasinScans, anywhere, near_buoy
+from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.filters.stage_table import Stage
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.shapes.lines import Line, LineDetector, LineDetectorParameters
@@ -24,8 +22,7 @@ DISTANCE_TOLERANCE, ANGLE_TOLERANCE = 0.15, math.radians(1.0)
 _SAME_WALL = 0.95
 
 
-@dataclass(frozen=True)
-class WallErrors:
+class WallErrors(NamedTuple):
     """One wall that is there: its distance from the sonar, and the errors of what was found, None when nothing was."""
 
     reach: float
@@ -55,56 +52,48 @@ def wall_errors(lines: List[Line], T_world_sonar: np.ndarray, farthest: float) -
     return result
 
 
-def wall_rows(spread: float, name: str, chain: Sequence[Stage]) -> List[Row]:
-    """Measure walls from random places, seed by seed. The sonar reaches 50 m: of a wall there it sees a few metres."""
-    scans, detector = BasinScans(spread), LineDetector(LineDetectorParameters())
-    clouds = [
-        reduce(lambda cloud, stage: stage(cloud), chain, scans.scan(anywhere(seed), seed)) for seed in range(SEEDS)
-    ]
+def rows() -> List[Row]:
+    """Return the figures of walls from random places and of buoys of 0.5 m radius from 10 m, seed by seed."""
+    threshold, found = Thresholder(ThresholderParameters()), []
+    for spread in SPREADS:
+        scans, remove = BasinScans(spread), OutlierRemover(OutlierRemoverParameters())
+        extract = EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))
+        turns = [scans.scan(anywhere(seed), seed) for seed in range(SEEDS)]
+        found += _wall_rows(f"cleaned, spread {spread} m", [remove(threshold(turn)) for turn in turns])
+        found += _wall_rows(f"echoes, spread {spread} m", [extract(turn) for turn in turns])
+        clouds = [threshold(scans.scan(near_buoy(seed), seed)) for seed in range(SEEDS)]
+        found += [row for radii in BUOY_RADII for row in _buoy_rows(f"thresholded, spread {spread} m", clouds, radii)]
+    return found
+
+
+def _wall_rows(name: str, clouds: List[Cloud]) -> List[Row]:
+    """Compare walls; the sonar reaches 50 m: of a wall there it sees a few metres."""
+    detector, result = LineDetector(LineDetectorParameters()), []
     lines = [detector(cloud) for cloud in clouds]
-    result = []
     for farthest in WALL_REACHES:
         seeds = [wall_errors(lines[seed], anywhere(seed), farthest) for seed in range(SEEDS)]
-        result += _wall_rows(f"{name}, spread {spread} m, walls within {farthest:.0f} m", seeds)
+        good = sum(all(error.is_good for error in errors) for errors in seeds)
+        there = [error for errors in seeds for error in errors if error.distance is not None]
+        worst = f"{max(e.distance for e in there):.2f} m, {math.degrees(max(e.angle for e in there)):.2f} deg"
+        title = f"{name}, walls within {farthest:.0f} m"
+        result += [
+            (f"{title}: all found to 0.15 m, 1 deg", f"{good} of {SEEDS} seeds", ">= 99"),
+            (f"{title}: greatest errors of those found", worst, "0.15 m, 1 deg"),
+        ]
     return result
 
 
-def _wall_rows(name: str, seeds: List[List[WallErrors]]) -> List[Row]:
-    good = sum(all(error.is_good for error in errors) for errors in seeds)
-    found = [error for errors in seeds for error in errors if error.distance is not None]
-    worst = f"{max(e.distance for e in found):.2f} m, {math.degrees(max(e.angle for e in found)):.2f} deg"
-    return [
-        (f"{name}: all found to 0.15 m, 1 deg", f"{good} of {SEEDS} seeds", ">= 99"),
-        (f"{name}: found of those there", f"{len(found)} of {sum(map(len, seeds))}", ""),
-        (f"{name}: greatest errors of those found", worst, "0.15 m, 1 deg"),
-    ]
-
-
-def buoy_rows(spread: float, min_radius: float, max_radius: float) -> List[Row]:
-    """Measure a buoy of 0.5 m radius from 10 m, seed by seed, told that its radius lies between two values [m]."""
-    scans = BasinScans(spread)
-    detector = CircleDetector(CircleDetectorParameters(min_radius=min_radius, max_radius=max_radius))
-    thresholder = Thresholder(ThresholderParameters())
-    errors = []
-    for seed in range(SEEDS):
-        pose, buoy = near_buoy(seed), np.array(BUOYS[seed % len(BUOYS)])
-        cloud = thresholder(scans.scan(pose, seed))
-        circles = detector(cloud, lambda times, place=pose[:2, 3]: np.tile(place, (len(times), 1)))
-        errors.append(min((float(np.linalg.norm(circle.center - buoy)) for circle in circles), default=math.inf))
+def _buoy_rows(name: str, clouds: List[Cloud], radii: Tuple[float, float]) -> List[Row]:
+    """Compare buoys whose radius is said to lie between two values [m]."""
+    detector, errors = CircleDetector(CircleDetectorParameters(min_radius=radii[0], max_radius=radii[1])), []
+    for seed, cloud in enumerate(clouds):
+        place = near_buoy(seed)[:2, 3]
+        circles = detector(cloud, lambda times, place=place: np.tile(place, (len(times), 1)))
+        off = [float(np.linalg.norm(circle.center - BUOYS[seed % len(BUOYS)])) for circle in circles]
+        errors.append(min(off, default=math.inf))
+    title = f"{name}: buoy of 0.5 m at 10 m, radius {radii[0]} to {radii[1]} m"
     good = sum(error <= DISTANCE_TOLERANCE for error in errors)
-    name = f"thresholded, spread {spread} m: buoy of 0.5 m at 10 m, radius {min_radius} to {max_radius} m"
     return [
-        (f"{name}, error of its centre", f"{np.median(errors):.2f} m median", "0.15 m"),
-        (f"{name}, within 0.15 m", f"{good} of {SEEDS} seeds", ">= 99"),
+        (f"{title}, error of its centre", f"{np.median(errors):.2f} m median", "0.15 m"),
+        (f"{title}, within 0.15 m", f"{good} of {SEEDS} seeds", ">= 99"),
     ]
-
-
-def rows() -> List[Row]:
-    """Return the figures of the shapes."""
-    found = []
-    for spread in SPREADS:
-        cleaned = [Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())]
-        extractor = EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))
-        found += wall_rows(spread, "cleaned", cleaned) + wall_rows(spread, "echoes", [extractor])
-        found += [row for radii in BUOY_RADII for row in buoy_rows(spread, *radii)]
-    return found

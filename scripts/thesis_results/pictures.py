@@ -44,9 +44,16 @@ class Pictures:
 
     def save(self, name: str, figure: Figure, what: str) -> str:
         """Write NAME.png and return the Markdown that shows it, with `what` it shows below."""
+        return self._write(name, _small_png(figure), what)
+
+    def copied(self, name: str, file: Path, what: str) -> str:
+        """Write a picture that a program made to NAME.png, in fewer colours, and return its Markdown as `save` does."""
+        return self._write(name, _in_few_colours(file.read_bytes()), what)
+
+    def _write(self, name: str, png: bytes, what: str) -> str:
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"{name}.png"
-        write_whole(path, _small_png(figure))
+        write_whole(path, png)
         what = prose(what)
         return f"![{name.replace('_', ' ')}]({path.relative_to(self._page.parent).as_posix()})\n\n*{what}*"
 
@@ -75,9 +82,14 @@ def _small_png(figure: Figure) -> bytes:
 
 
 def _png(figure: Figure, resolution: int) -> bytes:
-    full, small = BytesIO(), BytesIO()
+    full = BytesIO()
     figure.savefig(full, format="png", dpi=resolution, facecolor="white", bbox_inches="tight")
-    image = Image.open(full).convert("RGB").quantize(_COLOURS, method=Image.FASTOCTREE, dither=0)
+    return _in_few_colours(full.getvalue())
+
+
+def _in_few_colours(png: bytes) -> bytes:
+    small = BytesIO()
+    image = Image.open(BytesIO(png)).convert("RGB").quantize(_COLOURS, method=Image.FASTOCTREE, dither=0)
     image.save(small, format="png", optimize=True)
     return small.getvalue()
 
