@@ -194,11 +194,6 @@ def test_the_ending_tells_the_format(tmp_path, occupied, free, ending):
     assert not [name for name in tmp_path.iterdir() if name.name.startswith(".")]
 
 
-def test_another_ending_is_refused_with_those_there_are(tmp_path, occupied):
-    with pytest.raises(ExportError, match=r"must end with one of \.ply \.pcd"):
-        export(StoredMap("map", {Layer.SHOWN: occupied}), tmp_path / "map.xyz", ExportOptions())
-
-
 def test_an_empty_map_is_not_exported(tmp_path):
     with pytest.raises(ExportError, match="no blocks"):
         export(StoredMap("map", {Layer.SHOWN: _blocks()}), tmp_path / "map.ply", ExportOptions())

@@ -1,7 +1,6 @@
 """Maps moved, merged, cropped and compared."""
 
 import numpy as np
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_maps import in_order, partition, random_points
@@ -75,12 +74,6 @@ def test_merged_maps_have_the_layers_of_both():
     assert (both.frame, both.calibration) == ("map", {"range_scale": 0.9})
     assert len(both.shown) == len(shown) + len(other)
     assert both.layers[Layer.FREE].mean[:, 0].min() > 80.0
-
-
-def test_maps_of_different_resolutions_are_not_merged():
-    coarse = MultiLevelSurfaceMap(1.0).blocks
-    with pytest.raises(ValueError, match=r"resolution 1 m: must be the map's, 0\.5 m"):
-        merged_blocks(_blocks(random_points(0, 5)), coarse, LevelTransform())
 
 
 def test_moving_there_and_back_changes_nothing():

@@ -51,12 +51,6 @@ def test_the_bytes_are_those_of_markers_built_point_by_point(intervals):
     assert _bytes(packed) == _bytes(MarkerArray(markers=expected))
 
 
-def test_a_subscriber_reads_every_box():
-    blocks = blocks_of(MIXED)
-    points = [[p.x, p.y, p.z] for marker in _read(BlockMarkers().whole(blocks, HEADER)) for p in marker.points]
-    assert points == np.concatenate([boxes.centers for boxes in boxes_by_list(blocks)]).tolist()
-
-
 def test_an_empty_map_makes_no_markers():
     assert _read(BlockMarkers().whole(blocks_of([]), HEADER)) == []
 
@@ -65,14 +59,6 @@ def test_horizontal_and_vertical_blocks_differ_in_namespace_and_colour():
     markers = {marker.ns: marker for marker in _read(BlockMarkers().whole(blocks_of([(0, 0), (0, 0.5)]), HEADER))}
     assert sorted(markers) == ["horizontal", "vertical"]
     assert markers["horizontal"].color != markers["vertical"].color
-
-
-def test_markers_can_be_seen():
-    for marker in _read(BlockMarkers().whole(blocks_of(MIXED), HEADER)):
-        assert marker.color.a == 1.0
-        assert marker.pose.orientation == Quaternion(0.0, 0.0, 0.0, 1.0)
-        assert min(marker.scale.x, marker.scale.y, marker.scale.z) > 0.0
-        assert marker.header == HEADER
 
 
 def test_a_class_of_boxes_that_vanished_is_deleted_once():

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
-from made_missions import START, blocks, mission, verdict
+from made_missions import mission, verdict
 
 from mlsm_manager.report.page import Light, light_of, light_of_run, slider_json
 
@@ -92,8 +92,3 @@ class TestPage:
 
     def test_a_map_without_blocks_makes_a_page(self, page_of):
         assert "Map in 3-D" in page_of(mission(block_count=0))
-
-
-def test_stamps_of_the_fixture_are_those_of_a_real_clock():
-    assert mission().start == START
-    assert len(blocks(10)) == 10
