@@ -1,10 +1,11 @@
-"""Messages of several sonars become the same beams."""
+"""Messages of several sonars become the same beams; damaged ones crash nothing, and each is counted."""
 
 import math
 from pathlib import Path
 
 import numpy as np
 import pytest
+from fuzzed_beams import fuzz
 from hypothesis import given
 from hypothesis import strategies as st
 from sonar_messages import (
@@ -39,6 +40,7 @@ NEEDED = {
     MICRON: "header angle bin_distance_step bins",
     LASER_SCAN: "header angle_min angle_increment time_increment range_max ranges",
 }
+MESSAGES = 5000
 
 
 def reading(kind, message, **parameters):
@@ -224,3 +226,12 @@ def test_the_page_of_sonars_says_of_every_type_what_the_table_does(name):
     way = "clockwise" if kind.clockwise else "counter-clockwise"
     for words in (kind.unit.value.lower(), f"| {way} |", kind.zero, kind.strengths, kind.bins, kind.source):
         assert words in row
+
+
+# genpy warns of names that are no UTF-8, and its generated code writes arrays with the old name of tobytes.
+@pytest.mark.filterwarnings("ignore")
+def test_no_damaged_message_crashes_and_each_is_counted():
+    fuzzer = fuzz(MESSAGES, seed=2)
+    assert fuzzer.crashes == []
+    assert sum(fuzzer.outcomes.values()) == MESSAGES
+    assert set(fuzzer.outcomes) >= {"taken", "beams refused", "stamps refused", "messages not readable"}

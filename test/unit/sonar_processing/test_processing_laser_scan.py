@@ -5,8 +5,6 @@ import math
 import numpy as np
 import pytest
 from clouds import SECOND, beam_of
-from hypothesis import given
-from hypothesis import strategies as st
 
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.scans.parameters import SonarToCloudParameters
@@ -72,24 +70,6 @@ def test_lost_beams_and_beams_without_echo_are_infinitely_far():
     assert missing == [10, 11, 30, 80]
     assert turn.intensities[~np.isfinite(turn.ranges)].tolist() == [0.0] * 4
     assert set(turn.intensities[np.isfinite(turn.ranges)]) == {100.0}
-
-
-@given(st.floats(-1.5, 1.5), st.floats(-1.5, 1.5), st.floats(-0.6, 0.6))
-def test_a_wall_stays_straight_while_the_vehicle_moves(dx, dy, turned):
-    share = np.linspace(0.0, 1.0, RAYS)
-    poses = [_pose(dx * s, dy * s, turned * s) for s in share]
-    bearings = np.arange(RAYS) * STEP + turned * share
-    # Beams towards a wall along y at x = 6.
-    with np.errstate(divide="ignore"):
-        distances = np.where(np.cos(bearings) > 0.7, (6.0 - dx * share) / np.cos(bearings), 50.0)
-    turn = _laser(_scan(distances, poses=poses), laser_strongest_above=50.0)
-    near = np.isfinite(turn.ranges)
-    points = _pose(dx, dy, turned) @ np.array([
-        turn.ranges[near] * np.cos(_angles(turn)[near]), turn.ranges[near] * np.sin(_angles(turn)[near]),
-        np.zeros(near.sum()), np.ones(near.sum()),
-    ])  # fmt: skip
-    assert near.sum() > 15
-    assert np.abs(points[0] - 6.0).max() < 9.0 * STEP / 2 + 0.1
 
 
 def test_the_nearest_of_two_echoes_in_one_ray_stays():

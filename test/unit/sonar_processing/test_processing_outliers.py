@@ -129,15 +129,6 @@ def test_radius_counts_the_point_itself_and_keeps_more_than_asked_for():
     assert radius_inliers(line, 1.5, 3).tolist() == [False, False, False]
 
 
-def test_radius_includes_its_border():
-    assert radius_inliers(_array([(0, 0, 0), (1, 0, 0)]), 1.0, 1).all()
-    assert not radius_inliers(_array([(0, 0, 0), (1, 0, 0)]), 0.999999, 1).any()
-
-
-def test_radius_counts_duplicates():
-    assert radius_inliers(np.zeros((5, 3), dtype=np.float32), 0.001, 4).all()
-
-
 def test_radius_of_nothing_is_nothing():
     assert radius_inliers(np.empty((0, 3), dtype=np.float32), 1.0, 1).tolist() == []
 

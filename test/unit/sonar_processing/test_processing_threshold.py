@@ -1,4 +1,6 @@
-"""Which points each mode of the thresholder keeps, and its compiled loops against a few lines of numpy."""
+"""What the thresholder keeps, by Otsu as the thesis computes it (6.5.3), and when a filter removes everything."""
+
+from fractions import Fraction
 
 import numpy as np
 import pytest
@@ -6,14 +8,90 @@ from clouds import cloud_of
 from hypothesis import given
 from hypothesis import strategies as st
 
+from node_support.errors import RefusedInput
 from sonar_processing.cloud import Cloud
+from sonar_processing.filters.stage_table import EmptiedScans
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode, otsu_threshold
 
+LEVELS = st.lists(st.integers(0, 255), min_size=1, max_size=60)
+FEW_LEVELS = st.lists(st.sampled_from([0, 1, 2, 100, 101, 200, 255]), min_size=1, max_size=60)
 STRENGTHS = st.lists(st.integers(0, 255), max_size=40)
 ANY_STRENGTHS = st.lists(
     st.one_of(st.integers(-2, 300), st.floats(-2.0, 300.0, width=32), st.sampled_from([np.nan, np.inf, -np.inf])),
     max_size=60,
 )
+
+
+def literal_threshold(levels):
+    """Return the threshold by stepping through all levels; the only level when there is nothing to separate."""
+    histogram = [levels.count(level) for level in range(256)]
+    total = len(levels)
+    first = last = greatest = None
+    for t in range(256):
+        n1, n2 = sum(histogram[: t + 1]), sum(histogram[t + 1 :])
+        if not n1 or not n2:
+            continue
+        mu1 = Fraction(sum(level * histogram[level] for level in range(t + 1)), n1)
+        mu2 = Fraction(sum(level * histogram[level] for level in range(t + 1, 256)), n2)
+        between = Fraction(n1, total) * Fraction(n2, total) * (mu1 - mu2) ** 2
+        if greatest is None or between > greatest:
+            first, greatest = t, between
+        if between >= greatest:
+            last = t
+    return float(levels[0]) if greatest is None else (first + last) / 2.0
+
+
+@pytest.mark.parametrize("strategy", [LEVELS, FEW_LEVELS], ids=["many levels", "few levels"])
+@given(st.data())
+def test_it_is_the_mean_of_the_first_and_the_last_maximum(strategy, data):
+    levels = data.draw(strategy)
+    assert otsu_threshold(np.array(levels)) == literal_threshold(levels)
+
+
+@given(LEVELS, st.integers(2, 1000))
+def test_copies_of_a_scan_have_its_threshold(levels, copies):
+    assert otsu_threshold(np.repeat(levels, copies)) == literal_threshold(levels)
+
+
+def test_it_lies_midway_between_two_levels():
+    assert otsu_threshold(np.array([10, 10, 20])) == 14.5
+
+
+def test_symmetric_levels_have_two_maxima_that_are_averaged():
+    assert otsu_threshold(np.array([0, 50, 100])) == 49.5
+
+
+def test_strengths_above_127_are_levels_of_their_own():
+    assert otsu_threshold(np.array([128, 255])) == literal_threshold([128, 255]) == 191.0
+
+
+def test_strengths_outside_the_levels_count_in_the_nearest():
+    assert otsu_threshold(np.array([-50.0, 1000.0])) == literal_threshold([0, 255])
+
+
+def test_fractions_of_a_level_count_in_the_level_below():
+    assert otsu_threshold(np.array([10.9, 20.2])) == literal_threshold([10, 20])
+
+
+@pytest.mark.parametrize("level", [0, 30, 200, 255])
+def test_one_level_is_its_own_threshold(level):
+    assert otsu_threshold(np.full(5, level)) == level
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.float32, np.float64, np.int64])
+def test_the_type_of_the_strengths_does_not_matter(dtype):
+    assert otsu_threshold(np.array([3, 4, 90, 95], dtype=dtype)) == literal_threshold([3, 4, 90, 95])
+
+
+def test_a_large_scan_does_not_overflow():
+    levels = np.concatenate([np.full(3_000_000, 250), np.full(2_000_000, 255)])
+    assert otsu_threshold(levels) == literal_threshold([250, 250, 250, 255, 255])
+
+
+def test_no_strengths_are_refused():
+    with pytest.raises(RefusedInput) as refused:
+        otsu_threshold(np.empty(0))
+    assert refused.value.kind == "clouds without points"
 
 
 def _kept(strengths, **values):
@@ -34,10 +112,6 @@ def _threshold_by_numpy(strengths, mode, nonzero):
     proportional = own.max_proportion * float(strengths.max()) + own.min_proportion * float(strengths.min())
     values = {"FIXED": own.fixed_threshold, "PROPORTIONAL": proportional, "OTSU": otsu}
     return max(values.get(mode.value, own.otsu_multiplier * otsu), own.min_threshold)
-
-
-def test_fixed_keeps_what_is_above_the_value():
-    assert _kept([65, 66, 67, 200], mode="FIXED", fixed_threshold=66) == [67, 200]
 
 
 def test_proportional_weighs_the_strongest_and_the_weakest():
@@ -105,15 +179,6 @@ def test_stamps_go_with_their_points(strengths):
     np.testing.assert_array_equal(kept.time_stamps, kept.points[:, 0] + 1.0)
 
 
-def test_the_last_point_above_and_nothing_removed_is_no_special_case():
-    assert _kept([70, 80, 90], mode="FIXED", fixed_threshold=66) == [70, 80, 90]
-
-
-def test_points_that_are_all_below_leave_an_empty_cloud():
-    kept = Thresholder(ThresholderParameters(mode="FIXED", fixed_threshold=255))(cloud_of([1, 2, 3]))
-    assert len(kept) == len(kept.time_stamps) == 0
-
-
 @pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
 def test_an_empty_cloud_stays_empty(mode):
     assert _kept([], mode=mode) == []
@@ -122,14 +187,6 @@ def test_an_empty_cloud_stays_empty(mode):
 @pytest.mark.parametrize("mode", ["OTSU", "OTSU+PROPORTIONAL"])
 def test_silence_has_no_echoes(mode):
     assert _kept([0, 0, 0], mode=mode) == []
-
-
-@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
-def test_points_that_are_not_finite_are_removed_and_do_not_move_the_threshold(mode):
-    strengths = [5.0, 100.0, 200.0]
-    cloud = cloud_of([*strengths, np.nan, np.inf, 250.0])
-    cloud.points[5, 1] = np.nan
-    assert Thresholder(ThresholderParameters(mode=mode))(cloud).points[:, 3].tolist() == _kept(strengths, mode=mode)
 
 
 def test_an_organised_cloud_keeps_its_shape_and_its_stamps():
@@ -158,13 +215,6 @@ def test_header_and_frame_are_those_of_the_scan():
     assert (kept.stamp_ns, kept.frame_id) == (5 * 10**9, "odom")
 
 
-def test_points_that_an_earlier_stage_removed_have_no_say_in_the_threshold():
-    strengths = [10.0, 20.0, 90.0, 95.0]
-    thresholder = Thresholder(ThresholderParameters(mode="OTSU"))
-    thresholder(cloud_of([*strengths, np.nan, np.nan], height=2))
-    assert thresholder.newest_threshold == otsu_threshold(np.array(strengths))
-
-
 def test_the_newest_threshold_can_be_read():
     thresholder = Thresholder(ThresholderParameters(mode="FIXED", fixed_threshold=66))
     assert thresholder.newest_threshold is None
@@ -187,3 +237,21 @@ def test_echoes_that_are_all_equally_strong_do_not_pass_the_floor():
 
 def test_two_strengths_above_zero_are_separated():
     assert _kept([0, 10, 200], mode="OTSU") == [200]
+
+
+def _noticed(scans):
+    """Return the numbers of the scans, from 1 on, at which a stage is noticed."""
+    emptied = EmptiedScans()
+    return [number for number, (before, after) in enumerate(scans, 1) if emptied.take(before, after)]
+
+
+def test_every_tenth_scan_in_a_row_without_a_point_is_noticed():
+    assert _noticed([(5, 0)] * 35) == [10, 20, 30]
+
+
+def test_one_point_that_passes_begins_the_count_anew():
+    assert not _noticed([(5, 0)] * 9 + [(5, 1)] + [(5, 0)] * 9)
+
+
+def test_scans_that_come_without_points_are_not_counted():
+    assert _noticed([(5, 0)] * 9 + [(0, 0)] * 5 + [(5, 0), (0, 0)]) == [15]

@@ -1,0 +1,225 @@
+"""What beams and clouds refuse to be and hold; where the bins of a beam lie, and how its errors are put right."""
+
+import math
+
+import numpy as np
+import pytest
+from clouds import beam_of, cloud_of
+from hypothesis import given
+from hypothesis import strategies as st
+
+from node_support.errors import RefusedInput
+from node_support.geometry import pose_matrix, wrapped
+from node_support.parameters import ParameterError
+from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.parameters import BeamCorrection, MountingParameters
+from sonar_processing.beams.projection import project_beams
+from sonar_processing.cloud import Cloud
+
+ANGLES = st.floats(-7.0, 7.0)
+SHIFTS = st.tuples(*[st.floats(-100.0, 100.0)] * 3)
+BEAM = Beam(5_000_000_001, "sonar", 0.1, np.arange(4, dtype=np.uint8), 0.5)
+
+
+def _beam(bins=3, **values):
+    defaults = {"stamp_ns": 1, "frame_id": "sonar", "angle": 0.0, "range_resolution": 0.1}
+    return Beam(intensities=np.zeros(bins, dtype=np.uint8), **{**defaults, **values})
+
+
+@pytest.mark.parametrize("bins", [0, 4097, 10000])
+def test_a_beam_has_1_to_4096_bins(bins):
+    with pytest.raises(RefusedInput, match=f"^{bins} bins, must be 1 to 4096") as refused:
+        _beam(bins)
+    assert refused.value.kind == "beams refused"
+
+
+@pytest.mark.parametrize("bins", [1, 4096])
+def test_the_first_and_the_last_allowed_number_of_bins_are_taken(bins):
+    assert len(_beam(bins).ranges) == bins
+
+
+@pytest.mark.parametrize("resolution", [0.0, -0.1, math.nan, math.inf])
+def test_bins_have_a_length(resolution):
+    with pytest.raises(RefusedInput, match=f"range_resolution {resolution}"):
+        _beam(range_resolution=resolution)
+
+
+@pytest.mark.parametrize("resolution", [2.51, 1e6, 1e30, 1e308])
+def test_a_beam_reaches_10_km_at_most(resolution):
+    with pytest.raises(RefusedInput, match="must be at most 10000 m") as refused:
+        _beam(4000, range_resolution=resolution)
+    assert refused.value.kind == "beams refused"
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("name", ["angle", "sensor_angle"])
+def test_head_and_servo_point_somewhere(name, value):
+    with pytest.raises(RefusedInput, match=str(value)):
+        _beam(**{name: value})
+
+
+def test_a_beam_without_a_frame_is_refused():
+    with pytest.raises(RefusedInput, match="frame_id is empty"):
+        _beam(frame_id="")
+
+
+def test_ranges_are_those_of_the_bins_centres():
+    np.testing.assert_allclose(_beam(4, range_resolution=0.5).ranges, (0.25, 0.75, 1.25, 1.75))
+
+
+@pytest.mark.parametrize("stamps", [0, 2, 4])
+def test_a_cloud_has_as_many_stamps_as_points(stamps):
+    with pytest.raises(RefusedInput, match=f"3 points but {stamps} time stamps") as refused:
+        Cloud(np.zeros((3, 4), dtype=np.float32), np.zeros(stamps), 0, "odom")
+    assert refused.value.kind == "clouds refused"
+
+
+@pytest.mark.parametrize("height", [0, -1, 4])
+def test_the_points_of_a_cloud_fill_its_rows(height):
+    with pytest.raises(RefusedInput, match=f"6 points do not fill {height} rows"):
+        cloud_of([1] * 6, height)
+
+
+@pytest.mark.parametrize("column", range(4))
+@pytest.mark.parametrize("value", [np.nan, np.inf])
+def test_a_point_with_a_value_that_is_not_finite_is_not_valid(column, value):
+    cloud = cloud_of([1, 2, 3])
+    cloud.points[1, column] = value
+    assert cloud.valid.tolist() == [True, False, True]
+
+
+def test_a_point_with_a_stamp_that_is_not_finite_is_not_valid():
+    cloud = cloud_of([1, 2, 3])
+    cloud.time_stamps[0] = np.nan
+    assert cloud.valid.tolist() == [False, True, True]
+
+
+def test_points_beyond_a_limit_are_told_from_those_that_were_removed():
+    cloud = cloud_of([1, 2, 3, 4, 5])
+    cloud.points[:, 1] = 100.0, -100.1, 3e38, np.nan, -np.inf
+    assert cloud.beyond(100.0).tolist() == [False, True, True, False, True]
+
+
+def test_selected_points_keep_their_stamps():
+    selected = cloud_of([10, 20, 30]).select(np.array([True, False, True]))
+    assert selected.points[:, 3].tolist() == [10, 30]
+    assert selected.time_stamps.tolist() == [1, 3]
+
+
+def test_an_organised_cloud_keeps_its_shape_when_points_are_selected():
+    selected = cloud_of([10, 20, 30, 40], height=2).select(np.array([True, False, True, False]))
+    assert selected.is_organized
+    assert np.isnan(selected.points[:, 0]).tolist() == [False, True, False, True]
+    assert selected.time_stamps.tolist() == [1, 2, 3, 4]
+    assert selected.points.dtype == np.float32
+
+
+def _pose(shift=(0.0, 0.0, 0.0), rotation=(0.0, 0.0, 0.0)):
+    return pose_matrix(shift, rotation)
+
+
+def _projected(beam, pose=None, sides=1, width=0.0436):
+    T_target_sonar = _pose() if pose is None else pose
+    return project_beams([beam], T_target_sonar[np.newaxis], sides, width)[0]
+
+
+def test_a_bin_lies_at_its_centre():
+    points = _projected(beam_of((1, 2, 3), resolution=0.1))
+    np.testing.assert_allclose(points[:, 0], (0.05, 0.15, 0.25), rtol=1e-6)
+
+
+def test_the_head_turns_counter_clockwise_from_x():
+    np.testing.assert_allclose(_projected(beam_of(angle=math.pi / 2))[:, :2], [(0, 0.5), (0, 1.5), (0, 2.5)], atol=1e-6)
+
+
+def test_strengths_stay_with_their_bins():
+    assert _projected(beam_of((7, 0, 255)))[:, 3].tolist() == [7, 0, 255]
+
+
+def test_a_sonar_tilted_down_sends_its_bins_down():
+    points = _projected(beam_of(), _pose((0, 0, -1), (0.0, math.pi / 2, 0.0)))
+    np.testing.assert_allclose(points[:, :3], [(0, 0, -1.5), (0, 0, -2.5), (0, 0, -3.5)], atol=1e-6)
+
+
+@given(ANGLES, SHIFTS, st.tuples(ANGLES, ANGLES, ANGLES))
+def test_every_bin_goes_through_the_transform(angle, shift, rotation):
+    beam, pose = beam_of(range(20), angle), _pose(shift, rotation)
+    expected = [
+        pose @ (distance * math.cos(angle), distance * math.sin(angle), 0.0, 1.0) for distance in np.arange(20) + 0.5
+    ]
+    np.testing.assert_allclose(_projected(beam, pose)[:, :3], np.array(expected)[:, :3], rtol=1e-5, atol=1e-4)
+
+
+@pytest.mark.parametrize("sides", [2, 3, 15])
+def test_dispersed_points_spread_evenly_across_the_beams_width(sides):
+    points = _projected(beam_of(angle=1.0), sides=sides, width=0.2).reshape(sides, 3, 4)
+    headings = np.arctan2(points[..., 1], points[..., 0])
+    np.testing.assert_allclose(headings, np.repeat(np.linspace(0.9, 1.1, sides)[:, np.newaxis], 3, axis=1), rtol=1e-6)
+
+
+@pytest.mark.parametrize("sides", [2, 3, 15])
+def test_dispersed_points_keep_range_and_strength(sides):
+    points = _projected(beam_of((4, 5, 6)), sides=sides).reshape(sides, 3, 4)
+    np.testing.assert_allclose(np.hypot(points[..., 0], points[..., 1]), [[0.5, 1.5, 2.5]] * sides, rtol=1e-6)
+    assert points[..., 3].tolist() == [[4, 5, 6]] * sides
+
+
+def test_one_point_lies_on_the_axis_however_wide_the_beam():
+    np.testing.assert_array_equal(_projected(beam_of(), width=0.5), _projected(beam_of(), width=0.0))
+
+
+@given(st.floats(-100.0, 100.0))
+def test_wrapped_angles_point_the_same_way_within_half_a_turn(angle):
+    result = wrapped(angle)
+    assert -math.pi <= result < math.pi
+    assert math.cos(result - angle) == pytest.approx(1.0)
+
+
+def _first_bin(angle, **mounting):
+    """Return x y z of the first bin, at 0.5 m, of a beam at a head angle, in the vehicle's frame."""
+    T_base_sonar = MountingParameters(**mounting).matrix()
+    return project_beams([beam_of(angle=angle)], T_base_sonar[np.newaxis], 1, 0.0)[0, 0, :3]
+
+
+@pytest.mark.parametrize(
+    ("angle", "mounting", "expected"),
+    [
+        (0.0, {}, (0.5, 0.0, 0.0)),
+        (math.pi / 2, {}, (0.0, 0.5, 0.0)),
+        (0.0, {"mount_yaw": math.pi / 2}, (0.0, 0.5, 0.0)),
+        (math.pi / 2, {"upside_down": True}, (0.0, -0.5, 0.0)),
+        (math.pi / 2, {"upside_down": True, "mount_yaw": math.pi / 2}, (0.5, 0.0, 0.0)),
+        (0.0, {"mount_x": 1.0, "mount_y": -2.0, "mount_z": 3.0}, (1.5, -2.0, 3.0)),
+    ],
+)
+def test_angle_0_points_along_mount_yaw_and_an_upside_down_head_turns_the_other_way(angle, mounting, expected):
+    np.testing.assert_allclose(_first_bin(angle, **mounting), expected, atol=1e-6)
+
+
+def test_a_mounting_out_of_range_is_refused():
+    with pytest.raises(ParameterError, match="mount_x"):
+        MountingParameters(mount_x=1000.0)
+
+
+def test_nothing_wrong_changes_nothing():
+    assert BeamCorrection().corrected(BEAM) == BEAM
+
+
+def test_the_delay_is_added_to_the_nanosecond():
+    assert BeamCorrection(sonar_delay=0.25).corrected(BEAM).stamp_ns == 5_250_000_001
+    assert BeamCorrection(sonar_delay=-5.0).corrected(BEAM).stamp_ns == 1
+
+
+def test_ranges_are_scaled():
+    np.testing.assert_allclose(BeamCorrection(range_scale=0.9).corrected(BEAM).ranges, 0.9 * BEAM.ranges)
+
+
+def test_the_rest_of_the_beam_stays():
+    found = BeamCorrection(1.0, 1.1).corrected(BEAM)
+    assert (found.frame_id, found.angle, found.sensor_angle) == (BEAM.frame_id, BEAM.angle, BEAM.sensor_angle)
+    np.testing.assert_array_equal(found.intensities, BEAM.intensities)
+
+
+def test_a_beam_before_time_0_is_refused():
+    with pytest.raises(RefusedInput, match=r"stamp -5\.000 s, below 0; check sonar_delay"):
+        BeamCorrection(sonar_delay=-10.0).corrected(BEAM)
