@@ -6,7 +6,6 @@ import random
 import shutil
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 import unittest
@@ -16,9 +15,8 @@ from typing import Set
 
 import numpy as np
 import rospy
-import rostest
 from geometry_msgs.msg import Point
-from graph import PACKAGE_ROOT, PATIENCE, forget_links, wait_for_publisher_links, wait_until
+from graph import PACKAGE_ROOT, PATIENCE, forget_links, run, wait_for_publisher_links, wait_until
 
 from mlsm_manager.surface_map.map_file import read_map
 from sonar_processing.cloud import Cloud
@@ -161,5 +159,4 @@ class AutosaveKills(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("autosave_kills")
-    rostest.rosrun("underwater_map_construction", "autosave_kills", AutosaveKills, sys.argv)
+    run(AutosaveKills)

@@ -6,10 +6,9 @@ import sys
 import unittest
 
 import rospy
-import rostest
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
-from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 
 from underwater_map_construction.msg import SonarScanLine
@@ -110,5 +109,4 @@ class BadBeams(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("bad_beams")
-    rostest.rosrun("underwater_map_construction", "bad_beams", BadBeams, sys.argv)
+    run(BadBeams)

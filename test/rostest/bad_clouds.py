@@ -1,13 +1,11 @@
 #!/usr/bin/env python3
 """No cloud can end a stage: what cannot be used is counted, and the next cloud passes."""
 
-import sys
 import unittest
 
 import numpy as np
 import rospy
-import rostest
-from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 
 from sonar_processing.cloud import Cloud
@@ -127,5 +125,4 @@ class BadClouds(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("bad_clouds")
-    rostest.rosrun("underwater_map_construction", "bad_clouds", BadClouds, sys.argv)
+    run(BadClouds)

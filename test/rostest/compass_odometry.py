@@ -5,9 +5,8 @@ import math
 import unittest
 
 import rospy
-import rostest
 from geometry_msgs.msg import Quaternion
-from graph import Diagnostics, Inbox, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
@@ -128,5 +127,4 @@ def _yaw(orientation: Quaternion) -> float:
 
 
 if __name__ == "__main__":
-    rospy.init_node("compass_odometry")
-    rostest.rosrun(PACKAGE, "compass_odometry", DeadReckoning)
+    run(DeadReckoning)

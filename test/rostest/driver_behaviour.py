@@ -1,14 +1,13 @@
 """What every sonar's driver does with an emulated head in a square basin."""
 
 import math
-import subprocess
 from typing import Any, Callable, ClassVar, Dict, List
 
 import numpy as np
 import rospy
 from driver_listener import ERROR, beams, diagnostics, level, values
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE_ROOT, PATIENCE
+from graph import PACKAGE_ROOT, PATIENCE, ended
 from sensor_msgs.msg import JointState
 
 from underwater_map_construction.srv import OrderFault
@@ -124,9 +123,7 @@ class DriverBehaviour:
     def start_driver(self, argument: str) -> List[str]:
         """Run a second driver until it ends with status 1; return the lines it printed."""
         command = [str(PACKAGE_ROOT / f"nodes/{self.sonar}_driver"), "__name:=second_driver", argument]
-        done = subprocess.run(
-            command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE, check=False
-        )
+        done = ended(command)
         rospy.delete_param("second_driver")
         assert done.returncode == 1, done.stdout
         return done.stdout.splitlines()

@@ -2,8 +2,8 @@
 import unittest
 
 import rospy
-import rostest
 from driver_listener import Listener, beams
+from graph import run
 from sensor_msgs.msg import PointCloud2
 
 
@@ -17,5 +17,4 @@ class TestEmulatedGraph(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("driver_emulated")
-    rostest.rosrun("underwater_map_construction", "driver_emulated", TestEmulatedGraph)
+    run(TestEmulatedGraph)

@@ -1,17 +1,15 @@
 #!/usr/bin/env python3
 """Beams of other packages' types, published on sonar/raw, become scans; what is no beam is counted."""
 
-import sys
 import time
 import unittest
 from typing import Any
 
 import numpy as np
 import rospy
-import rostest
 from foreign_messages import message_classes, sane_message
 from fuzzed_beams import Fuzzer
-from graph import Diagnostics, Inbox, end_publishing, rows, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, rows, run, wait_for_publisher_links
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import String
@@ -130,5 +128,4 @@ class ForeignBeams(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("foreign_beams")
-    rostest.rosrun("underwater_map_construction", "foreign_beams", ForeignBeams, sys.argv)
+    run(ForeignBeams)

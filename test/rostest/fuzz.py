@@ -19,11 +19,10 @@ from typing import Any, Dict, List, Set, Tuple
 import numpy as np
 import rosgraph
 import rospy
-import rostest
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import TransformStamped
-from graph import PATIENCE, Inbox, wait_for_publisher_links, wait_until
+from graph import PATIENCE, Inbox, run, wait_for_publisher_links, wait_until
 from random_messages import RandomMessages
 from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
@@ -213,5 +212,4 @@ def _lives(pid: int) -> bool:
 
 
 if __name__ == "__main__":
-    rospy.init_node("fuzz")
-    rostest.rosrun("underwater_map_construction", "fuzz", Fuzz, sys.argv)
+    run(Fuzz)

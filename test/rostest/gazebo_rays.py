@@ -2,16 +2,14 @@
 """Ray scans of three types, from a sensor that sees the whole circle and from one that a joint turns, become beams."""
 
 import math
-import sys
 import unittest
 
 import numpy as np
 import rospy
-import rostest
 import tf2_ros
 from gazebo_scans import FULL_CIRCLE, block_laser, cloud2, header, laser_scan
 from geometry_msgs.msg import TransformStamped
-from graph import Diagnostics, Inbox, end_publishing, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, run, wait_for_publisher_links
 from sensor_msgs.msg import JointState, LaserScan, PointCloud, PointCloud2
 from std_msgs.msg import String
 
@@ -113,5 +111,4 @@ class GazeboSonar(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("gazebo_rays_test")
-    rostest.rosrun(PACKAGE, "gazebo_rays", GazeboSonar, sys.argv)
+    run(GazeboSonar)

@@ -2,6 +2,7 @@
 
 import os
 import subprocess
+import sys
 import threading
 import time
 import unittest
@@ -9,12 +10,13 @@ import xmlrpc.client
 from contextlib import contextmanager
 from http.client import HTTPException
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Tuple, Type
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
 import rosgraph
 import rospy
+import rostest
 from diagnostic_msgs.msg import DiagnosticArray
 
 PACKAGE = "underwater_map_construction"
@@ -24,6 +26,21 @@ TEST_DATA = PACKAGE_ROOT / "test/data"
 PATIENCE = 180.0
 # s: for the end of a simulation or a playback with which a machine cannot keep up.
 LONG_PATIENCE = 600.0
+
+
+def run(case: Type[unittest.TestCase], **options: Any) -> None:
+    """Run the tests of a script under rostest; `options` are those of rospy.init_node."""
+    name = Path(sys.argv[0]).stem
+    rospy.init_node(name, **options)
+    rostest.rosrun(PACKAGE, name, case, sys.argv)
+
+
+def ended(command: List[str], seconds: float = PATIENCE, **environment: str) -> "subprocess.CompletedProcess[str]":
+    """Run a program that must end by itself; what it says on stderr is in its stdout too."""
+    return subprocess.run(
+        command, env={**os.environ, **environment}, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True,
+        timeout=seconds, check=False,
+    )  # fmt: skip
 
 
 def recording(name: str) -> Path:

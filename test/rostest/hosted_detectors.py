@@ -1,13 +1,10 @@
 #!/usr/bin/env python3
 """The detectors in the process of the other stages find what they find as nodes, on the same topics."""
 
-import sys
 import unittest
 
 import rosgraph
-import rospy
-import rostest
-from graph import TEST_DATA, Diagnostics, Inbox, wait_for_subscribers
+from graph import TEST_DATA, Diagnostics, Inbox, run, wait_for_subscribers
 from playback import play, steps_every
 
 from sonar_processing.ros.conversions import cloud_from_message
@@ -67,5 +64,4 @@ class HostedDetectors(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("hosted_detectors_test")
-    rostest.rosrun("underwater_map_construction", "hosted_detectors", HostedDetectors, sys.argv)
+    run(HostedDetectors)

@@ -3,8 +3,8 @@ import math
 import unittest
 
 import rospy
-import rostest
-from driver_behaviour import PACKAGE, DriverBehaviour
+from driver_behaviour import DriverBehaviour
+from graph import run
 
 DEFAULTS = {
     "max_range": 20,
@@ -60,5 +60,4 @@ class TestDriver(DriverBehaviour, unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("imagenex_852_driver_test")
-    rostest.rosrun(PACKAGE, "imagenex_852_driver_test", TestDriver)
+    run(TestDriver)

@@ -5,7 +5,7 @@ import threading
 import unittest
 
 import rospy
-import rostest
+from graph import run
 
 _HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path.insert(0, os.path.join(_HERE, os.pardir, "unit", "imagenex_852_driver"))
@@ -59,5 +59,4 @@ class TestFaults(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("imagenex_852_faults")
-    rostest.rosrun("underwater_map_construction", "imagenex_852_faults", TestFaults)
+    run(TestFaults)

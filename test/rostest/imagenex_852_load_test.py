@@ -2,8 +2,8 @@
 import unittest
 
 import rospy
-import rostest
 from driver_load import is_once
+from graph import run
 
 # One turn: travel there and back over 5 m, 27 bytes out and 513 back at 115200 baud.
 FASTEST_RATE = 1.0 / (2 * 5.0 / 1500.0 + (27 + 513) * 10 / 115200)
@@ -23,5 +23,4 @@ class TestLoad(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("imagenex_852_load")
-    rostest.rosrun("underwater_map_construction", "imagenex_852_load", TestLoad)
+    run(TestLoad)

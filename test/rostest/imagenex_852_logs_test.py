@@ -9,9 +9,8 @@ from pathlib import Path
 
 import rosbag
 import rospy
-import rostest
 from driver_listener import beams, diagnostics, values
-from graph import PATIENCE, recording
+from graph import ended, recording, run
 
 from imagenex_852_driver.log_file import LogReader, LogWriter
 from imagenex_852_driver.log_record import LoggedPing
@@ -25,12 +24,6 @@ START = 1447000000.0
 def tool(name, *arguments):
     """Return the command that runs one of the tools."""
     return ["rosrun", PACKAGE, name, *map(str, arguments)]
-
-
-def output_of(command):
-    """Run a tool to its end; return its status and all it printed."""
-    done = subprocess.run(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=PATIENCE)
-    return done.returncode, done.stdout
 
 
 def logged(index):
@@ -55,11 +48,11 @@ class TestLogs(unittest.TestCase):
         """Return the beams that play_852 publishes, and what it prints."""
         listener = beams()
         self.addCleanup(listener.close)
-        status, text = output_of(tool("play_852", path, "--rate", 200, "--wait-for-subscribers", *options))
-        assert status == 0, text
-        published = int(text.split(" beams published")[0].split()[-1])
+        done = ended(tool("play_852", path, "--rate", 200, "--wait-for-subscribers", *options))
+        assert done.returncode == 0, done.stdout
+        published = int(done.stdout.split(" beams published")[0].split()[-1])
         assert listener.wait(lambda received: len(received) >= published)
-        return listener.received, text
+        return listener.received, done.stdout
 
     def test_play_publishes_every_ping_in_order(self):
         received, _ = self.play(self.log)
@@ -83,14 +76,14 @@ class TestLogs(unittest.TestCase):
         assert (len(received), kinds) == (177, {(500, 50.0, 12)})
 
     def test_play_of_no_file_ends_with_one_line(self):
-        status, text = output_of(tool("play_852", self.folder / "none.852"))
-        assert (status, len(text.splitlines())) == (1, 1)
-        assert "No such file" in text
+        done = ended(tool("play_852", self.folder / "none.852"))
+        assert (done.returncode, len(done.stdout.splitlines())) == (1, 1)
+        assert "No such file" in done.stdout
 
     def convert(self, *arguments):
         bag = self.folder / "out.bag"
-        status, text = output_of(tool("convert_852", *arguments, "--out", bag))
-        assert status == 0, text
+        done = ended(tool("convert_852", *arguments, "--out", bag))
+        assert done.returncode == 0, done.stdout
         with rosbag.Bag(str(bag)) as opened:
             return list(opened.read_messages())
 
@@ -103,9 +96,9 @@ class TestLogs(unittest.TestCase):
     def test_convert_refuses_what_is_no_log(self):
         stranger, bag = self.folder / "notes.txt", self.folder / "strange.bag"
         stranger.write_text("852 is a sonar\n" * 100)
-        status, text = output_of(tool("convert_852", stranger, "--out", bag))
-        assert status == 1
-        assert text.strip() == f"convert_852: {stranger}: not a .852 log, no ping in it; nothing was written"
+        done = ended(tool("convert_852", stranger, "--out", bag))
+        assert done.returncode == 1
+        assert done.stdout.strip() == f"convert_852: {stranger}: not a .852 log, no ping in it; nothing was written"
         assert not bag.exists()
 
     def test_convert_paces_a_log_without_times(self):
@@ -133,5 +126,4 @@ class TestLogs(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("imagenex_852_logs")
-    rostest.rosrun(PACKAGE, "imagenex_852_logs", TestLogs)
+    run(TestLogs)

@@ -2,16 +2,14 @@
 """What the map tells the world: map -> odom steadily, all of itself to late subscribers, files where it may write."""
 
 import shutil
-import sys
 import unittest
 from pathlib import Path
 from typing import List
 
 import numpy as np
 import rospy
-import rostest
 from geometry_msgs.msg import Point
-from graph import Inbox, wait_for_publisher_links
+from graph import Inbox, run, wait_for_publisher_links
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
@@ -139,5 +137,4 @@ def comes_steadily(messages: List[TFMessage]) -> bool:
 
 
 if __name__ == "__main__":
-    rospy.init_node("map_services")
-    rostest.rosrun("underwater_map_construction", "map_services", MapServices, sys.argv)
+    run(MapServices)

@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """The live graph does on a real marina what map_bag did: live.yaml holds all that it takes."""
 
-import sys
 import tempfile
 import unittest
 from functools import partial
@@ -11,8 +10,7 @@ from typing import Any, List, Tuple
 import numpy as np
 import rosbag
 import rospy
-import rostest
-from graph import TEST_DATA, Diagnostics, Inbox, recording, rows, wait_for_subscribers, wait_until
+from graph import TEST_DATA, Diagnostics, Inbox, recording, rows, run, wait_for_subscribers, wait_until
 from nav_msgs.msg import Odometry
 from playback import Step, play
 from scipy.spatial import cKDTree
@@ -143,5 +141,4 @@ def planar(position: Any, rotation: Any) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    rospy.init_node("marina_test")
-    rostest.rosrun("underwater_map_construction", "marina", Marina, sys.argv)
+    run(Marina)

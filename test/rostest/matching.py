@@ -1,15 +1,13 @@
 #!/usr/bin/env python3
 """A vehicle whose odometry is 30 % wrong knows where it is, once startMatching says so (thesis 7.4)."""
 
-import sys
 import unittest
 from contextlib import ExitStack
 
 import numpy as np
 import rospy
-import rostest
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
-from graph import LONG_PATIENCE, PACKAGE_ROOT, Diagnostics, Inbox, launched, wait_for_publisher_links
+from graph import LONG_PATIENCE, PACKAGE_ROOT, Diagnostics, Inbox, launched, run, wait_for_publisher_links
 from nav_msgs.msg import Odometry, Path
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
@@ -109,6 +107,4 @@ def place(message: object) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    rospy.init_node("matching_test")
-
-    rostest.rosrun("underwater_map_construction", "matching", Matching, sys.argv)
+    run(Matching)

@@ -1,14 +1,11 @@
 #!/usr/bin/env python3
 """A real Micron of another team, in its own message type and without any tf: every beam arrives in the map."""
 
-import sys
 import unittest
 from contextlib import ExitStack
 
 import numpy as np
-import rospy
-import rostest
-from graph import LONG_PATIENCE, Diagnostics, Inbox, launched, recording, rows
+from graph import LONG_PATIENCE, Diagnostics, Inbox, launched, recording, rows, run
 from sensor_msgs.msg import PointCloud2
 
 BEAMS = 2028
@@ -54,5 +51,4 @@ class MicronScanLine(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("micron_scan_line")
-    rostest.rosrun("underwater_map_construction", "micron_scan_line", MicronScanLine, sys.argv)
+    run(MicronScanLine)

@@ -1,13 +1,10 @@
 #!/usr/bin/env python3
 """A real Tritech Micron in a rectangular tank: four straight walls, no ring around the head."""
 
-import sys
 import unittest
 
 import numpy as np
-import rospy
-import rostest
-from graph import Inbox, recording, rows, wait_for_subscribers
+from graph import Inbox, recording, rows, run, wait_for_subscribers
 from playback import play
 from sensor_msgs.msg import PointCloud2
 
@@ -62,5 +59,4 @@ def longest_gap(positions: np.ndarray, first: float, last: float) -> float:
 
 
 if __name__ == "__main__":
-    rospy.init_node("micron_tank")
-    rostest.rosrun("underwater_map_construction", "micron_tank", MicronTank, sys.argv)
+    run(MicronTank)

@@ -1,14 +1,12 @@
 #!/usr/bin/env python3
 """The table behind docs/nodes.md and --help lists the topics and services that the nodes really have."""
 
-import sys
 import unittest
 from typing import Dict, Set
 
 import rosgraph
 import rospy
-import rostest
-from graph import Inbox, wait_until
+from graph import Inbox, run, wait_until
 from sensor_msgs.msg import Image
 
 from mlsm_manager.ros.map_publisher import has_octomap_messages
@@ -74,5 +72,4 @@ def _told(node: str, role: Role) -> Set[str]:
 
 
 if __name__ == "__main__":
-    rospy.init_node("node_topics_test")
-    rostest.rosrun(PACKAGE, "node_topics", NodeTopics, sys.argv)
+    run(NodeTopics)

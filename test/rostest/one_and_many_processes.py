@@ -1,16 +1,13 @@
 #!/usr/bin/env python3
 """A recorded tour of the basin gives the basin's walls, whether the stages share a process or not."""
 
-import sys
 import unittest
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Dict, List
 
 import numpy as np
-import rospy
-import rostest
-from graph import TEST_DATA, Inbox, launched, rows, wait_for_links, wait_for_subscribers
+from graph import TEST_DATA, Inbox, launched, rows, run, wait_for_links, wait_for_subscribers
 from playback import Step, play, steps_every
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
@@ -148,5 +145,4 @@ def walls() -> list:
 
 
 if __name__ == "__main__":
-    rospy.init_node("one_and_many_processes")
-    rostest.rosrun("underwater_map_construction", "one_and_many_processes", OneAndManyProcesses, sys.argv)
+    run(OneAndManyProcesses)

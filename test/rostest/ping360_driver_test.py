@@ -2,10 +2,9 @@
 import math
 import unittest
 
-import rospy
-import rostest
-from driver_behaviour import PACKAGE, DriverBehaviour
+from driver_behaviour import DriverBehaviour
 from driver_listener import diagnostics, values
+from graph import run
 
 DEFAULTS = {
     "max_range": 8.0,
@@ -77,5 +76,4 @@ class TestDriver(DriverBehaviour, unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("ping360_driver_test")
-    rostest.rosrun(PACKAGE, "ping360_driver_test", TestDriver)
+    run(TestDriver)

@@ -5,7 +5,7 @@ import threading
 import unittest
 
 import rospy
-import rostest
+from graph import run
 
 _HERE = os.path.dirname(os.path.realpath(__file__))
 sys.path[:0] = [os.path.join(_HERE, os.pardir, "unit", name) for name in ("ping360_driver", "sonar_driver")]
@@ -55,5 +55,4 @@ class TestFaults(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("ping360_faults")
-    rostest.rosrun("underwater_map_construction", "ping360_faults", TestFaults)
+    run(TestFaults)

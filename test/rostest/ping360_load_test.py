@@ -3,9 +3,8 @@ import socket
 import unittest
 
 import rospy
-import rostest
 from driver_load import is_once
-from graph import launched
+from graph import launched, run
 
 # A turn of a real head at 2 m takes 9 s (manufacturer's specification).
 REAL_RATE = 400 / 9.0
@@ -35,5 +34,4 @@ def _free_port() -> int:
 
 
 if __name__ == "__main__":
-    rospy.init_node("ping360_load")
-    rostest.rosrun("underwater_map_construction", "ping360_load", TestLoad)
+    run(TestLoad)

@@ -1,35 +1,50 @@
 #!/usr/bin/env python3
-"""play_bag.launch maps a recording by itself, whatever else the recording holds."""
+"""play_bag.launch maps a recording by itself, whatever else it holds, and though the mapping stands still."""
 
-import sys
+import os
+import signal
+import threading
 import unittest
+import xmlrpc.client
 from contextlib import ExitStack
 
-import rospy
-import rostest
+import rosbag
+import rosgraph
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import TEST_DATA, Inbox, launched
+from graph import TEST_DATA, Diagnostics, Inbox, launched, run
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 
+BAG = TEST_DATA / "basin.bag"
+STOP = 2.0  # s: as a busy machine stops a process
+
 
 class PlayBag(unittest.TestCase):
-    """Waits for what the launch file alone brings about."""
+    """Plays a recording of three minutes in fifteen seconds, and waits for what the launch file alone brings about."""
 
     @classmethod
     def setUpClass(cls) -> None:
         """Listen before the launch file is started."""
         cls.maps, cls.clocks = Inbox("/MLSM/cloud", PointCloud2), Inbox("/clock", Clock)
-        cls.fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
         playback = ExitStack()
         cls.addClassCleanup(playback.close)
-        arguments = (f"bag:={TEST_DATA}/basin.bag", "rate:=20", "matching:=true", "rviz:=false")
+        arguments = (f"bag:={BAG}", "rate:=12", "matching:=true", "rviz:=false")
         playback.enter_context(launched("play_bag.launch", *arguments))
+        with rosbag.Bag(str(BAG)) as bag:
+            cls.beams = bag.get_message_count("/sonar/raw")
+        for placed in (1, cls.beams // 2, cls.beams - 150):
+            cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", placed)
+            stop("/mapping")
 
     def test_a_map_grows_and_scans_are_matched(self) -> None:
         """Without anybody to start the player."""
         self.fixes.wait_for_number(2)
         self.maps.wait_for(lambda cloud: cloud.width > 300)
+
+    def test_every_beam_is_placed_though_the_mapping_stands_still_for_two_seconds(self) -> None:
+        """At the beginning, in the middle and before the last beam."""
+        self.diagnostics.wait_for("sonar_to_cloud", "beams placed", self.beams)
 
     def test_the_clock_never_stands_still(self) -> None:
         """It goes on in steps of 10 ms of wall time while messages are played."""
@@ -39,7 +54,17 @@ class PlayBag(unittest.TestCase):
         self.assertLess(max(steps), 0.3)
 
 
+def stop(node: str) -> None:
+    """Stop a node's process for two seconds."""
+    uri = rosgraph.Master("/play_bag_test").lookupNode(node)
+    _, _, process = xmlrpc.client.ServerProxy(uri).getPid("/play_bag_test")
+    os.kill(process, signal.SIGSTOP)
+    try:
+        threading.Event().wait(STOP)
+    finally:
+        os.kill(process, signal.SIGCONT)
+
+
 if __name__ == "__main__":
     # rospy itself takes one tick of the clock at a time, and drops the others that come meanwhile.
-    rospy.init_node("play_bag_test", disable_rostime=True)
-    rostest.rosrun("underwater_map_construction", "play_bag", PlayBag, sys.argv)
+    run(PlayBag, disable_rostime=True)

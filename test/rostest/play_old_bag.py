@@ -2,14 +2,11 @@
 """play_bag.launch and map_bag map a bag of avora_msgs types as it is, without `rosbag fix`."""
 
 import subprocess
-import sys
 import tempfile
 import unittest
 from pathlib import Path
 
-import rospy
-import rostest
-from graph import LONG_PATIENCE, PACKAGE, TEST_DATA, Inbox, launched
+from graph import LONG_PATIENCE, PACKAGE, TEST_DATA, Inbox, launched, run
 from old_bag import with_old_types
 from sensor_msgs.msg import PointCloud2
 
@@ -40,5 +37,4 @@ class PlayOldBag(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("play_old_bag_test")
-    rostest.rosrun(PACKAGE, "play_old_bag", PlayOldBag, sys.argv)
+    run(PlayOldBag)

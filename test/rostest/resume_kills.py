@@ -14,8 +14,7 @@ from typing import List
 
 import numpy as np
 import rospy
-import rostest
-from graph import PACKAGE_ROOT
+from graph import PACKAGE_ROOT, run
 from marina import replayed
 from resumed_vehicle import Fate, Kill, Mission, ResumedVehicle
 
@@ -98,5 +97,4 @@ def recorded_mission(bag: Path) -> Mission:
 
 
 if __name__ == "__main__":
-    rospy.init_node("resume_kills")
-    rostest.rosrun("underwater_map_construction", "resume_kills", ResumeKills, sys.argv)
+    run(ResumeKills)

@@ -2,13 +2,11 @@
 """Detectors of walls and circles: what they publish, and that no cloud can end them."""
 
 import math
-import sys
 import unittest
 
 import numpy as np
 import rospy
-import rostest
-from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -114,5 +112,4 @@ class Shapes(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("shapes_test")
-    rostest.rosrun("underwater_map_construction", "shapes", Shapes, sys.argv)
+    run(Shapes)

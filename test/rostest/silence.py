@@ -1,15 +1,13 @@
 #!/usr/bin/env python3
 """A vehicle with a compass alone hears nothing for two minutes, moves on, and finds itself again in its own map."""
 
-import sys
 import unittest
 from typing import Any
 
 import numpy as np
 import rospy
-import rostest
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import LONG_PATIENCE, PACKAGE, Diagnostics, Inbox, wait_for_publisher_links
+from graph import LONG_PATIENCE, Diagnostics, Inbox, run, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 
 from underwater_map_construction.msg import SonarScanLine
@@ -62,5 +60,4 @@ def _at(truth: Inbox, fix: PoseWithCovarianceStamped) -> np.ndarray:
 
 
 if __name__ == "__main__":
-    rospy.init_node("silence_test")
-    rostest.rosrun(PACKAGE, "silence", Silence, sys.argv)
+    run(Silence)

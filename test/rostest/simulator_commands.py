@@ -4,14 +4,12 @@
 import math
 import signal
 import subprocess
-import sys
 import time
 import unittest
 
 import rospy
-import rostest
 from geometry_msgs.msg import Twist
-from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, wait_for_publisher_links
+from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, run, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 
 ATTEMPTS = 5
@@ -95,5 +93,4 @@ class SimulatorCommands(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("simulator_commands_test")
-    rostest.rosrun(PACKAGE, "simulator_commands", SimulatorCommands, sys.argv)
+    run(SimulatorCommands)

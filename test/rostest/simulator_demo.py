@@ -1,13 +1,10 @@
 #!/usr/bin/env python3
 """The demo's graph: the simulated vehicle really moves 1.3 times what its odometry says."""
 
-import sys
 import unittest
 
 import numpy as np
-import rospy
-import rostest
-from graph import LONG_PATIENCE, PACKAGE, PACKAGE_ROOT, Diagnostics, Inbox, launched
+from graph import LONG_PATIENCE, PACKAGE_ROOT, Diagnostics, Inbox, launched, run
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker, MarkerArray
@@ -46,5 +43,4 @@ class SimulatorDemo(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("simulator_demo_test")
-    rostest.rosrun(PACKAGE, "simulator_demo", SimulatorDemo, sys.argv)
+    run(SimulatorDemo)

@@ -1,13 +1,11 @@
 #!/usr/bin/env python3
 """A vehicle that stands still, with a static odometry, keeps its place from scan to scan."""
 
-import sys
 import unittest
 
 import numpy as np
 import rospy
-import rostest
-from graph import Diagnostics, Inbox, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
@@ -70,5 +68,4 @@ def scan(start: float, moved: float) -> Cloud:
 
 
 if __name__ == "__main__":
-    rospy.init_node("standing_test")
-    rostest.rosrun("underwater_map_construction", "standing", Standing, sys.argv)
+    run(Standing)

@@ -2,13 +2,11 @@
 """The servo is stepped, the map gets a floor, and a service puts the sonar back to horizontal."""
 
 import math
-import sys
 import unittest
 
 import numpy as np
 import rospy
-import rostest
-from graph import PATIENCE, Diagnostics, Inbox
+from graph import PATIENCE, Diagnostics, Inbox, run
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, UInt32
 
@@ -82,5 +80,4 @@ class SonarControl(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("tilting")
-    rostest.rosrun("underwater_map_construction", "tilting", SonarControl, sys.argv)
+    run(SonarControl)

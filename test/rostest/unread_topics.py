@@ -2,15 +2,13 @@
 """What nobody reads is not made: no cloud, scan or image is serialised, and no echo is looked for."""
 
 import math
-import sys
 import unittest
 from typing import Callable, Iterable
 
 import rospy
-import rostest
 import tf2_ros
 from geometry_msgs.msg import TransformStamped
-from graph import Inbox, wait_for_publisher_links, wait_until
+from graph import Inbox, run, wait_for_publisher_links, wait_until
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
@@ -126,5 +124,4 @@ class UnreadTopics(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("unread_topics")
-    rostest.rosrun("underwater_map_construction", "unread_topics", UnreadTopics, sys.argv)
+    run(UnreadTopics)

@@ -1,12 +1,9 @@
 #!/usr/bin/env python3
 """vehicle.launch: beams become a map and walls, in the frames that its arguments name."""
 
-import sys
 import unittest
 
-import rospy
-import rostest
-from graph import Inbox
+from graph import Inbox, run
 from sensor_msgs.msg import PointCloud2
 
 from underwater_map_construction.msg import Walls
@@ -25,5 +22,4 @@ class Vehicle(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    rospy.init_node("vehicle_test")
-    rostest.rosrun("underwater_map_construction", "vehicle", Vehicle, sys.argv)
+    run(Vehicle)

@@ -2,19 +2,20 @@
 """A vehicle without a DVL, as a launch file of the package runs it, is where its fixes say.
 
 Parameters: ~launch_file, ~arguments (separated by blanks), ~fixes: how many are compared, ~farthest: m, median distance
-of the fixes from the truth, ~least_way: m, by which a vehicle that believes to stand still would be wrong at the end.
+of the fixes from the truth, ~least_way: m, by which a vehicle that believes to stand still would be wrong at the end,
+~least_reckoned: m, by which the odometry moves, because it is told the velocity; without it nothing is asked of it.
 """
 
-import sys
 import unittest
 from typing import Any
 
 import numpy as np
 import rospy
-import rostest
-from fixes_and_truth import followed
-from graph import PACKAGE
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph import LONG_PATIENCE, Inbox, launched, run
+from nav_msgs.msg import Odometry
 
+TOLD = 3.0  # stated deviations within which an error is expected
 LEAST_SHARE = 0.8  # of the fixes that are as near as they say: three deviations hold for nearly all
 
 
@@ -23,16 +24,36 @@ class VehicleFollowed(unittest.TestCase):
 
     def test_the_fixes_follow_the_truth_as_well_as_they_say(self) -> None:
         """Truth and fixes begin at the first fix."""
-        found = followed(_given("launch_file"), _given("arguments").split(), _given("fixes"))
-        self.assertLess(np.median(found.errors), _given("farthest"), f"errors {found.errors}, told {found.told}")
-        self.assertGreaterEqual(found.share_as_told, LEAST_SHARE, f"errors {found.errors}, told {found.told}")
-        self.assertGreater(found.way, _given("least_way"))
+        truth, odometry = Inbox("/ground_truth", Odometry), Inbox("/odom", Odometry)
+        fixes, count = Inbox("/MLSM/pose", PoseWithCovarianceStamped), given("fixes")
+        with launched(given("launch_file"), *given("arguments").split()):
+            found = fixes.wait_for_number(count, LONG_PATIENCE)[:count]
+            truth.wait_for(lambda message: message.header.stamp >= found[-1].header.stamp)
+        stamps, true = stamps_and_places(truth.messages)
+        times, fixed = stamps_and_places(found)
+        there = np.column_stack([np.interp(times, stamps, true[:, axis]) for axis in (0, 1)])
+        errors = np.hypot(*((fixed - fixed[0]) - (there - there[0])).T)[1:]
+        variances = np.array([fix.pose.covariance[0] + fix.pose.covariance[7] for fix in found])
+        told = np.sqrt(variances[1:] + variances[0])
+        self.assertLess(np.median(errors), given("farthest"), f"errors {errors}, told {told}")
+        self.assertGreaterEqual(np.mean(errors <= TOLD * told), LEAST_SHARE, f"errors {errors}, told {told}")
+        self.assertGreater(np.hypot(*(there[-1] - there[0])), given("least_way"))
+        if rospy.has_param("~least_reckoned"):
+            reckoned = np.ptp(stamps_and_places(odometry.messages)[1], axis=0).max()
+            self.assertGreater(reckoned, given("least_reckoned"))
 
 
-def _given(name: str) -> Any:
+def given(name: str) -> Any:
+    """Return a parameter of the test."""
     return rospy.get_param(f"~{name}")
 
 
+def stamps_and_places(messages: list) -> tuple:
+    """Return stamps (n,) s and positions (n, 2) m."""
+    rows = [(m.header.stamp.to_sec(), m.pose.pose.position.x, m.pose.pose.position.y) for m in messages]
+    values = np.array(rows)
+    return values[:, 0], values[:, 1:]
+
+
 if __name__ == "__main__":
-    rospy.init_node("vehicle_followed_test")
-    rostest.rosrun(PACKAGE, "vehicle_followed", VehicleFollowed, sys.argv)
+    run(VehicleFollowed)
