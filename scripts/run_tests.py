@@ -20,8 +20,10 @@ RESULTS = ROOT / "build/test_results"
 STEP_TIMEOUT = 1200.0
 # s: downloads 100 MB, or computes with what the others leave, on a machine that is three times slower than most.
 SPARE_TIMEOUT = 3600.0
-# Rostests mostly wait; each has a master of its own. With more at once, two cores take as long.
-TOGETHER = 2
+# Rostests mostly wait; each has a master of its own.
+TOGETHER = 3
+# Spare steps at once: as many as leave no processor idle while the others wait.
+SPARE_TOGETHER = 2
 # The lowest there is: who waits for a message gets the processor at once.
 SPARE_PRIORITY = 19
 # Rostests that measure time or processor time; all others wait for what must come, however late.
@@ -48,9 +50,10 @@ class Outcome:
 class Load(Enum):
     """What a step asks of the machine."""
 
-    WHOLE = "uses all processors or measures time: nothing else may run"
+    ALONE = "measures processor time, or is quick: nothing else may run"
+    WHOLE = "uses all processors or measures time: only SPARE ones may run beside it"
     SHARED = "mostly waits: some run at once"
-    SPARE = "computes and measures no time: takes what the SHARED ones leave"
+    SPARE = "computes and measures no time: takes what all others leave"
 
 
 @dataclass(frozen=True)
@@ -74,11 +77,11 @@ class Step:
 
 
 def steps() -> List[Step]:
-    """Return all steps, those that run alone with quick ones first, and long ones before short ones."""
+    """Return all steps, of each load in the order in which they begin: long ones before short ones."""
     return [
-        Step("ruff check", ["ruff", "check", "--quiet", "."]),
-        Step("ruff format", ["ruff", "format", "--quiet", "--check", "."]),
-        Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."]),
+        Step("ruff check", ["ruff", "check", "--quiet", "."], load=Load.ALONE),
+        Step("ruff format", ["ruff", "format", "--quiet", "--check", "."], load=Load.ALONE),
+        Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."], load=Load.ALONE),
         _pytest("unit tests", "test/unit", "-m", "not long", *IN_PARALLEL),
         _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
         *oldest_versions(),
@@ -104,7 +107,7 @@ def _by_length(test: Path) -> Tuple[bool, str]:
 
 def _rostest(test: Path) -> Step:
     command = ["rostest", "--results-filename=result.xml", str(test)]
-    load = Load.WHOLE if test.stem in ALONE else Load.SHARED
+    load = Load.ALONE if test.stem in ALONE else Load.SHARED
     # Nodes of one name that run at once would save their maps in one file.
     variables = {"ROS_HOME": str(RESULTS / test.stem / "ros_home")}
     return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load, variables=variables)
@@ -194,10 +197,11 @@ def main(words: List[str], run: Callable[[Step], Outcome] = run_step) -> int:
         return 2
     subprocess.run(["rm", "-rf", str(RESULTS)], check=True)
     RESULTS.mkdir(parents=True)
-    outcomes = [run(step) for step in chosen if step.load is Load.WHOLE]
-    with ThreadPoolExecutor(TOGETHER) as shared, ThreadPoolExecutor(TOGETHER) as spare:
-        pools = {Load.SHARED: shared, Load.SPARE: spare}
-        running = [pools[step.load].submit(run, step) for step in chosen if step.load in pools]
+    outcomes = [run(step) for step in chosen if step.load is Load.ALONE]
+    with ThreadPoolExecutor(TOGETHER) as shared, ThreadPoolExecutor(SPARE_TOGETHER) as spare:
+        running = [spare.submit(run, step) for step in chosen if step.load is Load.SPARE]
+        outcomes += [run(step) for step in chosen if step.load is Load.WHOLE]
+        running += [shared.submit(run, step) for step in chosen if step.load is Load.SHARED]
     outcomes += [one.result() for one in running]
     passed, failed = sum(o.passed for o in outcomes), sum(o.failed for o in outcomes)
     print(f"{passed} passed, {failed} failed")

@@ -145,6 +145,12 @@ class Diagnostics:
             known = self._values.get(stage)
         raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {known}")
 
+    def known(self, stage: str, counter: str) -> int:
+        """Wait until a stage has reported, and return the counter as it is now, 0 where it has not begun to count."""
+        with self._condition:
+            assert self._condition.wait_for(lambda: stage in self._values, PATIENCE), f"{stage} reports nothing"
+            return max(self._number(stage, counter), 0)
+
     def forget(self) -> None:
         """Forget all counters: the node that published them has ended."""
         with self._condition:

@@ -10,7 +10,7 @@ from enum import Enum
 from typing import Any, Dict, List, Tuple
 
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE_ROOT, PATIENCE, Diagnostics, ended, run, wait_until
+from graph import PACKAGE_ROOT, PATIENCE, Diagnostics, ended, run
 
 sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
 
@@ -74,8 +74,7 @@ class ParameterRefusals(unittest.TestCase):
         diagnostics, accepted, sent = Diagnostics(), [], 0
         for node in sorted(LIVE_NODES):
             client = Client(f"/{node}", timeout=PATIENCE)
-            wait_until(lambda node=node: bool(diagnostics.values(node)))
-            counted = int(diagnostics.values(node).get(REFUSED, 0))
+            counted = diagnostics.known(node, REFUSED)
             before = client.get_configuration(timeout=PATIENCE)
             refused = 0
             for field in LIVE_NODES[node].parameters.tunable_fields():

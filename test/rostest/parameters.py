@@ -45,13 +45,14 @@ class Parameters(unittest.TestCase):
 
     def test_a_bad_change_is_refused_and_the_old_value_stays(self) -> None:
         """It is counted, and neither bent into the range nor stored."""
-        diagnostics = Diagnostics()
+        diagnostics, refused = Diagnostics(), "changes of parameters refused"
+        counted = diagnostics.known("outlier_remover", refused)
         client = Client("/outlier_remover", timeout=PATIENCE)
         answer = client.update_configuration({"mode": "RADIUSES", "mean_k": 30})
         self.assertEqual((answer["mode"], answer["mean_k"]), ("STATISTICAL", 20))
         self.assertEqual(client.update_configuration({"min_radius": -3.0})["min_radius"], 1.0)
         self.assertEqual(rospy.get_param("/outlier_remover/min_radius"), 1.0)
-        diagnostics.wait_for("outlier_remover", "changes of parameters refused", 2)
+        diagnostics.wait_for("outlier_remover", refused, counted + 2)
         client.close()
 
 

@@ -12,7 +12,7 @@ from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
 from node_support.geometry import inverse, transformed
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; the solver and its parts are tested with every version")]
 PITCH = 2.5  # m, hardly more than the cut within which points are compared
 WALLS = tour(24, direction=0.12, delay=0.6).scans
 
