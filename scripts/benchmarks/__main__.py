@@ -14,7 +14,6 @@ from benchmarks import (
     map_bag_figures,
     map_figures,
     matching_figures,
-    shape_figures,
     simulation_figures,
 )
 from benchmarks.harness import Row, print_table
@@ -27,7 +26,6 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "matching": matching_figures.rows,
     "chain": chain_figures.rows,
     "simulation": simulation_figures.rows,
-    "shapes": shape_figures.rows,
 }
 STUDIES = ("canals", "heads", "long_run", "open_water", "silence", "twins", "without_dvl")
 

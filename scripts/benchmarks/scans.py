@@ -26,11 +26,6 @@ from sonar_simulator.world.world_file import load_sdf
 RAYS = {15: (5, 3), 45: (15, 3), 150: (30, 5), 500: (50, 10)}
 HEAD = SonarHead(beams_per_turn=120, seconds_per_turn=16.0)
 DEPTH = -2.0
-HALF_LENGTH, HALF_WIDTH = 60.0, 25.0
-WALLS = ((1.0, 0.0, HALF_LENGTH), (-1.0, 0.0, HALF_LENGTH), (0.0, 1.0, HALF_WIDTH), (0.0, -1.0, HALF_WIDTH))
-"""Inner faces of the basin's walls: normal x, normal y, distance from the basin's centre [m]."""
-BUOYS = ((42.0, 17.0), (-50.0, -16.0))
-SONAR_DEPTH = 1.8
 _FLOOR = Shape("floor", "box", pose_matrix((0.0, 0.0, -6.0)), (400.0, 400.0, 1.0))
 _WALL = Shape("wall", "box", pose_matrix((0.0, 15.5, -2.5)), (400.0, 1.0, 6.0))
 WORLDS: dict = {
@@ -131,27 +126,6 @@ class BasinScans:
             beam = Beam(stamp_ns, "sonar", float(angle), strengths[number], sonar.range_resolution)
             scan = assembler.add(PlacedBeam(beam, T_world_sonar, is_moving=False))
         return scan
-
-
-def anywhere(seed: int) -> np.ndarray:
-    """Return the (4, 4) pose of a sonar somewhere in the basin, 7 m or more from its walls."""
-    rng = np.random.default_rng([1, seed])
-    return _pose(rng.uniform(-50.0, 50.0), rng.uniform(-18.0, 18.0), rng)
-
-
-def near_buoy(seed: int, distance: float = 10.0) -> np.ndarray:
-    """Return the (4, 4) pose of a sonar `distance` m from the axis of buoy number seed mod 2, any way round."""
-    rng = np.random.default_rng([2, seed])
-    buoy = BUOYS[seed % len(BUOYS)]
-    while True:
-        bearing = rng.uniform(-math.pi, math.pi)
-        x, y = buoy[0] + distance * math.cos(bearing), buoy[1] + distance * math.sin(bearing)
-        if abs(x) < HALF_LENGTH - 3.0 and abs(y) < HALF_WIDTH - 3.0:
-            return _pose(x, y, rng)
-
-
-def _pose(x: float, y: float, rng: np.random.Generator) -> np.ndarray:
-    return pose_matrix((x, y, -SONAR_DEPTH), (0.0, 0.0, rng.uniform(-math.pi, math.pi)))
 
 
 @lru_cache(maxsize=None)

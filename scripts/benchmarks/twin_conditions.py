@@ -30,8 +30,7 @@ class TwinParameters:
     half_width: of the beam at half power. echo_length: of a plateau, m per 10 dB above the threshold. objects: piers,
     boats and posts. clutter: share of beams with a false echo. basin_radius, canal_radius: m of water kept free.
     rotation: of the path. binary: strengths are 0 or 127, else graded. soft_iron: of the compass, amplitude of an error
-    that turns twice with the heading. ebb: m by which all banks and objects grow into the water during the run, as
-    where sloping banks fall dry. ships: that pass within hearing, one after the other, at 1 m/s.
+    that turns twice with the heading.
     """
 
     seed: int = 1
@@ -53,8 +52,6 @@ class TwinParameters:
     canal_radius: float = 11.0
     binary: bool = True
     soft_iron: float = 0.0
-    ebb: float = 0.0
-    ships: int = 0
 
 
 TWINS = {
@@ -71,8 +68,6 @@ TWINS = {
     "short_odometry": TwinParameters(20, rotation=1.7, scale=0.05, direction=0.09),
     "late": TwinParameters(21, rotation=-2.2, delay=1.5, direction=0.04),
     "warm": TwinParameters(22, rotation=2.9, range_scale=0.03, scale=-0.01, direction=-0.08),
-    "ebb": TwinParameters(23, rotation=0.9, ebb=2.0, direction=0.06),
-    "ships": TwinParameters(24, rotation=-0.9, ships=12, direction=-0.03),
     "open": TwinParameters(25, rotation=1.3, basin_radius=70.0, canal_radius=70.0, objects=8, direction=0.06),
     "graded": TwinParameters(18, PathForm.MIRRORED, 3.0, binary=False, direction=0.08, range_scale=0.015, scale=-0.01),
 }

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Tuple
 
 import numpy as np
-from scipy.ndimage import distance_transform_edt, gaussian_filter
+from scipy.ndimage import gaussian_filter
 
 from benchmarks.twin_conditions import TwinParameters
 from node_support.geometry import rotated
@@ -12,7 +12,6 @@ from node_support.geometry import rotated
 RESOLUTION = 0.2  # m: a tenth of the accuracy that is looked for
 _MARGIN = 80.0  # m around the path, more than the sonar's range
 _CLEARANCE = 5.0  # m around the path in which nothing stands
-_SHIP = (12.0, 3.5)  # m, length and beam
 _CANAL_SMOOTHING = 600  # samples of the path, 60 s: banks do not follow a vehicle's weaving
 
 
@@ -51,25 +50,6 @@ def water_of(free: np.ndarray, origin: np.ndarray) -> Water:
     """Return the water of a raster (rows, columns) bool whose first cell is at `origin` (2,) [m]."""
     blurred = gaussian_filter(free.astype(np.float32), 4.0)
     return Water(free, origin, np.stack(np.gradient(blurred)))
-
-
-def ebbed(water: Water, fall: float) -> Water:
-    """Return the water when banks and objects have grown into it by `fall` [m]."""
-    if fall <= 0.0:
-        return water
-    return Water(distance_transform_edt(water.free) * RESOLUTION > fall, water.origin, water.slopes)
-
-
-def with_ship(water: Water, place: np.ndarray, heading: float) -> Water:
-    """Return the water with a ship's hull in it, at `place` (2,) [m]."""
-    free = water.free.copy()
-    _add_hull(free, np.zeros_like(free), water.origin, place, heading, *_SHIP)
-    low, high = (np.maximum(((place + side * _SHIP[0] - water.origin) / RESOLUTION).astype(int), 0) for side in (-1, 1))
-    part = (slice(low[0], high[0]), slice(low[1], high[1]))
-    slopes = water.slopes.copy()
-    if min(free[part].shape) > 1:
-        slopes[(slice(None), *part)] = water_of(free[part], water.origin).slopes
-    return Water(free, water.origin, slopes)
 
 
 def _smoothed(path: np.ndarray) -> np.ndarray:

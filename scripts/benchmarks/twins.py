@@ -3,26 +3,21 @@
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Iterator, Tuple
 
 import numpy as np
 
 from benchmarks.harness import benchmark_parser
 from benchmarks.paths import batch_figures, live_figures, solved_live
 from benchmarks.twin_conditions import TWINS, TwinParameters, reported, true_path
-from benchmarks.twin_water import Water, ebbed, heard, made_water, with_ship
+from benchmarks.twin_water import heard, made_water
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording, Truth, read_recording
 from mlsm_manager.offline.run_files import positions_at
 from mlsm_manager.offline.suited_parameters import echo_shape_of
-from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from recordings.reader import Request
 from sonar_processing.beams.beam import PlacedBeam
 
-_MOMENT = 7.0  # s for which a ship is taken to stand still
-_TIDES = 20  # levels of an ebb
-_SHIP_SPEED, _SHIP_BESIDE = 1.0, 12.0  # m/s, m from the vehicle's way
 _AT_ENDS = 2.0  # s at both ends of the recording without beams, so that odometry covers delayed beams
 
 
@@ -42,44 +37,14 @@ def twin_of(source: Recording, parameters: TwinParameters) -> Recording:
     )
     mounting = np.arctan2(T_base_sonar[1, 0], T_base_sonar[0, 0])
     bearings = np.array([beam.angle for beam in beams]) + mounting
-    strengths = np.concatenate(
-        [
-            heard(now, path.at(stamps[part] + parameters.delay), bearings[part], T_base_sonar[:2, 3], parameters, rng)
-            for part, now in _moments(water, path, stamps, parameters)
-        ]
-    )
+    poses = path.at(stamps + parameters.delay)
+    strengths = heard(water, poses, bearings, T_base_sonar[:2, 3], parameters, rng)
     places = matrices(odometry.at(stamps)) @ T_base_sonar
     made = [
         PlacedBeam(replace(beam, intensities=row), place, True) for beam, row, place in zip(beams, strengths, places)
     ]
     times = np.arange(path.times[0], path.times[-1], 1.0)
     return Recording(made, 0, odometry, Truth(times, path.at(times)[:, :2]))
-
-
-def _moments(
-    water: Water, path: Track, stamps: np.ndarray, parameters: TwinParameters
-) -> Iterator[Tuple[slice, Water]]:
-    """Yield parts of the beams, in the order of time, and the water in which they are heard."""
-    if not parameters.ebb and not parameters.ships:
-        yield slice(None), water
-        return
-    span = stamps[-1] - stamps[0]
-    bounds = np.searchsorted(stamps, np.arange(stamps[0], stamps[-1], _MOMENT))
-    tides = [ebbed(water, parameters.ebb * share) for share in (np.arange(_TIDES) + 0.5) / _TIDES]
-    for start, end in zip(bounds, np.append(bounds[1:], len(stamps))):
-        share = (stamps[start] - stamps[0]) / span
-        now = tides[int(share * _TIDES)]
-        if parameters.ships:
-            place = path.at(stamps[start : start + 1])[0, :2]
-            now = with_ship(now, *_passing(share * parameters.ships, span / parameters.ships, place))
-        yield slice(start, end), now
-
-
-def _passing(number: float, duration: float, vehicle: np.ndarray) -> Tuple[np.ndarray, float]:
-    """Return place (2,) [m] and heading of a ship that passes the vehicle at (2,) [m]; each ship goes another way."""
-    heading = 2.4 * int(number)
-    along, beside = np.array([np.cos(heading), np.sin(heading)]), np.array([-np.sin(heading), np.cos(heading)])
-    return vehicle + _SHIP_SPEED * duration * (number % 1.0 - 0.5) * along + _SHIP_BESIDE * beside, heading
 
 
 def main() -> None:

@@ -7,7 +7,7 @@ from typing import List, Tuple
 
 from benchmarks.harness import ROOT, recorded
 
-from thesis_results import accuracy, marina, moves, moving, processing, sonar, survey
+from thesis_results import consistency, marina, moves, moving, processing, sonar, survey
 from thesis_results.page import Section, joined, made_with, write_page
 from thesis_results.pictures import Pictures
 
@@ -23,8 +23,7 @@ SECTIONS: Tuple[Section, ...] = (
     Section("moving", "7.4", "A vehicle that never stops", moving.make),
     Section("marina", "7.4", "A real marina", marina.make, marina.RECORDINGS),
     Section("compass", "7.4", "The marina with the compass alone", marina.make_compass_alone, marina.RECORDINGS),
-    Section("convergence", "beyond", "From how far off a scan finds its place", accuracy.make_convergence),
-    Section("consistency", "beyond", "Are the stated deviations true?", accuracy.make_consistency),
+    Section("consistency", "beyond", "Are the stated deviations true?", consistency.make),
 )
 """All sections of the page, in its order; a new one is one line here."""
 

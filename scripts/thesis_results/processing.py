@@ -7,7 +7,6 @@ from typing import List
 import numpy as np
 from benchmarks.harness import ROOT, recorded_beams
 from benchmarks.scans import BasinScans
-from benchmarks.shape_figures import WallErrors, wall_errors
 from matplotlib.axes import Axes
 
 from node_support.geometry import pose_matrix
@@ -158,24 +157,10 @@ def _rows(found: List[Processed], world: World) -> List[List[str]]:
     for stage in found[0].stages:
         shares = [_share_on_surfaces(scan.stages[stage], world) for scan in found]
         rows.append([f"echoes within {_ON:g} m of a surface, {stage}", *(f"{100.0 * share:.0f} %" for share in shares)])
-    errors = [wall_errors(scan.lines, _PLACE, _REACH) for scan in found]
-    return [
-        *rows,
-        ["walls found, of those within reach", *(f"{len(_found(walls))} of {len(walls)}" for walls in errors)],
-        ["largest errors of these", *(_largest(_found(walls)) for walls in errors)],
-    ]
+    return rows
 
 
 def _share_on_surfaces(cloud: Cloud, world: World) -> float:
     """Return the share of points with any strength that lie on a surface; they are drawn at the depth of the sonar."""
     points = cloud.points[cloud.valid]
     return float(np.mean(distances(world, points[points[:, 3] > 0, :3]) <= _ON))
-
-
-def _found(walls: List[WallErrors]) -> List[WallErrors]:
-    return [wall for wall in walls if wall.distance is not None]
-
-
-def _largest(walls: List[WallErrors]) -> str:
-    distance, angle = max(wall.distance for wall in walls), max(wall.angle for wall in walls)
-    return f"{distance:.2f} m, {math.degrees(angle):.2f} deg"

@@ -1,28 +1,19 @@
-"""Beyond the thesis: from how far off a scan finds its place, and whether the stated deviations are true."""
+"""Beyond the thesis: whether the stated deviations are true."""
 
-from itertools import product
-from typing import Dict, List, Mapping
+from typing import Dict, List
 
 import numpy as np
 from benchmarks.heads import mean_figures
-from benchmarks.matchers import MATCHERS, MatcherName
-from benchmarks.matching_figures import NEAR, NEAR_YAW, WIDE, started, tour_map
+from benchmarks.matchers import MatcherName
 from benchmarks.scans import KINDS, ScanMaker, SonarKind
 from benchmarks.tours import simulated
 from matplotlib.axes import Axes
-from matplotlib.image import AxesImage
 from scipy.stats import chi2
 
-from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
-from mlsm_manager.scan_matching.scan import Matcher
 from thesis_results.moves import SEEDS, session_errors, session_scans, session_track
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure
 
-_BASE = KINDS[0]
-_DISTANCES = (0.5, 1.0, 2.0, 3.0, 4.5, 6.0, 8.0)  # m
-_ANGLES = (2.0, 10.0, 20.0, 30.0, 45.0, 60.0)  # deg
-_STARTS = 10
 _JOINT_KINDS = (KINDS[0], KINDS[2])
 _DRAWS = 6
 _FEWEST = 10  # runs: fewer make no distribution
@@ -30,63 +21,7 @@ _STATES = 3
 """Of a pose: x, y and heading."""
 
 
-def make_convergence(pictures: Pictures) -> str:
-    """Return the section of starts that are off by a distance and an angle."""
-    maker = ScanMaker("basin", _BASE)
-    target = tour_map(maker)
-    matchers = _matchers()
-    figure, (axes,) = new_figure(15.0, 4.6, 1, len(matchers))
-    wrong = {}
-    for cell, (title, matcher) in zip(axes, matchers.items()):
-        starts = {
-            case: [started(maker, target, matcher, case[0], np.radians(case[1]), seed) for seed in range(_STARTS)]
-            for case in product(_DISTANCES, _ANGLES)
-        }
-        found = np.array([np.mean([one.found for one in same]) for same in starts.values()])
-        wrong[title] = sum(one.result.accepted and not one.found for same in starts.values() for one in same)
-        image = _draw_shares(cell, title, 100.0 * found.reshape(len(_DISTANCES), len(_ANGLES)))
-    figure.colorbar(image, ax=list(axes), label="found, %", shrink=0.8)
-    total = _STARTS * len(_DISTANCES) * len(_ANGLES)
-    return joined(
-        prose(f"""A scan of the basin is matched with the map of the tour, from an expectation that is off in a
-        random direction; {_STARTS} scans for each distance and angle, {_BASE}. Found: accepted, and within {NEAR:g} m
-        and {np.degrees(NEAR_YAW):.0f} degrees of the truth."""),
-        pictures.save(
-            "convergence",
-            figure,
-            f"""Share of the scans that find their place. Left: generalised ICP, which does not search. Middle: the
-            default, which searches up to {_reach({})} from the expectation. Right: up to {_reach(WIDE)}.""",
-        ),
-        f"Accepted at a wrong place: {', '.join(f'{title} {count} of {total}' for title, count in wrong.items())}.",
-    )
-
-
-def _matchers() -> Dict[str, Matcher]:
-    return {
-        "`GICP`": MATCHERS[MatcherName.GICP](),
-        "`DISTRIBUTIONS`": MATCHERS[MatcherName.DISTRIBUTIONS](),
-        "`DISTRIBUTIONS`, wide search": DistributionMatcher(DistributionMatcherParameters().changed(WIDE)),
-    }
-
-
-def _reach(changes: Mapping[str, object]) -> str:
-    parameters = DistributionMatcherParameters().changed(changes)
-    return f"{parameters.search_distance:g} m and {np.degrees(parameters.search_angle):.0f} degrees"
-
-
-def _draw_shares(axes: Axes, title: str, found: np.ndarray) -> AxesImage:
-    image = axes.imshow(found.T, origin="lower", cmap="RdYlGn", vmin=0.0, vmax=100.0, aspect="auto")
-    for (column, row), value in np.ndenumerate(found):
-        axes.text(column, row, f"{value:.0f}", ha="center", va="center", fontsize="small")
-    axes.set_xticks(range(len(_DISTANCES)))
-    axes.set_xticklabels([f"{distance:g}" for distance in _DISTANCES])
-    axes.set_yticks(range(len(_ANGLES)))
-    axes.set_yticklabels([f"{angle:g}" for angle in _ANGLES])
-    axes.set(xlabel="distance of the expectation, m", ylabel="angle, deg", title=title.replace("`", ""))
-    return image
-
-
-def make_consistency(pictures: Pictures) -> str:
+def make(pictures: Pictures) -> str:
     """Return the section of squared errors over stated variances."""
     squares = {kind: _last_squares(kind) for kind in KINDS}
     figure, ((axes,),) = new_figure(7.5, 4.8)
