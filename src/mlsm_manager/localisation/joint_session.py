@@ -18,7 +18,7 @@ from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
 from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
-from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, inverse, transformed, wrapped
@@ -101,7 +101,7 @@ class JointSession:
             # from the second turn on: the first one alone does not tell its own speed
             *(position_uncertainty(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[1:2]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
-            *in_one_map(turns.times, turns.apart),
+            *in_submaps(turns.times, turns.apart),
         ]
 
     def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:

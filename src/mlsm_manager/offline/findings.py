@@ -16,7 +16,7 @@ from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
-from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
@@ -197,7 +197,7 @@ def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verd
         *surfaces_tell(
             float(solver.log.node_times[0]), turns.times, turns.surfaces, solver.odometry.distance_deviation
         ),
-        *in_one_map(turns.times, turns.apart),
+        *in_submaps(turns.times, turns.apart),
     ]
     found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
     before = Calibration.expected(solver)

@@ -81,10 +81,10 @@ def map_in_3d(mission: Mission) -> go.Figure:
 def _blocks_in_3d(blocks: Blocks, mean: np.ndarray, name: str) -> go.Scatter3d:
     """Return blocks at their means (n, 4), in the colour of their height or, in a flat map, of their points' number."""
     flat = not len(mean) or np.ptp(mean[:, 2]) < blocks.resolution
-    shade, told = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
+    shade, legend = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
     return go.Scatter3d(
         x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
-        marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": told}},
+        marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": legend}},
     )  # fmt: skip
 
 
@@ -98,10 +98,10 @@ def correction_over_time(mission: Mission) -> go.Figure:
         distance = np.hypot(shown.poses[:, 0] - columns[0], shown.poses[:, 1] - columns[1])
         _add_line(figure, shown.times - mission.start, distance, f"{path.name} from {odometry.name}", path.color)
     if mission.uncertainty is not None:
-        told = mission.uncertainty
-        radius = np.sqrt(np.trace(told.covariances, axis1=1, axis2=2))
-        _add_line(figure, told.times - mission.start, radius, "standard deviation of the position", _DOUBT)
-        for begin, end in told.doubtful - mission.start:
+        uncertainty = mission.uncertainty
+        radius = np.sqrt(np.trace(uncertainty.covariances, axis1=1, axis2=2))
+        _add_line(figure, uncertainty.times - mission.start, radius, "standard deviation of the position", _DOUBT)
+        for begin, end in uncertainty.doubtful - mission.start:
             figure.add_vrect(x0=begin, x1=end, fillcolor=_DOUBT, opacity=0.15, line_width=0)
     figure.update_xaxes(title="time [s]")
     figure.update_yaxes(title="distance [m]", rangemode="tozero")
@@ -128,14 +128,14 @@ def thinned(path: Path) -> Path:
     return Path(path.name, path.color, path.times[::step], path.poses[::step].astype(np.float32))
 
 
-def _add_uncertainty(figure: go.Figure, best: Path, told: Uncertainty) -> None:
-    shown = slice(None, None, max(1, len(told.times) // _MOST_ELLIPSES))
-    centers = np.column_stack([np.interp(told.times[shown], best.times, best.poses[:, axis]) for axis in (0, 1)])
-    x, y = _ellipses(centers, told.covariances[shown])
+def _add_uncertainty(figure: go.Figure, best: Path, uncertainty: Uncertainty) -> None:
+    shown = slice(None, None, max(1, len(uncertainty.times) // _MOST_ELLIPSES))
+    centers = np.column_stack([np.interp(uncertainty.times[shown], best.times, best.poses[:, axis]) for axis in (0, 1)])
+    x, y = _ellipses(centers, uncertainty.covariances[shown])
     _add_line(figure, x, y, "two standard deviations", _DOUBT, width=1)
     gap = np.array([[np.nan, np.nan]])
     stretches: List[np.ndarray] = []
-    for begin, end in told.doubtful:
+    for begin, end in uncertainty.doubtful:
         inside = (best.times >= begin) & (best.times <= end)
         stretches += [best.poses[inside, :2], gap]
     if stretches:

@@ -35,11 +35,11 @@ class FixPublisher:
         self._pose = rospy.Publisher(topics.MATCHED_POSE, PoseWithCovarianceStamped, queue_size=10)
         self._odometry = rospy.Publisher(topics.MATCHED_ODOMETRY, Odometry, queue_size=10)
         self._path = rospy.Publisher(topics.MATCHED_PATH, Path, queue_size=2, latch=True)
-        self._way = Path()
+        self._matched_path = Path()
 
     def clear(self) -> None:
         """Begin a new path."""
-        self._way = Path()
+        self._matched_path = Path()
 
     def publish(self, result: MatchResult, T_map_base: np.ndarray, stamp_ns: int) -> None:
         """Send the fix of a match; `T_map_base` is the matched pose with z, roll and pitch, (4, 4)."""
@@ -55,9 +55,9 @@ class FixPublisher:
         self._extend(PoseStamped(header=fix.header, pose=fix.pose.pose))
 
     def _extend(self, pose: PoseStamped) -> None:
-        self._way.header = pose.header
-        self._way.poses = [*self._way.poses[-_LONGEST_PATH:], pose]
-        self._path.publish(self._way)
+        self._matched_path.header = pose.header
+        self._matched_path.poses = [*self._matched_path.poses[-_LONGEST_PATH:], pose]
+        self._path.publish(self._matched_path)
 
 
 def _covariance(planar: np.ndarray) -> list:

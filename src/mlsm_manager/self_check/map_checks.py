@@ -13,7 +13,7 @@ _GOOD_ODOMETRY = 0.1  # relative deviation of reported distances up to which the
 _SCANS = 10  # about 2 minutes, in which a small vehicle passes what it hears
 
 
-def in_one_map(times: np.ndarray, apart: np.ndarray) -> Tuple[Verdict, ...]:
+def in_submaps(times: np.ndarray, apart: np.ndarray) -> Tuple[Verdict, ...]:
     """Return a verdict on the share of scans whose place in the map is known; none where that is every scan's.
 
     times: (n,) s of the scans' ends. apart: (n,) bool, whether a scan lies in a submap of which nobody knows how it

@@ -12,7 +12,7 @@ from node_support.geometry import composed, inverse
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
 _CLIMB = 2.0
 # The odometry as it is, and turned up: x, y and yaw are multiplied by these.
-_AS_TOLD, _TURNED_UP = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
+_AS_REPORTED, _TURNED_UP = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
 # Echoes of a scan: with fewer their mean distance tells little, and more take time and tell nothing new.
 _FEWEST, _MOST = 30, 1000
 # m: echoes that are farther from all others say no more than that something else is seen.
@@ -87,11 +87,11 @@ def _fits_turned_up(earlier: Scan, later: Scan) -> Optional[bool]:
     """Return whether two scans fit each other better with the odometry turned up; None where they do not tell."""
     if min(len(earlier), len(later)) < _FEWEST:
         return None
-    as_told = _distance(_placed(earlier, _AS_TOLD), _placed(later, _AS_TOLD))
+    as_reported = _distance(_placed(earlier, _AS_REPORTED), _placed(later, _AS_REPORTED))
     turned_up = _distance(_placed(earlier, _TURNED_UP), _placed(later, _TURNED_UP))
-    if max(as_told, turned_up) < _CLEARLY * min(as_told, turned_up):
+    if max(as_reported, turned_up) < _CLEARLY * min(as_reported, turned_up):
         return None
-    return turned_up < as_told
+    return turned_up < as_reported
 
 
 def _placed(scan: Scan, signs: np.ndarray) -> np.ndarray:

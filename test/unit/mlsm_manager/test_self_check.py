@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 
-from mlsm_manager.self_check.map_checks import in_one_map, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
@@ -175,18 +175,18 @@ def test_few_scans_say_too_little_of_the_surfaces():
 
 
 def test_a_run_of_one_map_has_no_such_check():
-    assert in_one_map(TURNS, np.zeros(10, dtype=bool)) == ()
+    assert in_submaps(TURNS, np.zeros(10, dtype=bool)) == ()
 
 
 def test_scans_apart_make_it_fire_and_are_the_doubtful_ones():
-    (verdict,) = in_one_map(TURNS, TURNS > 90.0)
+    (verdict,) = in_submaps(TURNS, TURNS > 90.0)
     assert verdict.fires
     assert verdict.value == 0.7
     np.testing.assert_allclose(verdict.doubtful, [[84.0, 126.0]])
 
 
 def test_a_single_scan_apart_is_told():
-    (verdict,) = in_one_map(TURNS[:1], np.ones(1, dtype=bool))
+    (verdict,) = in_submaps(TURNS[:1], np.ones(1, dtype=bool))
     assert verdict.fires
 
 
