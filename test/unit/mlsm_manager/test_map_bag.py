@@ -1,20 +1,26 @@
 """map_bag as it is run: bags in, files, figures and one-line errors out."""
 
+from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
 import pytest
+import rosbag
 import yaml
 from heading_only import reduce_bag
-from map_bag_runs import BASIN, run, summary_of
+from map_bag_runs import BASIN, refused, run, summary_of
 
+from mlsm_manager.offline import sessions
+from mlsm_manager.offline.recording import read_recording
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.sessions import executor_for, prepared, prepared_in_parallel
 from mlsm_manager.surface_map.map_file import Layer, read_map
+from recordings.reader import Request
 
 pytestmark = pytest.mark.long
-
-# map_bag runs as a process of its own here, so that its import of a compiled module of ROS does not show.
 pytest.importorskip("tf2_py")
 
+TRAJECTORIES = ("trajectory.csv", "trajectory_2.csv")
 FILES = {
     "map.mlsm", "map.ply", "map.png", "trajectory.csv", "live.yaml", "summary.json",
     "dead_reckoning.tum", "corrected.tum", "refined.tum", "truth.tum",
@@ -123,3 +129,107 @@ def test_parameters_of_a_file_are_taken_and_held(tmp_path):
     assert done.returncode == 0, done.stderr
     cloud = yaml.safe_load((tmp_path / "out" / "live.yaml").read_text())["sonar_to_cloud"]
     assert (cloud["sonar_delay"], cloud["range_scale"]) == pytest.approx((0.25, 0.99), abs=1e-6)
+
+
+@pytest.fixture(scope="module")
+def twice(tmp_path_factory):
+    """Return the folder of a run with the same recording twice."""
+    folder = tmp_path_factory.mktemp("twice")
+    done = run(BASIN, BASIN, "--out", folder)
+    assert done.returncode == 0, done.stderr
+    return folder
+
+
+def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(twice):
+    summary = summary_of(twice)
+    (second,) = summary["sessions"]
+    assert (second["found_after_scans"], second["matched"]) == (0, second["scans"])
+    first, second = (np.loadtxt(str(twice / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
+    assert np.hypot(*(first - second)[-20:, 4:6].T).max() < 0.5
+    assert read_map(twice / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
+
+
+def test_the_report_shows_the_way_of_each_recording(twice):
+    pytest.importorskip("plotly")
+    assert "corrected, basin.bag" in (twice / "report.html").read_text()
+
+
+def test_a_dask_cluster_prepares_further_recordings():
+    distributed = pytest.importorskip("distributed")
+    read = partial(read_recording, request=Request())
+    # The worker is a thread here, but is spoken to over TCP, as any other.
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None, host="127.0.0.1"
+    ) as cluster, executor_for(2, cluster.scheduler_address) as executor:
+        ((there, scans),) = prepared_in_parallel([BASIN], read, ReplayParameters(), executor)
+    here, expected = prepared(BASIN, read, ReplayParameters())
+    assert len(there.beams) == len(here.beams)
+    assert [scan.points.tobytes() for scan in scans] == [scan.points.tobytes() for scan in expected]
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        (["/no/such.bag"], "map_bag: /no/such.bag: No such file or directory"),
+        ([BASIN, "--set", "echo_deviation=30"], "map_bag: echo_deviation = 30: must be a number from 0.01 to 10 m"),
+        ([BASIN, "--set", "no_such=1"], "no_such = 1: no such parameter"),
+    ],
+)
+def test_what_cannot_be_used_is_refused_in_one_line(words, reason, tmp_path):
+    assert reason in refused(*words, "--out", tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("words", "reason"),
+    [
+        ([BASIN, BASIN, "--refine"], "--refine fits one recording"),
+        ([BASIN, "--check"], "--check repeats the fit of --refine"),
+    ],
+)
+def test_options_that_contradict_each_other_are_refused(words, reason, tmp_path):
+    done = run(*words, "--out", tmp_path)
+    assert (done.returncode, reason in done.stderr) == (2, True)
+
+
+def test_a_missing_further_bag_is_named_before_the_first_is_mapped(tmp_path):
+    out = tmp_path / "out"
+    assert refused(BASIN, "/no/such.bag", "--out", out) == "map_bag: /no/such.bag: No such file or directory"
+    assert not out.exists()
+
+
+def test_a_missing_topic_is_answered_with_those_there_are(tmp_path):
+    line = refused(BASIN, "--out", tmp_path, "--truth", "/gps")
+    assert "no topic /gps" in line
+    assert "/ground_truth" in line
+
+
+def test_an_empty_bag_is_refused(tmp_path):
+    rosbag.Bag(str(tmp_path / "empty.bag"), "w").close()
+    assert "there are none at all" in refused(tmp_path / "empty.bag", "--out", tmp_path / "out")
+    assert not (tmp_path / "out").exists()
+
+
+def test_a_bag_without_tf_is_refused(tmp_path):
+    with rosbag.Bag(str(BASIN)) as whole, rosbag.Bag(str(tmp_path / "beams.bag"), "w") as beams:
+        for topic, message, stamp in whole.read_messages(topics=["/sonar/raw"]):
+            beams.write(topic, message, stamp)
+    assert "no /tf" in refused(tmp_path / "beams.bag", "--out", tmp_path / "out")
+
+
+def test_an_output_folder_that_is_a_file_is_refused(tmp_path):
+    file = tmp_path / "file"
+    file.write_text("")
+    assert refused(BASIN, "--out", file) == f"map_bag: {file}: is a file, must be a folder"
+
+
+def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
+    broken = tmp_path / "no.bag"
+    broken.write_bytes(b"no bag")
+    assert refused(BASIN, broken, "--out", tmp_path).startswith(f"map_bag: {broken}: ")
+
+
+def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr(sessions, "CLUSTER_TIMEOUT", 0.5)
+    line = refused(BASIN, BASIN, "--out", tmp_path, "--scheduler", "tcp://127.0.0.1:9")
+    assert line.startswith("map_bag: --scheduler tcp://127.0.0.1:9: ")

@@ -1,4 +1,4 @@
-"""What map_bag leaves in its folder."""
+"""What map_bag leaves in its folder: trajectories, their errors, the picture, and whether its run can be trusted."""
 
 import json
 
@@ -8,11 +8,23 @@ import numpy as np
 import pytest
 from made_blocks import blocks_of
 
+from mlsm_manager.offline.findings import Deviations, Trust
 from mlsm_manager.offline.recording import Recording, Truth
-from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, Run, errors_of, trajectory_csv, write_run, write_summary
+from mlsm_manager.offline.run_files import (
+    CORRECTED,
+    ODOMETRY,
+    Run,
+    errors_of,
+    position_error,
+    trajectory_csv,
+    write_run,
+    write_summary,
+)
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.ply_file import read_ply
+from recordings.bags.bag import RecordingError
 
 TIMES = np.arange(4.0)
 ODOMETRY_POSES = np.column_stack([TIMES, np.zeros(4), np.full(4, 4.0)])
@@ -51,3 +63,62 @@ def test_a_summary_that_cannot_be_written_leaves_the_old_one(tmp_path):
         write_summary(tmp_path, {"scans": object()})
     assert json.loads((tmp_path / "summary.json").read_text()) == {"scans": 1}
     assert [path.name for path in tmp_path.iterdir()] == ["summary.json"]
+
+
+FINE = Verdict("depth", 0.5, 1.0, "m")
+FIRING = Verdict("width", 2.0, 1.0, "too wide (2 m)", doubtful=np.array([[3.0, 9.0]]))
+SHORT = Verdict("length", np.nan, 1.0, "m")
+
+
+def trust_of(*verdicts, times=(0.0, 10.0, 200.0)):
+    covariances = np.tile(np.diag([9.0, 16.0]), (len(times), 1, 1))
+    return Trust(list(verdicts), Deviations(np.array(times), covariances))
+
+
+def test_a_run_without_doubts_says_so():
+    assert trust_of(FINE, SHORT).line == "trust: all 2 checks are fine"
+    assert trust_of(FINE).doubtful.shape == (0, 2)
+
+
+def test_only_the_checks_that_fire_are_named():
+    trust = trust_of(FINE, FIRING)
+    assert trust.line == "trust: DOUBTFUL: too wide (2 m)"
+    np.testing.assert_array_equal(trust.doubtful, [[3.0, 9.0]])
+
+
+def test_what_it_cannot_tell_is_null_in_json():
+    told = trust_of(SHORT).to_mapping()
+    assert told["checks"]["length"]["value"] is None
+    assert told["deviation_per_minute"] == [5.0, None, None, 5.0]
+    json.dumps(told, allow_nan=False)
+
+
+SECONDS = np.arange(0.0, 11.0)
+AHEAD = np.column_stack([SECONDS, np.zeros(11)])
+
+
+def test_a_shifted_truth_is_no_error():
+    error = position_error(SECONDS, AHEAD, Truth(SECONDS, AHEAD + np.array([100.0, -50.0])))
+    assert (error.mean, error.max) == (0.0, 0.0)
+
+
+def test_a_turned_truth_is_an_error():
+    error = position_error(SECONDS, AHEAD, Truth(SECONDS, AHEAD[:, ::-1]))
+    assert error.max == pytest.approx(10.0 * np.sqrt(2.0))
+
+
+def test_distances_count_at_the_stamps_of_the_truth():
+    error = position_error(
+        SECONDS, AHEAD, Truth(np.array([0.0, 2.5, 7.5]), np.array([[0.0, 0], [2.5, 3.0], [7.5, 0.0]]))
+    )
+    assert (error.mean, error.max, error.sd) == pytest.approx((1.0, 3.0, np.sqrt(2.0)))
+
+
+def test_the_truth_beyond_the_odometry_does_not_count():
+    late = Truth(np.array([5.0, 10.0, 20.0]), np.array([[5.0, 0.0], [10.0, 0.0], [99.0, 0.0]]))
+    assert position_error(SECONDS, AHEAD, late).max == 0.0
+
+
+def test_a_truth_of_another_time_is_refused():
+    with pytest.raises(RecordingError, match="no time in common"):
+        position_error(SECONDS, AHEAD, Truth(SECONDS + 100.0, AHEAD))
