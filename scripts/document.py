@@ -46,6 +46,10 @@ also publishes `/diagnostics`. `yaml/<node>_default.yaml` holds every parameter 
 Parameters marked * can be changed with dynamic_reconfigure while the node runs. A value that is not allowed is
 refused, and the old value stays.
 
+Parameters named `expert/...` are hardly ever changed. They stand under the key `expert` in yaml files and on the
+parameter server, each with the reason for its default. Keys of older versions are taken over, or left out where they
+are gone, and the node names them in one warning. An unknown key is refused, with the name of one that resembles it.
+
 `sonar_processing` and `mapping` run several of these nodes in one process. `sonar_processing` runs sonar_to_cloud,
 sonar_image and the stages listed in its parameter `~chain`, a list of node names, by default `[thresholder,
 outlier_remover, echo_extractor]`. `mapping` also runs mlsm_core. Topics are the same as with one node per stage, and

@@ -16,7 +16,7 @@ _SLACK = 0.5
 
 
 @dataclass(frozen=True)
-class Cloud:
+class MapCloud:
     """points: (n, 4) float64, x y z [m] in odom and echo strength. times: (n,) s. end: s, stamp of the newest beam."""
 
     points: np.ndarray
@@ -24,7 +24,7 @@ class Cloud:
     end: float
 
     @classmethod
-    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "Cloud":
+    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "MapCloud":
         """Build from a cloud's points (n, 4) and signed time stamps (n,); points that are not finite are left out."""
         points = np.asarray(points, dtype=np.float64)
         stamps = np.asarray(time_stamps, dtype=np.float64)
@@ -32,12 +32,12 @@ class Cloud:
         return cls(points[valid], np.abs(stamps[valid]), end)
 
     @classmethod
-    def of_scan(cls, scan: Scan) -> "Cloud":
+    def of_scan(cls, scan: Scan) -> "MapCloud":
         """Return the points of a scan."""
         return cls(scan.points, scan.times, scan.reference_time)
 
     @classmethod
-    def joined(cls, clouds: "Sequence[Cloud]") -> "Cloud":
+    def joined(cls, clouds: "Sequence[MapCloud]") -> "MapCloud":
         """Return the points of clouds (at least one), one after the other, as one cloud."""
         points, times = ([getattr(cloud, name) for cloud in clouds] for name in ("points", "times"))
         return cls(np.concatenate(points), np.concatenate(times), max(cloud.end for cloud in clouds))
@@ -75,7 +75,7 @@ class CorrectionHistory:
         corrections = composed(poses, inverse(track.at(times)))
         self._stretches.append(_Stretch(times, corrections, poses, holds))
 
-    def placed(self, cloud: Cloud) -> Tuple[np.ndarray, np.ndarray]:
+    def placed(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:
         """Return those of the cloud's points whose time has a place, (k, 4) in map, and the times of their beams (k,).
 
         Between two stretches the nearer one's end counts.

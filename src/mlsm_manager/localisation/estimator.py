@@ -8,7 +8,7 @@ from typing import Deque, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.clouds import Cloud, CorrectionHistory
+from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
@@ -75,7 +75,7 @@ class Estimator(ABC):
         self.correction = np.zeros(3)
         self._expected: Optional[Belief] = None
         self._history = CorrectionHistory()
-        self._waiting: Deque[Cloud] = deque(maxlen=_MOST_WAITING)
+        self._waiting: Deque[MapCloud] = deque(maxlen=_MOST_WAITING)
         self._uncarved: Deque[Tuple[np.ndarray, np.ndarray]] = deque(maxlen=_MOST_WAITING)
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
@@ -160,7 +160,7 @@ class Estimator(ABC):
         """Insert points (n, 4) that are in map already into the map that is shown."""
         return CloudUpdate(self._insert(points), False, 0)
 
-    def add_cloud(self, cloud: Cloud) -> CloudUpdate:
+    def add_cloud(self, cloud: MapCloud) -> CloudUpdate:
         """Insert a cloud into the map that is shown, or let it wait until the pose of its time is known."""
         if self.matching:
             return self._add_matched(cloud)
@@ -186,7 +186,7 @@ class Estimator(ABC):
         """Time [s] until which the poses of matched scans are known; -inf before the first."""
 
     @abstractmethod
-    def _add_matched(self, cloud: Cloud) -> CloudUpdate:
+    def _add_matched(self, cloud: MapCloud) -> CloudUpdate:
         """Insert a cloud where matched scans put it, or let it wait."""
 
     @abstractmethod
@@ -200,7 +200,7 @@ class Estimator(ABC):
         Return None where nothing is to be carved.
         """
 
-    def _wait(self, cloud: Cloud) -> CloudUpdate:
+    def _wait(self, cloud: MapCloud) -> CloudUpdate:
         self._waiting.append(cloud)
         return CloudUpdate(NOTHING_INSERTED, True, 0)
 

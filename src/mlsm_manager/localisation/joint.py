@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint_session import (
     JointSession,
@@ -176,7 +176,7 @@ class Joint(Estimator):
     def _known_until(self) -> float:
         return -np.inf if self._session is None else self._session.known_until
 
-    def _add_matched(self, cloud: Cloud) -> CloudUpdate:
+    def _add_matched(self, cloud: MapCloud) -> CloudUpdate:
         """Insert a cloud as a keyframe of the run; without a run it waits for one."""
         session = self._session
         if cloud.end <= self._found_at:
@@ -208,7 +208,7 @@ class Joint(Estimator):
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
-        self._maps.matched.add(Cloud.of_scan(scan))
+        self._maps.matched.add(MapCloud.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
         return update_of(scan, session, self.belief, perf_counter() - start)

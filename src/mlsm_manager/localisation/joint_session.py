@@ -12,7 +12,7 @@ from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
@@ -140,11 +140,11 @@ class JointSession:
     def _placement(self) -> SolvedPlacement:
         return SolvedPlacement(self.solver.log, self.solver.odometry, self.solver.state)
 
-    def points(self, cloud: Cloud) -> np.ndarray:
+    def points(self, cloud: MapCloud) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
         return self._placement.points(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
 
-    def origins(self, cloud: Cloud) -> np.ndarray:
+    def origins(self, cloud: MapCloud) -> np.ndarray:
         """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
         return self._placement.origins(cloud)
 

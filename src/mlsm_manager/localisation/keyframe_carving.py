@@ -7,7 +7,7 @@ from typing import Deque, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.placement import Placement
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
@@ -91,7 +91,7 @@ class KeyframeCarving:
     def look(
         self,
         surface_map: MultiLevelSurfaceMap,
-        clouds: List[Cloud],
+        clouds: List[MapCloud],
         points: List[np.ndarray],
         placement: Placement,
         scans: int = 1,

@@ -7,7 +7,7 @@ from typing import Deque, Dict, List, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
@@ -53,7 +53,7 @@ class KeyframeMap:
         """
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks)
         self._free = KeyframeCarving(resolution, limit, carver, most_followed)
-        self._moving: Deque[Cloud] = deque()
+        self._moving: Deque[MapCloud] = deque()
         self._overlay = Overlay(self._map)
         self._above = self._new().blocks
         self._due: Optional[Placement] = None
@@ -75,7 +75,7 @@ class KeyframeMap:
         return self._free
 
     @property
-    def moving(self) -> List[Cloud]:
+    def moving(self) -> List[MapCloud]:
         """The keyframes that may still move, oldest first."""
         return list(self._moving)
 
@@ -111,7 +111,7 @@ class KeyframeMap:
             self._overlay.lay(self._above)
         return carved
 
-    def add(self, cloud: Cloud) -> None:
+    def add(self, cloud: MapCloud) -> None:
         """Add a keyframe; it is in the map from the next `draw` on."""
         self._moving.append(cloud)
 
@@ -150,7 +150,7 @@ class KeyframeMap:
                 copy.insert(placement.points(cloud))
         return copy
 
-    def _settled(self, cloud: Cloud, placement: Placement, before: Optional[CarveReport]) -> Drawn:
+    def _settled(self, cloud: MapCloud, placement: Placement, before: Optional[CarveReport]) -> Drawn:
         """Draw the oldest keyframe for ever; `before`: what older ones carved."""
         self._free.forget_oldest()
         points = placement.points(cloud)
@@ -163,7 +163,7 @@ class KeyframeMap:
         if self._due is None:
             return
         (placement, self._due), clouds, above = (self._due, None), list(self._moving), self._new()
-        everything = placement.points(Cloud.joined(clouds))
+        everything = placement.points(MapCloud.joined(clouds))
         points = np.split(everything, np.cumsum([len(cloud) for cloud in clouds])[:-1])
         above.insert(everything)
         self._above = above.blocks
@@ -219,7 +219,7 @@ class JointMaps:
         run.matched.uncover(self.matched.map)
         for scan in run.scans:
             if scan.reference_time > session.settled_until:
-                self.matched.add(Cloud.of_scan(scan))
+                self.matched.add(MapCloud.of_scan(scan))
         for cloud in run.clouds:
             self.shown.add(cloud)
         self.shown.draw(session, session.settled_until)

@@ -8,7 +8,7 @@ from typing import Any, Callable, List, Mapping, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.live_correction import LiveCorrection, StandingCorrection
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
@@ -119,11 +119,11 @@ class Localiser:
                 self._live.believe(update.belief)
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
-                clouds.append(self.estimator.add_cloud(Cloud.of_scan(scan)))
+                clouds.append(self.estimator.add_cloud(MapCloud.of_scan(scan)))
             clouds += iter(self.estimator.add_waiting, None)
         return ScanResult(update, clouds)
 
-    def take_cloud(self, cloud: Cloud) -> CloudUpdate:
+    def take_cloud(self, cloud: MapCloud) -> CloudUpdate:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)

@@ -9,17 +9,17 @@ from mlsm_manager.joint_solver.measured.run_log import RunLog
 from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
 from mlsm_manager.joint_solver.placing.drawing import corrected_path, drawn
 from mlsm_manager.joint_solver.unknowns.state import DELAY, State
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from node_support.geometry import transformed
 
 
 class Placement(Protocol):
     """Places clouds as it is known now."""
 
-    def points(self, cloud: Cloud) -> np.ndarray:
+    def points(self, cloud: MapCloud) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map."""
 
-    def origins(self, cloud: Cloud) -> np.ndarray:
+    def origins(self, cloud: MapCloud) -> np.ndarray:
         """Return where the sonar was in map when it heard each of them, (n, 2) m."""
 
 
@@ -31,11 +31,11 @@ class SolvedPlacement:
     odometry: OdometryModel
     state: State
 
-    def points(self, cloud: Cloud) -> np.ndarray:
+    def points(self, cloud: MapCloud) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map."""
         return drawn(self.log, self.odometry, self.state, cloud.points, cloud.times)
 
-    def origins(self, cloud: Cloud) -> np.ndarray:
+    def origins(self, cloud: MapCloud) -> np.ndarray:
         """Return where the sonar was in map when it heard each of them, (n, 2) m."""
         path = self.path(cloud.times + self.state.run[DELAY])
         return transformed(path, np.broadcast_to(self.log.sonar_in_base, (len(path), 2)))

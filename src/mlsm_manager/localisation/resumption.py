@@ -5,7 +5,7 @@ from typing import Callable, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -130,7 +130,7 @@ def resumed_if_it_fits(session: JointSession, scan: Scan, surface_map: MultiLeve
         agreement = longer.add(scan).agreement
     except RefusedInput:
         return None
-    points = longer.points(Cloud.of_scan(scan))[:, :2]
+    points = longer.points(MapCloud.of_scan(scan))[:, :2]
     near = _share_near_blocks(points, surface_map)
     if near * agreement < _LEAST_SHARE:
         return None
@@ -153,7 +153,7 @@ class StoredRun:
     sonar_in_base: np.ndarray
     scans: Sequence[Scan]
     solver: Mapping[str, np.ndarray]
-    clouds: Sequence[Cloud]
+    clouds: Sequence[MapCloud]
     shown: Covered
     matched: Covered
 
@@ -164,7 +164,7 @@ class StoredRun:
             "T_map_odom": self.T_map_odom,
             "sonar_in_base": np.asarray(self.sonar_in_base),
             **{_SOLVER + name: array for name, array in self.solver.items()},
-            **_joined("scan", [Cloud.of_scan(scan) for scan in scans]),
+            **_joined("scan", [MapCloud.of_scan(scan) for scan in scans]),
             "scan_moving": np.concatenate([np.empty(0), *(scan.moving for scan in scans)]).astype(np.uint8),
             "track_times": np.concatenate([np.empty(0), *(track.times for track in tracks)]),
             "track_poses": np.concatenate([np.empty((0, 3)), *(track.poses for track in tracks)]),
@@ -201,7 +201,7 @@ def _run_of(part: Callable[[str], np.ndarray], solver: Mapping[str, np.ndarray])
     return StoredRun(part("T_map_odom"), part("sonar_in_base"), scans, solver, _split("cloud", part), shown, matched)
 
 
-def _joined(name: str, clouds: Sequence[Cloud]) -> Dict[str, np.ndarray]:
+def _joined(name: str, clouds: Sequence[MapCloud]) -> Dict[str, np.ndarray]:
     return {
         f"{name}_points": np.concatenate([np.empty((0, 4)), *(cloud.points for cloud in clouds)]),
         f"{name}_times": np.concatenate([np.empty(0), *(cloud.times for cloud in clouds)]),
@@ -210,12 +210,12 @@ def _joined(name: str, clouds: Sequence[Cloud]) -> Dict[str, np.ndarray]:
     }
 
 
-def _split(name: str, part: Callable[[str], np.ndarray]) -> List[Cloud]:
+def _split(name: str, part: Callable[[str], np.ndarray]) -> List[MapCloud]:
     points, times = (_parts(part(f"{name}_{kind}"), part(f"{name}_lengths")) for kind in ("points", "times"))
     ends = part(f"{name}_ends")
     if len(ends) != len(points) or any(there.shape != (len(then), 4) for there, then in zip(points, times)):
         raise ValueError(f"{name}s whose arrays do not belong together")
-    return [Cloud(there, then, float(end)) for there, then, end in zip(points, times, ends)]
+    return [MapCloud(there, then, float(end)) for there, then, end in zip(points, times, ends)]
 
 
 def _parts(array: np.ndarray, lengths: np.ndarray) -> List[np.ndarray]:

@@ -4,7 +4,7 @@ from typing import List, Mapping, Optional
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
@@ -94,7 +94,7 @@ class ScanByScan(Estimator):
     def _known_until(self) -> float:
         return self._history.end
 
-    def _add_matched(self, cloud: Cloud) -> CloudUpdate:
+    def _add_matched(self, cloud: MapCloud) -> CloudUpdate:
         if cloud.end > self._known_until:
             return self._wait(cloud)
         points, times = self._history.placed(cloud)
@@ -119,7 +119,7 @@ class ScanByScan(Estimator):
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)
         self._history.add(times, poses, scan.track, holds=True)
-        self._insert_matched(*self._history.placed(Cloud.of_scan(scan)))
+        self._insert_matched(*self._history.placed(MapCloud.of_scan(scan)))
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
         # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
         if belief.theta[ERRORS].any():

@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.placing.path import solved_path
 from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed, solved
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.joint_solver.unknowns.state import POSE, State
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.odometry_profiles import fitted
@@ -44,7 +44,7 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: Ma
     closing = closed(solver, fitted(solver))
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
-        surfaces.add(Cloud.of_scan(scan))
+        surfaces.add(MapCloud.of_scan(scan))
     surfaces.settle(SolvedPlacement(solver.log, solver.odometry, closing.batch.state))
     poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
     return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)

@@ -6,7 +6,7 @@ import numpy as np
 import rospy
 from std_msgs.msg import Bool
 
-from mlsm_manager.localisation.clouds import Cloud as MapCloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.updates import (

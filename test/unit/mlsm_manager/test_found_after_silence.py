@@ -8,7 +8,7 @@ from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal
 from mlsm_manager.joint_solver.compare.islands import MAP
 from mlsm_manager.joint_solver.placing.turns import Turns
 from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
@@ -199,7 +199,7 @@ class Carried:
         for scan in scans:
             scan = with_heading_only(scan)
             self.localiser.take_scan(scan)
-            self.localiser.take_cloud(Cloud.of_scan(scan))
+            self.localiser.take_cloud(MapCloud.of_scan(scan))
 
 
 @pytest.fixture(scope="module")

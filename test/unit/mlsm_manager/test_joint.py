@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
@@ -78,7 +78,7 @@ def test_clear_forgets_everything():
 
 def test_a_cloud_waits_for_the_scan_of_its_time():
     localiser, _ = localiser_after(2, map_input=MapInput.CLEANED)
-    cloud = Cloud.of_scan(SCANS[2])
+    cloud = MapCloud.of_scan(SCANS[2])
     assert localiser.take_cloud(cloud).waiting
     (waited,) = localiser.take_scan(SCANS[2]).clouds
     assert waited.report.inserted == len(cloud)
@@ -87,7 +87,7 @@ def test_a_cloud_waits_for_the_scan_of_its_time():
 def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
     localiser = PARAMETERS.changed({"map_input": MapInput.CLEANED}).build_localiser(SONAR_IN_BASE)
     localiser.take_scan(SCANS[5])
-    early = Cloud.of_scan(SCANS[3])
+    early = MapCloud.of_scan(SCANS[3])
     assert localiser.take_cloud(early).report.inserted == len(early)
     low, high = early.points[:, :2].min(axis=0), early.points[:, :2].max(axis=0)
     assert (localiser.blocks.mean[:, :2] >= low - 1e-6).all()

@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_maps import random_points
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.surface_map.free_space import Carver, CarvingParameters, FirstEchoes
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -34,7 +34,7 @@ class MovedBy:
 def patch(number):
     """Return keyframe `number`: a flat patch of points that ends at that second."""
     points = random_points(number, 40, extent=3.0) * [1.0, 1.0, 0.0, 1.0]
-    return Cloud(points, np.full(len(points), float(number)), float(number))
+    return MapCloud(points, np.full(len(points), float(number)), float(number))
 
 
 def made_at_once(*parts):
@@ -127,7 +127,7 @@ def test_what_is_settled_until_a_time_forgets_the_keyframes_after_it():
 def cloud(number, *echoes):
     """Return keyframe `number`, which ends at that second, with a beam for each of the echoes (x, y) [m]."""
     points = np.array([[x, y, -2.0, 50.0] for x, y in echoes]).reshape(-1, 4)
-    return Cloud(points, number + 0.001 * np.arange(len(points)), float(number))
+    return MapCloud(points, number + 0.001 * np.arange(len(points)), float(number))
 
 
 def carved_map(*clouds, place=None):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_scans import SECONDS, drifting, harbour, scan_of, still
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import LocaliserParameters, MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import MatchStatus
@@ -36,7 +36,7 @@ def test_the_correction_moves_to_a_fix_within_the_blend_time():
 def test_where_cleaned_clouds_make_the_map_they_wait_for_the_scan_of_their_time():
     localiser = MlsmCoreParameters(start_matching=True).build_localiser()
     localiser.take_scan(drifting(0))
-    assert localiser.take_cloud(Cloud.of_scan(drifting(1))).waiting
+    assert localiser.take_cloud(MapCloud.of_scan(drifting(1))).waiting
     assert localiser.block_count == 0
     (waited,) = localiser.take_scan(drifting(1)).clouds
     assert waited.report.inserted == len(harbour())
@@ -55,7 +55,7 @@ def test_a_jump_back_in_time_keeps_the_map_and_forgets_the_place(take):
     assert localiser.notice_time(SECONDS) == 7 * SECONDS
     assert (localiser.believed_until, localiser.block_count) == (None, count)
     early = drifting(0)
-    assert getattr(localiser, take)(early if take == "take_scan" else Cloud.of_scan(early)) is not None
+    assert getattr(localiser, take)(early if take == "take_scan" else MapCloud.of_scan(early)) is not None
 
 
 def test_a_scan_that_is_late_by_more_than_half_a_minute_is_refused():

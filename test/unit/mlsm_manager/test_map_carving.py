@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_scans import harbour, scan_of, still, wall
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 from mlsm_manager.surface_map.map_file import Layer
@@ -104,7 +104,7 @@ def shown_in_order(estimator, cloud_first, carve, scans=9):
     localiser = parameters.build_localiser((0.0, 0.0))
     for turn in range(9):
         heard = scan_of(np.vstack([harbour(), GHOST]) if turn == 0 else harbour(), still(), start=16.0 * turn)
-        steps = [lambda heard=heard: localiser.take_cloud(Cloud.of_scan(heard))]
+        steps = [lambda heard=heard: localiser.take_cloud(MapCloud.of_scan(heard))]
         if turn < scans:
             steps.insert(1 if cloud_first else 0, lambda heard=heard: localiser.take_scan(heard))
         for step in steps:

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, still
 
-from mlsm_manager.localisation.clouds import Cloud, CorrectionHistory
+from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.scan_matching.prediction import Belief, Fading
 from mlsm_manager.scan_matching.scan import Track
@@ -25,7 +25,7 @@ def belief_of(time, pose, *errors):
 
 def cloud_at(times):
     times = np.array(times, dtype=float)
-    return Cloud(np.zeros((len(times), 4)), times, float(times[-1]))
+    return MapCloud(np.zeros((len(times), 4)), times, float(times[-1]))
 
 
 def history_of(*stretches):

@@ -3,7 +3,7 @@
 import numpy as np
 from made_scans import drifting, elsewhere, harbour, scan_of, still, wall
 
-from mlsm_manager.localisation.clouds import Cloud
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.scan_by_scan import ScanByScan
 from mlsm_manager.scan_matching.distribution_matcher import (
@@ -77,14 +77,14 @@ def test_after_rejections_the_place_is_less_sure_and_is_found_again():
 
 def test_a_cloud_of_a_rejected_scan_stays_out_of_the_map():
     estimator, _ = mapped([drifting(0), drifting(1), elsewhere(2)])
-    update = estimator.add_cloud(Cloud.of_scan(drifting(2)))
+    update = estimator.add_cloud(MapCloud.of_scan(drifting(2)))
     assert update.unplaced > 0.8 * len(harbour())
     assert update.report.inserted < 0.2 * len(harbour())
 
 
 def test_without_matching_a_cloud_is_inserted_at_once():
     estimator = estimator_of(matching=False)
-    update = estimator.add_cloud(Cloud.of_scan(drifting(0)))
+    update = estimator.add_cloud(MapCloud.of_scan(drifting(0)))
     assert not update.waiting
     assert update.report.inserted == len(harbour())
 
