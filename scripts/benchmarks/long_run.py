@@ -7,7 +7,7 @@ from typing import Iterator
 import numpy as np
 
 from benchmarks.harness import benchmark_parser
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan, Track

@@ -4,9 +4,9 @@ from typing import Callable, List, NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.measured.odometry_log import as_complex
-from mlsm_manager.joint_solver.solve.batch_solver import BatchResult
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.batch_solver import BatchResult
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.odometry_log import as_complex
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters

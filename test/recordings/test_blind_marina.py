@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.suited_parameters import EchoShape, suited

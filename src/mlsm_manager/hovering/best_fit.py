@@ -9,11 +9,11 @@ from mlsm_manager.hovering.echoes import Echoes
 from mlsm_manager.hovering.particle_filter import ParticleFilter, on_path
 from mlsm_manager.hovering.path_agreement import log_likelihood
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
-from mlsm_manager.joint_solver.placing.estimate import misfit_covariance
-from mlsm_manager.joint_solver.placing.path import NodePath
-from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, settled, solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import State
+from mlsm_manager.joint_solver.batch_solver import BatchResult, settled, solved
+from mlsm_manager.joint_solver.estimate import misfit_covariance
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.placement import NodePath
 
 _FILTERS = 3  # besides the live one: one of three or four loses a simulated tour now and then
 _ALL_TURNS = 200  # that particles reach back: all of a run of 50 minutes

@@ -5,11 +5,11 @@ from typing import Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
+from mlsm_manager.joint_solver.motion_models import OdometryModel
+from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place, place_lone
-from mlsm_manager.joint_solver.unknowns.state import State
+from mlsm_manager.joint_solver.placement import PlacedPoints, place, place_lone
+from mlsm_manager.joint_solver.run_log import RunLog
 
 ACROSS = 0.7  # m: standard deviation of an echo across the surface of another
 ALONG = 1.5  # m: and along it, where it says less

@@ -14,11 +14,11 @@ import numpy as np
 from mlsm_manager.hovering.compiled_particles import log_likelihoods, moves_onto_echoes
 from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST, Echoes
 from mlsm_manager.hovering.particles import Particles, drawn, led, squares_of
-from mlsm_manager.joint_solver.measured.odometry_log import Motion
-from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.velocity_models import AHEAD, ASIDE
+from mlsm_manager.joint_solver.normal_equations import YAW
+from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.unknowns.state import YAW
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.velocity_models import AHEAD, ASIDE
 from node_support.geometry import rotated
 
 _COUNT = 6000  # particles: with 1000 one simulated tour of two is lost

@@ -5,8 +5,8 @@ from typing import Dict, Mapping, Optional, Protocol
 
 import numpy as np
 
-from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
+from mlsm_manager.joint_solver.motion_models import OdometryModel
+from mlsm_manager.joint_solver.run_log import RunLog
 from node_support.parameters import ParameterSet, parameter
 
 # Beams are later than their stamps by so many deviations at most, and s of odometry that are worth waiting for.

@@ -5,8 +5,8 @@ from typing import List, Mapping, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint_session import (

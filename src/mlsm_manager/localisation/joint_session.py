@@ -5,13 +5,12 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
+from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
+from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.map_support import shares_heard_before
+from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
-from mlsm_manager.joint_solver.placing.turns import Turns
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.updates import ScanUpdate

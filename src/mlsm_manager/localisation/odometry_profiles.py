@@ -6,7 +6,9 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion.motion_models import (
+from mlsm_manager.joint_solver.batch_solver import BatchResult, solved
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.motion_models import (
     Compass,
     DvlFactors,
     DvlOdometry,
@@ -14,16 +16,14 @@ from mlsm_manager.joint_solver.motion.motion_models import (
     ThrusterFactors,
     ThrusterOdometry,
 )
-from mlsm_manager.joint_solver.motion.velocity_models import (
+from mlsm_manager.joint_solver.parameters import NodeSearch
+from mlsm_manager.joint_solver.velocity_models import (
     HeadingFactors,
     HeadingOdometry,
     Speeds,
     UnaidedFactors,
     UnaidedOdometry,
 )
-from mlsm_manager.joint_solver.parameters import NodeSearch
-from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.parameters import parameter
 

@@ -5,10 +5,10 @@ from typing import Protocol
 
 import numpy as np
 
-from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.motion.motion_models import OdometryModel
-from mlsm_manager.joint_solver.placing.drawing import corrected_path, drawn
-from mlsm_manager.joint_solver.unknowns.state import DELAY, State
+from mlsm_manager.joint_solver.motion_models import OdometryModel
+from mlsm_manager.joint_solver.normal_equations import DELAY, State
+from mlsm_manager.joint_solver.placement import corrected_path, drawn
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.clouds import MapCloud
 from node_support.geometry import transformed
 

@@ -5,13 +5,12 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compare.map_support import shares_heard_before
-from mlsm_manager.joint_solver.motion.motion_models import HELD_DEVIATION, OdometryModel
-from mlsm_manager.joint_solver.placing.estimate import LiveEstimate
-from mlsm_manager.joint_solver.placing.turns import Turns
-from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, PartResult, solved_part
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import DELAY, RANGE_SCALE, RUN_COLUMNS, State
+from mlsm_manager.joint_solver.batch_solver import BatchResult, Closed, PartResult, solved_part
+from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.map_support import shares_heard_before
+from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION, OdometryModel
+from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, RUN_COLUMNS, State
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters

@@ -5,11 +5,11 @@ from typing import List, Mapping, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.batch_solver import BatchResult, Closed, closed, solved
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.normal_equations import POSE, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placing.path import solved_path
-from mlsm_manager.joint_solver.solve.batch_solver import BatchResult, Closed, closed, solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import POSE, State
+from mlsm_manager.joint_solver.placement import solved_path
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap

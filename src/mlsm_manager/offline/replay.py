@@ -6,7 +6,7 @@ from typing import Callable, List, Mapping, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.updates import ScanUpdate

@@ -5,7 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-from mlsm_manager.joint_solver.placing.drawing import drawn
+from mlsm_manager.joint_solver.placement import drawn
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording

@@ -5,7 +5,7 @@ from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.measured.run_log import RunLog
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
 

@@ -1,20 +1,20 @@
 """Motion models of small vehicles, and parameters of the joint solver with a DVL."""
 
-from mlsm_manager.joint_solver.motion.motion_models import (
+from mlsm_manager.joint_solver.motion_models import (
     Compass,
     DvlFactors,
     DvlOdometry,
     ThrusterFactors,
     ThrusterOdometry,
 )
-from mlsm_manager.joint_solver.motion.velocity_models import (
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.velocity_models import (
     HeadingFactors,
     HeadingOdometry,
     Speeds,
     UnaidedFactors,
     UnaidedOdometry,
 )
-from mlsm_manager.joint_solver.parameters import SolverParameters
 
 COMPASS = Compass(heading_deviation=0.01745, heading_correlation_time=300.0, heading_walk=0.00035)
 DVL_ODOMETRY = DvlOdometry(

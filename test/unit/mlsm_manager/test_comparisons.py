@@ -9,16 +9,13 @@ from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solver_parameters
 
-from mlsm_manager.joint_solver.compare.association import COSINE_FADING, FADING, Pairs
-from mlsm_manager.joint_solver.compare.comparisons import summed
-from mlsm_manager.joint_solver.compare.neighbours import Neighbours
-from mlsm_manager.joint_solver.compiled.compiled_sums import scattered_blocks
-from mlsm_manager.joint_solver.compiled.compiled_weights import weighed_pairs
-from mlsm_manager.joint_solver.measured.odometry_log import as_complex
-from mlsm_manager.joint_solver.measured.surface_points import ramp
-from mlsm_manager.joint_solver.placing.placement import PlacedPoints, place
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import RANGE_SCALE, State
+from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, Neighbours, Pairs, summed
+from mlsm_manager.joint_solver.compiled_comparisons import scattered_blocks, weighed_pairs
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
+from mlsm_manager.joint_solver.odometry_log import as_complex
+from mlsm_manager.joint_solver.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.surface_points import ramp
 from node_support.geometry import rotated
 
 SAME = 1e-9

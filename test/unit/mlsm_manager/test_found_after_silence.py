@@ -5,9 +5,9 @@ import pytest
 from made_compass import PARAMETERS, with_heading_only
 from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, tour
 
-from mlsm_manager.joint_solver.compare.islands import MAP
-from mlsm_manager.joint_solver.placing.turns import Turns
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.estimate import Turns
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.submaps import MAP
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values

@@ -7,11 +7,11 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 from made_models import DVL_ODOMETRY, solver_parameters
 
-from mlsm_manager.joint_solver.motion.motion_models import DIRECTION, DvlFactors
-from mlsm_manager.joint_solver.placing.path import solved_path
-from mlsm_manager.joint_solver.solve.batch_solver import solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import DELAY
+from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.motion_models import DIRECTION, DvlFactors
+from mlsm_manager.joint_solver.normal_equations import DELAY
+from mlsm_manager.joint_solver.placement import solved_path
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry import composed

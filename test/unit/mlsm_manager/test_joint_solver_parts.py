@@ -9,16 +9,14 @@ from hypothesis import strategies as st
 from made_harbour import logged, tour
 from made_models import DVL, DVL_ODOMETRY, solver_parameters
 
-from mlsm_manager.joint_solver.compare.association import pairs_of
-from mlsm_manager.joint_solver.compare.neighbours import Neighbours
-from mlsm_manager.joint_solver.measured.growing import GrowingArray
-from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
-from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
-from mlsm_manager.joint_solver.motion.motion_models import DvlFactors
-from mlsm_manager.joint_solver.placing.placement import place
-from mlsm_manager.joint_solver.solve.frozen_map import fading, joint_covariance, nearest_blocks
-from mlsm_manager.joint_solver.unknowns.normal_equations import DenseSolution, NormalEquations, SparseSolution
-from mlsm_manager.joint_solver.unknowns.state import Layout, State
+from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
+from mlsm_manager.joint_solver.growing import GrowingArray
+from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_blocks
+from mlsm_manager.joint_solver.motion_models import DvlFactors
+from mlsm_manager.joint_solver.normal_equations import DenseSolution, Layout, NormalEquations, SparseSolution, State
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.placement import place
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 from mlsm_manager.scan_matching.scan import Track
 
 STEP = 1e-6

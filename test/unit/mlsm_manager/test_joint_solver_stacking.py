@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from mlsm_manager.joint_solver.solve.stacking import stacked, unstacked
+from mlsm_manager.joint_solver.estimate import stacked, unstacked
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,10 @@ import pytest
 from made_harbour import tour
 from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.compare.association import Pairs
-from mlsm_manager.joint_solver.compare.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.placing.placement import place
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.comparisons import Pairs
+from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.placement import place
 from node_support.geometry import transformed
 
 HARBOUR = tour(4)

@@ -5,10 +5,9 @@ import pytest
 from made_models import HEADING, solver_parameters
 from made_posts import SPEED, cluttered, heard, true_path
 
-from mlsm_manager.joint_solver.measured.lone_points import crowds, lone_points
-from mlsm_manager.joint_solver.measured.surface_points import SurfacePoints
-from mlsm_manager.joint_solver.solve.batch_solver import solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, crowds, lone_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = pytest.mark.long

@@ -7,10 +7,10 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.search.loops import Loop, agreed, loops_of
-from mlsm_manager.joint_solver.search.places import PlaceCandidate
-from mlsm_manager.joint_solver.solve.batch_solver import Closed, closed, solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.batch_solver import Closed, closed, solved
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
+from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, transformed
 

@@ -7,9 +7,9 @@ import pytest
 from made_models import DVL, HEADING, solver_parameters
 from made_posts import heard, true_path
 
-from mlsm_manager.joint_solver.compare.map_support import misfit_variances, shares_heard_before
-from mlsm_manager.joint_solver.measured.run_log import RunLog
-from mlsm_manager.joint_solver.unknowns.state import State
+from mlsm_manager.joint_solver.map_support import misfit_variances, shares_heard_before
+from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.run_log import RunLog
 
 TURNS = 4
 

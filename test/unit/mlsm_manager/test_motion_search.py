@@ -5,10 +5,10 @@ import pytest
 from made_harbour import ahead, logged, tour
 from made_models import DVL, HEADING, UNAIDED, solver_parameters
 
-from mlsm_manager.joint_solver.motion.motion_models import Transition
-from mlsm_manager.joint_solver.placing.path import NodePath
-from mlsm_manager.joint_solver.search.place_search import searched_node
-from mlsm_manager.joint_solver.unknowns.state import YAW, State
+from mlsm_manager.joint_solver.motion_models import Transition
+from mlsm_manager.joint_solver.normal_equations import YAW, State
+from mlsm_manager.joint_solver.place_search import searched_node
+from mlsm_manager.joint_solver.placement import NodePath
 
 FAR = np.array([3.0, -5.0])
 

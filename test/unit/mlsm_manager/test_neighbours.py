@@ -4,8 +4,8 @@ import numpy as np
 from hypothesis import given
 from hypothesis import strategies as st
 
-from mlsm_manager.joint_solver.compare.neighbours import TIE, Neighbours
-from mlsm_manager.joint_solver.placing.placement import PlacedPoints
+from mlsm_manager.joint_solver.comparisons import TIE, Neighbours
+from mlsm_manager.joint_solver.placement import PlacedPoints
 
 SCANS = np.repeat(np.arange(6), 15)
 BLOCK_SCANS = 3

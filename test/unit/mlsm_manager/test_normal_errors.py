@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.joint_solver.compare.normal_errors import discounted
+from mlsm_manager.joint_solver.weak_directions import discounted
 
 PLACES = np.array([[0, 1], [3, 4], [6, 7], [9, 10]])
 COLUMNS = 14

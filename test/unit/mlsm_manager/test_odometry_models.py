@@ -7,12 +7,11 @@ import numpy as np
 import pytest
 from made_harbour import CANAL, SONAR_IN_BASE, ahead, along_canal, tour
 
-from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
-from mlsm_manager.joint_solver.placing.estimate import scale_covariance
-from mlsm_manager.joint_solver.solve.batch_solver import solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.normal_equations import NormalEquations
-from mlsm_manager.joint_solver.unknowns.state import Layout
+from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.estimate import scale_covariance
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track

@@ -5,9 +5,9 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.solve.batch_solver import solved, solved_part
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
-from mlsm_manager.joint_solver.unknowns.state import DELAY, RUN_COLUMNS
+from mlsm_manager.joint_solver.batch_solver import solved, solved_part
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.normal_equations import DELAY, RUN_COLUMNS
 
 pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; whole runs are mapped with every version")]
 FIRST = 8

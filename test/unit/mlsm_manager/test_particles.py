@@ -19,8 +19,8 @@ from mlsm_manager.hovering.particle_filter import (
     weighed,
 )
 from mlsm_manager.hovering.particles import Particles, drawn, led
-from mlsm_manager.joint_solver.measured.odometry_log import Motion, OdometryLog
-from mlsm_manager.joint_solver.motion.velocity_models import AHEAD, ASIDE
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.velocity_models import AHEAD, ASIDE
 from mlsm_manager.scan_matching.scan import Track
 
 PART = 5.0  # s

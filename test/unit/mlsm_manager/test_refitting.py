@@ -7,8 +7,8 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.solve.batch_solver import solved
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
 from node_support.geometry import inverse, transformed
 

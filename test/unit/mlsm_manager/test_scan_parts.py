@@ -3,7 +3,7 @@
 import numpy as np
 from made_posts import heard
 
-from mlsm_manager.joint_solver.measured.scan_parts import parts_of
+from mlsm_manager.joint_solver.run_log import parts_of
 from mlsm_manager.scan_matching.scan import Scan
 
 FIRST, SECOND = heard(2)

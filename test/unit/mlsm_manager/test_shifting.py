@@ -13,8 +13,8 @@ from mlsm_manager.hovering.particle_filter import likelihoods_of, nearby_of, on_
 from mlsm_manager.hovering.particles import Particles
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
-from mlsm_manager.joint_solver.solve.batch_solver import settled
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.batch_solver import settled
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
 
-from mlsm_manager.joint_solver.solve.live_solver import LiveSolver
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted, profile_values, strafes
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 from mlsm_manager.offline.suited_parameters import may_strafe

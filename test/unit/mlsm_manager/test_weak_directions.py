@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.compare.weak_directions import WeakDirections
-from mlsm_manager.joint_solver.placing.placement import PlacedPoints
-from mlsm_manager.joint_solver.unknowns.state import BEFORE_THE_RUN
+from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
+from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
 MATCHING = solver_parameters(normal_deviation=0.2)
 SCANS = 5

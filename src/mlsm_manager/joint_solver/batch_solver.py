@@ -1,0 +1,267 @@
+"""Fits a whole run at once, starting from what the live solver found."""
+
+from dataclasses import dataclass
+from typing import Any, Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons, pairs_of, support
+from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.loops import Loop, add_loops, loops_of
+from mlsm_manager.joint_solver.map_support import misfit_variances
+from mlsm_manager.joint_solver.motion_models import OdometryModel
+from mlsm_manager.joint_solver.normal_equations import (
+    POSE_COLUMNS,
+    RUN_COLUMNS,
+    Layout,
+    NormalEquations,
+    State,
+    solution_of,
+)
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.post_comparisons import LoneComparisons
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.submaps import Islands
+from mlsm_manager.joint_solver.weak_directions import WeakDirections
+
+_MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
+_PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
+_CONVINCING = 10.0  # nats by which a run with loops must fit better
+_TOLD_STEP = 0.3  # m: deviation of a step of a path that is told, within which scans then find their places
+_CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
+
+
+@dataclass(frozen=True)
+class BatchResult:
+    """The whole run. steps: how many were taken. converged: the last one was as short as the parameters ask for.
+
+    node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2).
+    """
+
+    state: State
+    node_times: np.ndarray
+    pose_covariances: np.ndarray
+    run_covariance: np.ndarray
+    steps: int
+    converged: bool
+
+
+@dataclass(frozen=True)
+class PartResult:
+    """What a part of a run says of sonar and odometry. node: (width,) the newest one's unknowns. run: (2,).
+
+    covariance: (width + 2, width + 2) of both. steps: how many were taken.
+    """
+
+    node: np.ndarray
+    run: np.ndarray
+    covariance: np.ndarray
+    steps: int
+
+
+@dataclass(frozen=True)
+class Closed:
+    """batch: the fit that the run speaks for. loops: places visited again that it goes back to; none where it does not.
+
+    gain: nats by which the run speaks for the fit with loops, less if below 0; NaN where none was found.
+    """
+
+    batch: BatchResult
+    loops: List[Loop]
+    gain: float
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return it for summary.json."""
+        return {
+            "gain": None if np.isnan(self.gain) else round(self.gain, 1),
+            "found": [loop.line() for loop in self.loops],
+        }
+
+
+def closed(live: LiveSolver, batch: BatchResult) -> Closed:
+    """Return the fit with places visited again that their shape tells, if the run fits better so than in `batch`.
+
+    What was found only pulls the run near; where it ends, comparisons of echoes and the odometry say alone.
+    """
+    loops = loops_of(live.log, live.odometry, batch.state, live.parameters)
+    if not loops:
+        return Closed(batch, [], np.nan)
+    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, batch.state.copy(), loops)
+    for _ in range(_PULLED_STEPS):
+        problem.step()
+    other = solved(live, start=problem.state)
+    without, with_loops = (
+        _Batch(live.log, live.islands, live.odometry, live.parameters, some.state.copy()).evidence()
+        for some in (batch, other)
+    )
+    gain = with_loops - without
+    return Closed(other, loops, gain) if gain > _CONVINCING else Closed(batch, [], gain)
+
+
+def solved(
+    live: LiveSolver,
+    parameters: Optional[SolverParameters] = None,
+    start: Optional[State] = None,
+    told: Optional[State] = None,
+) -> BatchResult:
+    """Return the fit of all scans that `live` has taken; its own state stays as it is.
+
+    parameters, start: others than those of `live`, with the same odometry. told: unknowns whose
+    steps are known to _TOLD_STEP; None where none are.
+    """
+    parameters, start = parameters or live.parameters, start or live.state
+    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy(), told=told)
+    steps, converged = problem.converge()
+    poses, run = problem.covariances()
+    poses = poses + misfit_covariance(_misfit(live, problem.state))
+    return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
+
+
+def settled(live: LiveSolver, start: State) -> State:
+    """Return the unknowns of the fit that begins at `start` and takes its steps for told, without covariances.
+
+    Where next to nothing tells the way along a wall, a fit that is not told creeps to a standstill there.
+    """
+    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, start.copy(), told=start)
+    problem.converge()
+    return problem.state
+
+
+def solved_part(live: LiveSolver, first: int) -> PartResult:
+    """Return the fit of the scan `first` of `live` and all later ones alone, as if the run had begun with it.
+
+    What `live` found is where the fit begins, but no belief of it.
+    """
+    state = State(live.state.nodes[first:].copy(), live.state.run.copy())
+    state.nodes[:, :2] -= state.nodes[0, :2]
+    islands = Islands(live.islands.numbers[first:])
+    problem = _Batch(live.log.since(first), islands, live.odometry, live.parameters, state)
+    steps, _ = problem.converge()
+    return PartResult(state.nodes[-1].copy(), state.run.copy(), problem.newest_covariance(), steps)
+
+
+def _misfit(live: LiveSolver, state: State) -> np.ndarray:
+    """Return how uncertain scans that fit nowhere make the place of each node (n,) [m^2]."""
+    parts = live.parameters.parts_per_turn
+    of_turns = misfit_variances(live.log, live.odometry, state, live.parameters, 0)
+    return np.cumsum(np.append(0.0, np.repeat(of_turns / parts, parts)))
+
+
+class _Batch:
+    def __init__(
+        self,
+        log: RunLog,
+        islands: Islands,
+        odometry: OdometryModel,
+        parameters: SolverParameters,
+        state: State,
+        loops: Sequence[Loop] = (),
+        told: Optional[State] = None,
+    ) -> None:
+        self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
+        self._islands = islands
+        self._layout = Layout(0, log.scan_count, odometry.width)
+        self._motion = log.node_motion(np.arange(log.scan_count + 1))
+        self._loops, self._start, self._told = list(loops), state.copy(), told
+        self._solution = None
+        self._move = np.zeros(self._layout.size)
+        self._lists: Optional[Neighbours] = None
+        scans = np.arange(log.scan_count)
+        self._lone = LoneComparisons(log, odometry, parameters, scans, np.ones(len(scans)))
+
+    def converge(self) -> Tuple[int, bool]:
+        """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
+        window = self._parameters
+        for taken in range(1, window.batch_iterations + 1):
+            if self.step() < window.tolerance or self.step_deviations < window.stop_sigma:
+                return taken, True
+        return window.batch_iterations, False
+
+    def step(self) -> float:
+        """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
+        equations, parameters = self._expected(), self._parameters
+        add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
+        points, pairs = self._met()
+        add_comparisons(equations, self._layout, pairs, points, points, parameters, parameters.cut)
+        self._lone.add(equations, self._layout, self.state, parameters.cut)
+        self._solution = solution_of(equations)
+        self._move = self._solution.step + _MOMENTUM * self._move
+        self.state.nodes += self._nodes_of(self._move)
+        self.state.run += self._move[self._layout.run_start :]
+        moves = self._nodes_of(self._solution.step)[:, :2]
+        return float(np.sqrt((moves**2).sum(axis=1).mean()))
+
+    def evidence(self) -> float:
+        """Return how much [nats] comparisons and odometry speak for the state: echoes on surfaces less odd motions."""
+        points, pairs = self._met()
+        on_surfaces = support(pairs, points, points, self._parameters)
+        return on_surfaces - 0.5 * self._expected().cost
+
+    def _expected(self) -> NormalEquations:
+        """Return what is expected of the unknowns without any echo."""
+        equations = NormalEquations(self._layout.size)
+        odometry = self._odometry
+        equations.add_prior(0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
+        equations.add_prior(
+            self._layout.run_start, self.state.run, self._parameters.run_mean, self._parameters.run_deviations
+        )
+        odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
+        if self._told is not None:
+            now, told = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._told))
+            _add_fixed_steps(equations, self._layout, now, told)
+        return equations
+
+    def _met(self) -> Tuple[PlacedPoints, Pairs]:
+        """Return all points and their comparisons."""
+        parameters = self._parameters
+        rows = self._log.rows(0, self._layout.last)
+        points = place(self._log, self._odometry, self.state, rows)
+        points = WeakDirections.of([points], parameters).without(points, points.scans)
+        if self._lists is None:
+            self._lists = Neighbours(points, parameters.group_scans)
+        pairs = pairs_of(self._lists, points, points, parameters.cut, parameters)
+        return points, self._islands.within(pairs, points, points)
+
+    def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
+        return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
+
+    @property
+    def step_deviations(self) -> float:
+        """Root mean square over the nodes of the last step, in its standard deviations."""
+        return self._solution.step_deviations / float(np.sqrt(len(self.state.nodes)))
+
+    def covariances(self) -> Tuple[np.ndarray, np.ndarray]:
+        """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""
+        run = self._layout.run_start + np.arange(RUN_COLUMNS)
+        nodes = np.arange(self._layout.last + 1)
+        poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
+        places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
+        by_scale = scale_covariance(places, self._parameters.world_scale_deviation)
+        return np.concatenate(poses) + by_scale, self._columns_of_inverse(run)[run]
+
+    def newest_covariance(self) -> np.ndarray:
+        """Return that of the newest node's and the run's unknowns (width + 2, width + 2)."""
+        columns = np.arange(self._layout.node_start(self._layout.last), self._layout.size)
+        return self._columns_of_inverse(columns)[columns]
+
+    def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
+        columns = self._layout.pose_columns(nodes)
+        inverse = self._columns_of_inverse(columns.ravel()).reshape(self._layout.size, len(nodes), POSE_COLUMNS)
+        return np.stack([inverse[own, number] for number, own in enumerate(columns)])
+
+    def _columns_of_inverse(self, columns: np.ndarray) -> np.ndarray:
+        unit = np.zeros((self._layout.size, len(columns)))
+        unit[columns, np.arange(len(columns))] = 1.0
+        return self._solution.solve(unit)
+
+
+def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndarray, told: np.ndarray) -> None:
+    """Add that steps between all nodes, now at `places` (n, 2) [m] in map, are those of the path `told` (n, 2)."""
+    count = len(places) - 1
+    columns = layout.pose_columns(np.column_stack([np.arange(count), np.arange(count) + 1]))
+    errors = np.diff(places - told, axis=0)
+    for axis in (0, 1):
+        jacobian = np.tile([-1.0, 1.0], (count, 1))
+        equations.add(columns[:, :, axis], jacobian, errors[:, axis], np.full(count, _TOLD_STEP**-2.0))

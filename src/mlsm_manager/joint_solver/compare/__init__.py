@@ -1,1 +1,0 @@
-"""Compares points with the surfaces that other scans heard."""

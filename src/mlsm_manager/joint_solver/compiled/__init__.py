@@ -1,1 +1,0 @@
-"""Loops compiled by numba. Nothing here imports the rest of the solver."""

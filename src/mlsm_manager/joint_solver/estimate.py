@@ -1,0 +1,170 @@
+"""What the live solver knows when a scan has ended."""
+
+from dataclasses import dataclass, fields, is_dataclass
+from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
+
+import numpy as np
+
+from mlsm_manager.joint_solver.motion_models import Drift
+from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
+from mlsm_manager.joint_solver.odometry_log import as_complex
+
+
+@dataclass(frozen=True)
+class LiveEstimate:
+    """Known from the scan that ended at `time` [s] and those before it.
+
+    T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. T_map_odom: (3,) the correction. node: (width,)
+    the newest node's unknowns. run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
+    own_covariance: the same if the frozen map had no error. reported_velocity: (3,) m/s, m/s, rad/s that the odometry
+    reported in base_link. drift: how the true motion differs from it.
+    world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
+    agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
+    mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
+    misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place.
+    """
+
+    time: float
+    T_odom_base: np.ndarray
+    T_map_base: np.ndarray
+    T_map_odom: np.ndarray
+    node: np.ndarray
+    run: np.ndarray
+    covariance: np.ndarray
+    own_covariance: np.ndarray
+    reported_velocity: np.ndarray
+    drift: Drift
+    world_scale_deviation: float
+    comparisons: int
+    agreement: float
+    distance: float
+    surfaces: np.ndarray
+    misfit_variance: float = 0.0
+
+    @property
+    def pose_covariance(self) -> np.ndarray:
+        """(3, 3) of T_map_base: m^2, m rad, rad^2; what the world's scale adds grows from the map's origin."""
+        by_scale = scale_covariance(self.T_map_base[np.newaxis], self.world_scale_deviation)[0]
+        return self.covariance[POSE, POSE] + by_scale + misfit_covariance(np.array([self.misfit_variance]))[0]
+
+    @property
+    def node_deviations(self) -> np.ndarray:
+        """(width,) standard deviations of `node` if the frozen map had no error."""
+        return np.sqrt(np.diag(self.own_covariance)[:-RUN_COLUMNS])
+
+    @property
+    def run_deviations(self) -> np.ndarray:
+        """(2,) standard deviations of `run`: errors of the frozen map bend it as they bend the path."""
+        return np.sqrt(np.diag(self.covariance)[-RUN_COLUMNS:])
+
+    @property
+    def velocity(self) -> np.ndarray:
+        """(3,) of the vehicle in base_link, m/s, m/s, rad/s."""
+        moved = self._gain * as_complex(self.reported_velocity)
+        return np.array([moved.real, moved.imag, self.reported_velocity[2]]) + self.drift.values[:3]
+
+    @property
+    def velocity_covariance(self) -> np.ndarray:
+        """(3, 3) of `velocity`: what the unknowns of the newest node leave open, without noise of what is reported."""
+        by_gain = np.exp(1j * self.drift.values[4]) * as_complex(self.reported_velocity)
+        by_direction = 1j * self._gain * as_complex(self.reported_velocity)
+        by_drift = np.eye(3, len(self.drift.values))
+        by_drift[:2, 3] = by_gain.real, by_gain.imag
+        by_drift[:2, 4] = by_direction.real, by_direction.imag
+        slopes = by_drift @ self.drift.slopes
+        return slopes @ self.covariance[:-RUN_COLUMNS, :-RUN_COLUMNS] @ slopes.T
+
+    @property
+    def _gain(self) -> complex:
+        return complex((1.0 + self.drift.values[3]) * np.exp(1j * self.drift.values[4]))
+
+    @property
+    def range_scale(self) -> float:
+        """True range over reported range, minus 1."""
+        return float(self.run[RANGE_SCALE])
+
+    @property
+    def sonar_delay(self) -> float:
+        """Seconds by which beams are later than their stamps."""
+        return float(self.run[DELAY])
+
+
+def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:
+    """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map.
+
+    deviation: of the scale, as a share of 1.
+    """
+    lengths = poses * np.array([1.0, 1.0, 0.0])
+    return deviation**2 * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]
+
+
+def misfit_covariance(variances: np.ndarray) -> np.ndarray:
+    """Return what an uncertainty of the place by `variances` (n,) [m^2] adds to the covariances (n, 3, 3) of poses."""
+    return variances[:, np.newaxis, np.newaxis] * np.diag([1.0, 1.0, 0.0])
+
+
+class Turns(NamedTuple):
+    """n turns. times: (n,) s of their ends. agreements: (n,), surfaces: (n, 2, 2), see LiveEstimate. radii: (n,) m,
+    told deviation of the position. apart: (n,) bool, whether their place in the map is not known.
+    """
+
+    times: np.ndarray
+    agreements: np.ndarray
+    surfaces: np.ndarray
+    radii: np.ndarray
+    apart: np.ndarray
+
+    @classmethod
+    def of(cls, estimates: Sequence[LiveEstimate], apart: np.ndarray, parts: int) -> "Turns":
+        """Return those of `estimates` and `apart`, both (n parts,), `parts` of which belong to each turn."""
+        ends = estimates[parts - 1 :: parts]
+        return cls(
+            times=np.array([estimate.time for estimate in ends]),
+            agreements=np.array([estimate.agreement for estimate in estimates]).reshape(-1, parts).mean(axis=1),
+            surfaces=np.array([estimate.surfaces for estimate in estimates]).reshape(-1, parts, 2, 2).sum(axis=1),
+            radii=np.sqrt([np.trace(estimate.pose_covariance[:2, :2]) for estimate in ends]),
+            apart=apart[parts - 1 :: parts],
+        )
+
+    @classmethod
+    def with_echoes(
+        cls, estimates: Sequence[LiveEstimate], apart: np.ndarray, parts: int, point_counts: np.ndarray, most: int
+    ) -> "Turns":
+        """Return the newest `most` turns in which surfaces were heard; point_counts: (n parts,) of the scans."""
+        heard = np.flatnonzero(point_counts.reshape(-1, parts).any(axis=1))[-most:]
+        scans = (heard[:, np.newaxis] * parts + np.arange(parts)).ravel()
+        return cls.of([estimates[scan] for scan in scans], apart[scans], parts)
+
+
+def stacked(items: Sequence[Any], prefix: str = "") -> Dict[str, np.ndarray]:
+    """Return for each field its values in all `items` (n), (n, ...); the fields of a nested dataclass one by one."""
+    if not items:
+        return {}
+    arrays = {}
+    for field in fields(items[0]):
+        values = [getattr(item, field.name) for item in items]
+        if is_dataclass(values[0]):
+            arrays.update(stacked(values, f"{prefix}{field.name}."))
+        else:
+            arrays[prefix + field.name] = np.array(values)
+    return arrays
+
+
+def unstacked(kind: type, arrays: Mapping[str, np.ndarray], prefix: str = "") -> List[Any]:
+    """Return the dataclasses of type `kind` that `stacked` took; none where `arrays` has no such field.
+
+    Raises KeyError for a field that is missing, and ValueError for fields that are not equally long.
+    """
+    if not any(name.startswith(prefix) for name in arrays):
+        return []
+    columns = [_column(field.type, arrays, prefix + field.name) for field in fields(kind)]
+    if len({len(column) for column in columns}) != 1:
+        raise ValueError(f"{prefix}: {[len(column) for column in columns]} elements")
+    return [kind(*values) for values in zip(*columns)]
+
+
+def _column(kind: type, arrays: Mapping[str, np.ndarray], name: str) -> Sequence[Any]:
+    if is_dataclass(kind):
+        return unstacked(kind, arrays, f"{name}.")
+    array = arrays[name]
+    return array.tolist() if array.ndim == 1 and kind is not np.ndarray else list(array)

@@ -1,0 +1,273 @@
+"""Older scans that no longer move: the nearest blocks of them, what they say and how certain they are."""
+
+from dataclasses import dataclass
+from typing import Iterator, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons, pairs_of
+from mlsm_manager.joint_solver.estimate import LiveEstimate
+from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.map_support import agreement, surfaces_met
+from mlsm_manager.joint_solver.motion_models import OdometryModel, frozen_deviations
+from mlsm_manager.joint_solver.normal_equations import (
+    DELAY,
+    POSE,
+    POSE_COLUMNS,
+    RANGE_SCALE,
+    RUN_COLUMNS,
+    DenseSolution,
+    Layout,
+    NormalEquations,
+    State,
+)
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.post_comparisons import LoneComparisons
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.submaps import Islands
+from mlsm_manager.joint_solver.weak_directions import WeakDirections
+from node_support.geometry import composed, inverse
+
+_AGE_DISTANCE = 5.0  # m by which the newest block counts as farther than the oldest: the oldest drifted least
+_FADING = 0.1  # share of the reach within which a block fades out, so that no block appears at once
+_NO_DISTANCE = 1e-9  # m: keeps blocks at one place from dividing by zero
+
+
+@dataclass(frozen=True)
+class FrozenMap:
+    """Points of frozen blocks, placed with the run's unknowns at `run` (2,).
+
+    importance: (n,) factor of each point's weight, 0 at the border of what is near.
+    numbers: (b,) the blocks that are near, in the order of time. block_importance: (b,) the factor of each.
+    """
+
+    points: PlacedPoints
+    importance: np.ndarray
+    numbers: np.ndarray
+    block_importance: np.ndarray
+    run: np.ndarray
+
+    def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
+        """Return the points with the run's unknowns at `run` (2,), to first order."""
+        return self.points.moved_by_run(run - self.run)
+
+
+def nearest_blocks(
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    count: int,
+    place_now: np.ndarray,
+    parameters: SolverParameters,
+) -> FrozenMap:
+    """Return the blocks nearest to `place_now` (2,) among the first `count` blocks of the run."""
+    scans = parameters.group_scans
+    middles = np.arange(count) * scans + scans // 2
+    places = log.node_poses(middles)[:, :2] + state.nodes[middles, :2]
+    distances = np.hypot(*(places - place_now).T) + _AGE_DISTANCE * np.arange(count) / max(count, 1)
+    importance = fading(distances, parameters.frozen_groups)
+    numbers = np.flatnonzero(importance > 0.0)
+    rows = np.concatenate(
+        [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
+    )
+    points = place(log, odometry, state, rows)
+    per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
+    return FrozenMap(points, per_point, numbers, importance[numbers], state.run.copy())
+
+
+def fading(distances: np.ndarray, most: int) -> np.ndarray:
+    """Return factors (b,) of blocks at `distances` (b,) [m]: 1 for near ones, falling to 0; at most `most` are above 0.
+
+    They depend on the distances continuously. Blocks at one distance fade together.
+    """
+    if len(distances) <= most:
+        return np.ones(len(distances))
+    border = np.partition(distances, most)[most]
+    return np.clip((border - distances) / max(_FADING * border, _NO_DISTANCE), 0.0, 1.0)
+
+
+def joint_covariance(covariances: np.ndarray) -> np.ndarray:
+    """Return (3 b, 3 b) of the poses of b frozen places with `covariances` (b, 3, 3).
+
+    They are taken to be correlated as the places of a random walk are: by the ratio of their deviations.
+    """
+    deviations = np.sqrt(covariances[:, 0, 0] + covariances[:, 1, 1])
+    ratio = np.minimum.outer(deviations, deviations) / np.maximum.outer(deviations, deviations)
+    factors = np.linalg.cholesky(covariances)
+    joint = np.einsum("iac,jbc,ij->iajb", factors, factors, ratio)
+    return joint.reshape(POSE_COLUMNS * len(covariances), POSE_COLUMNS * len(covariances))
+
+
+_FORGOTTEN_DELAY = 2.0
+"""Factor of the delay's deviation as it was known before the window. Comparisons follow where points go, and what is
+frozen keeps what it was frozen with, so that they tell less than they seem to: taken at their word, windows 41 scans
+apart kept a delay of their own each, in turn 0.68 and 0.86 s, where the whole run says 1.00 s."""
+_MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
+
+
+class LiveWindow:
+    """Moves the free nodes of `state` and its run's unknowns in place.
+
+    estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
+    standard deviations of the first node's pose, None where it defines the map. known: what was in the map before.
+    islands: which scans are compared with each other.
+    """
+
+    def __init__(
+        self, log: RunLog, odometry: OdometryModel, parameters: SolverParameters, state: State,
+        estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
+        known: Optional[KnownSurfaces], islands: Islands,
+    ) -> None:  # fmt: skip
+        self._islands = islands
+        self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
+        last = log.scan_count
+        first = max(0, last - parameters.free_nodes)
+        self._scans_per_block = parameters.group_scans
+        self._recent = first // self._scans_per_block * self._scans_per_block
+        around = log.node_poses(last)[:2] + state.nodes[last, :2]
+        self._frozen = nearest_blocks(log, odometry, state, first // self._scans_per_block, around, parameters)
+        self._layout = Layout(first, last, odometry.width, self._groups(first))
+        self._held_covariance = self._covariance_of_frozen(covariances, first)
+        self._anchor = estimates[first - 1] if first else None
+        self._motion = log.node_motion(np.arange(first, last + 1))
+        self._start, self._known = start, known
+        self._solution: Optional[DenseSolution] = None
+        self._comparisons = 0
+        self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
+        self._met = ()
+        self._lone = self._lone_comparisons()
+
+    def _lone_comparisons(self) -> LoneComparisons:
+        """Return those with the frozen blocks and with the scans since."""
+        blocks = self._frozen.numbers[:, np.newaxis] * self._scans_per_block + np.arange(self._scans_per_block)
+        recent = np.arange(self._recent, self._layout.last)
+        importance = np.repeat(self._frozen.block_importance, self._scans_per_block)
+        scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
+        same = self._islands.numbers[scans] == self._islands.newest
+        scans, importance = scans[same], importance[same]
+        return LoneComparisons(self._log, self._odometry, self._parameters, scans, importance)
+
+    def _groups(self, first: int) -> np.ndarray:
+        """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
+        group_of_block = np.full(first // self._scans_per_block + 1, -1)
+        group_of_block[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
+        group_of_block[-1] = len(self._frozen.numbers)
+        return group_of_block[np.arange(first) // self._scans_per_block]
+
+    def _covariance_of_frozen(self, covariances: np.ndarray, first: int) -> np.ndarray:
+        """Return (3 g, 3 g) of the groups' poses."""
+        if not first:
+            return np.zeros((0, 0))
+        middles = self._frozen.numbers * self._scans_per_block + self._scans_per_block // 2
+        return joint_covariance(covariances[np.append(middles, first)])
+
+    def step(self, cut: float) -> None:
+        """Take one Gauss-Newton step with points up to `cut` [m] apart."""
+        equations = NormalEquations(self._layout.size, len(self._held_covariance))
+        self._add_beliefs(equations)
+        free = self._state.nodes[self._layout.first :]
+        self._odometry.add_steps(equations, self._layout, free, self._motion)
+        self._comparisons = self._add_surfaces(equations, cut)
+        self._comparisons += self._lone.add(equations, self._layout, self._state, cut)
+        self._solution = DenseSolution(equations)
+        self._move(self._solution.step)
+
+    def _add_beliefs(self, equations: NormalEquations) -> None:
+        mean, deviations, run, of_run = self._beliefs()
+        equations.add_prior(0, self._state.nodes[self._layout.first], mean, deviations)
+        equations.add_prior(self._layout.run_start, self._state.run, run, of_run)
+        if self._anchor is not None:
+            own = np.arange(POSE_COLUMNS)
+            held = self._layout.size + len(self._held_covariance) - POSE_COLUMNS + own
+            weight = deviations[POSE] ** -2.0
+            cross = np.zeros((POSE_COLUMNS, 2, 2))
+            cross[:, 0, 1] = cross[:, 1, 0] = -weight
+            equations.add_blocks(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
+
+    def _beliefs(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """Return mean and deviations of the first free node and of the run's unknowns.
+
+        Of a frozen node it is what was known when it was the newest: the window's scans are not in that.
+        """
+        if self._anchor is None:
+            deviations = self._odometry.first_deviations()
+            if self._start is not None:
+                deviations[POSE] = self._start
+            return self._odometry.first_node(), deviations, self._parameters.run_mean, self._parameters.run_deviations
+        pose = self._state.nodes[self._layout.first, POSE]
+        mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
+        deviations = frozen_deviations(self._anchor.node_deviations)
+        of_run = self._anchor.run_deviations
+        of_run[DELAY] *= _FORGOTTEN_DELAY
+        return mean, deviations, self._anchor.run, of_run
+
+    def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
+        """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
+        parameters = self._parameters
+        rows = self._log.rows(self._recent, self._layout.last)
+        recent = place(self._log, self._odometry, self._state, rows)
+        frozen = self._frozen.moved_by_run(self._state.run)
+        weak = WeakDirections.of((frozen, recent), parameters)
+        frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
+        sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
+        to_frozen, to_recent = self._compared(sources, (frozen, recent), cut)
+        met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
+        summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
+        if self._known is not None:
+            to_known, known = self._known.compared(sources, cut, parameters)
+            known = weak.without(known, sources.scans[to_known.rows])
+            to_known = self._islands.within(to_known, sources, known)
+            met.insert(0, (to_known, sources, known))
+            summed.insert(1, met[0])
+        self._met = tuple(met)
+        return sum(add_comparisons(equations, self._layout, *some, parameters, cut) for some in summed)
+
+    def _compared(
+        self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
+    ) -> Iterator[Pairs]:
+        """Compare `sources` with frozen and recent points, whose neighbours are looked up once for all steps."""
+        parameters = self._parameters
+        if self._lists is None:
+            self._lists = tuple(Neighbours(targets, parameters.group_scans) for targets in surfaces)
+        for lists, targets in zip(self._lists, surfaces):
+            pairs = pairs_of(lists, sources, targets, cut, parameters)
+            yield self._islands.within(pairs, sources, targets)
+
+    def _move(self, step: np.ndarray) -> None:
+        nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)
+        self._state.nodes[self._layout.first :] += nodes
+        for column, most in _MOST_RUN_STEP.items():
+            self._state.run[column] += np.clip(step[self._layout.run_start + column], -most, most)
+
+    @property
+    def oldest(self) -> int:
+        """The oldest free node."""
+        return self._layout.first
+
+    def covariances_of_oldest(self, count: int) -> np.ndarray:
+        """Return the pose covariances (count + 1, 3, 3) of the oldest free nodes, the next ones to be frozen."""
+        columns = self._layout.pose_columns(self._layout.first + np.arange(count + 1))
+        return np.stack([self._solution.covariance(own, self._held_covariance) for own in columns])
+
+    def estimates(self, count: int) -> List[LiveEstimate]:
+        """Return what is known of the newest `count` nodes, oldest first."""
+        return [self._estimate(node) for node in range(self._layout.last - count + 1, self._layout.last + 1)]
+
+    def _estimate(self, number: int) -> LiveEstimate:
+        """Return what is known of node `number`, at the end of the scan before it."""
+        own = self._layout.node_start(number) + np.arange(self._layout.width)
+        unknowns = np.append(own, self._layout.run_start + np.arange(RUN_COLUMNS))
+        T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
+        T_map_base = T_odom_base + node[POSE]
+        share, distance = agreement(self._met, number - 1, self._parameters)
+        return LiveEstimate(
+            time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
+            T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
+            covariance=self._solution.covariance(unknowns, self._held_covariance),
+            own_covariance=self._solution.covariance(unknowns, np.zeros_like(self._held_covariance)),
+            world_scale_deviation=self._parameters.world_scale_deviation,
+            reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
+            drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
+            agreement=share, distance=distance, surfaces=surfaces_met(self._met, number - 1),
+        )  # fmt: skip

@@ -1,0 +1,129 @@
+"""How far scans lie on the surfaces that other scans heard, and what that tells of errors the solver cannot know."""
+
+from typing import Sequence, Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.joint_solver.comparisons import Pairs
+from mlsm_manager.joint_solver.motion_models import OdometryModel
+from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN, State
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.run_log import RunLog
+
+_CELL = 1.0  # m: about twice the deviation of an echo
+_SURROUNDINGS = 8.0  # m around a point within which surfaces may be the one that it lies on, or lie beside it
+_CANDIDATES = 24  # points heard before that are looked at for each point: enough to find one that faces the same way
+_FEWEST_POINTS = 2.0  # points with surfaces around them: fewer tell nothing
+_TURNS_BEFORE = 10  # a few minutes, in which a vehicle sees the same
+_FITS = 0.65  # share of a turn's points on what was heard before from which on it fits; as in self_check.scans_go_on
+_SPEED = 0.5  # m/s: the usual speed of a small vehicle; nothing else tells how far it went
+_ON_PLANE = 1.0  # deviations within which a point lies on the plane of the one that it is compared with
+Met = Sequence[Tuple[Pairs, PlacedPoints, PlacedPoints]]
+"""Comparisons with the sets of points that they compare."""
+
+
+def map_support(
+    sources: PlacedPoints, targets: PlacedPoints, places: np.ndarray, parameters: SolverParameters
+) -> np.ndarray:
+    """Return how many of n sources (k,) lie on targets that face the same way, where they are at `places` (k, n, 2).
+
+    Each counts by its quality, and in part where it lies a little beside. Of each only the nearest target is looked at.
+    """
+    distance = surface_distances(sources, targets, places, parameters, parameters.cut, 1)
+    return (nearness(distance) * sources.qualities).sum(axis=1)
+
+
+def nearness(distance: np.ndarray) -> np.ndarray:
+    """Return how far points count as lying on what is `distance` [m] away: 1 on it, 0 far off."""
+    return np.exp(-0.5 * (distance / _CELL) ** 2)
+
+
+def surface_distances(
+    sources: PlacedPoints, targets: PlacedPoints, places: np.ndarray, parameters: SolverParameters,
+    reach: float, candidates: int,
+) -> np.ndarray:  # fmt: skip
+    """Return how far (k, n) [m] n sources at `places` (k, n, 2) are from the nearest target that faces the same way.
+
+    It is sought among so many `candidates`, the nearest targets within `reach` [m]; infinity where none of them does.
+    Surfaces from before the run do not say from which side they were heard.
+    """
+    tree, shape = cKDTree(targets.places), (*places.shape[:2], candidates)
+    distance, index = tree.query(places.reshape(-1, 2), k=np.arange(1, candidates + 1), distance_upper_bound=reach)
+    distance, index = distance.reshape(shape), np.where(index < len(targets), index, 0).reshape(shape)
+    cosine = np.einsum("na,knca->knc", sources.normals, targets.normals[index])
+    cosine = np.where((targets.scans == BEFORE_THE_RUN)[index], np.abs(cosine), cosine)
+    return np.where(cosine > parameters.min_cosine, distance, np.inf).min(axis=2)
+
+
+def shares_heard_before(
+    log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters, first: int
+) -> np.ndarray:
+    """Return which share (n,) of the points of turns `first` and newer lies on surfaces that those before heard.
+
+    Only points count around which a surface was heard that faces the same way: others may be new. NaN for turns with
+    hardly any such points. A turn is a scan, or all its parts.
+    """
+    turns = range(first, log.scan_count // parameters.parts_per_turn)
+    return np.array([_share(log, odometry, state, parameters, turn) for turn in turns])
+
+
+def misfit_variances(
+    log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters, first: int
+) -> np.ndarray:
+    """Return by how much (n,) [m^2] each of the turns `first` and newer makes the place of all that follows uncertain.
+
+    In each direction. It is 0 for a turn that fits to those before it, and grows with the share of its points that
+    should lie on what these heard and do not, up to as far as a vehicle goes in a turn. Where the odometry reports
+    distances it is 0: a motion that is reported is not lost with a scan.
+    """
+    parts = parameters.parts_per_turn
+    times = log.node_times[parts * first :: parts]
+    if not np.isinf(odometry.distance_deviation):
+        return np.zeros(len(times) - 1)
+    shares = shares_heard_before(log, odometry, state, parameters, first)
+    misfit = np.clip(1.0 - np.where(np.isfinite(shares), shares, _FITS) / _FITS, 0.0, 1.0)
+    return misfit * (_SPEED * np.diff(times)) ** 2
+
+
+def agreement(met: Met, scan: int, parameters: SolverParameters) -> Tuple[float, float]:
+    """Return the share of a scan's comparisons in which its point lies on its neighbour's surface, and the mean
+    distance [m] from it; 0 without any.
+    """
+    near = weight = distance = 0.0
+    for pairs, sources, targets in met:
+        own = sources.scans[pairs.rows] == scan
+        i, j = pairs.rows[own], pairs.neighbours[own]
+        residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
+        variance = parameters.variances(sources.slants[i], targets.slants[j])
+        distance += float((pairs.importance[own] * np.abs(residual)).sum())
+        near += float(pairs.importance[own][residual**2 < _ON_PLANE**2 * variance].sum())
+        weight += float(pairs.importance[own].sum())
+    return (near / weight, distance / weight) if weight else (0.0, 0.0)
+
+
+def surfaces_met(met: Met, scan: int) -> np.ndarray:
+    """Return the sum (2, 2) of the outer products of the normals of all surfaces that a scan was compared with."""
+    total = np.zeros((2, 2))
+    for pairs, sources, targets in met:
+        own = sources.scans[pairs.rows] == scan
+        normals = targets.normals[pairs.neighbours[own]]
+        total += np.einsum("n,na,nb->ab", pairs.importance[own], normals, normals)
+    return total
+
+
+def _share(log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters, turn: int) -> float:
+    parts = parameters.parts_per_turn
+    before = log.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
+    own = log.rows(parts * turn, parts * (turn + 1))
+    if not len(before) or not len(own):
+        return np.nan
+    sources, targets = (place(log, odometry, state, rows) for rows in (own, before))
+    here = sources.places[np.newaxis]
+    distances = surface_distances(sources, targets, here, parameters, _SURROUNDINGS, _CANDIDATES)[0]
+    known = np.isfinite(distances)
+    total = sources.qualities[known].sum()
+    if total <= _FEWEST_POINTS:
+        return np.nan
+    return float(sources.qualities[known] @ nearness(distances[known]) / total)

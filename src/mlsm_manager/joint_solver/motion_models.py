@@ -1,0 +1,349 @@
+"""Motion models: what is unknown of the motion between nodes, and what the odometry says of it.
+
+Here are the interface, the terms that models share, and the models of odometries that report positions. Those of which
+the velocity is unknown are in velocity_models.
+"""
+
+from dataclasses import dataclass
+from typing import Dict, NamedTuple, Optional, Protocol
+
+import numpy as np
+
+from mlsm_manager.joint_solver.normal_equations import POSE, YAW, Layout, NormalEquations
+from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product
+from mlsm_manager.scan_matching.prediction import Fading
+
+FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
+HELD_DEVIATION = 1e-6  # stands for a deviation of zero
+DRIFT_STATES = 5
+DIRECTION, SCALE, CURRENT_X, CURRENT_Y = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw
+_CURRENT = slice(5, 7)
+_CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far below any effect
+_ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not divide by zero
+
+
+@dataclass(frozen=True)
+class Drift:
+    """How a motion goes on after a node, as matching.problem.state describes it: the errors of the odometry.
+
+    values: (5,) rate x y [m/s] and yaw [rad/s] in base_link, scale, direction. slopes: (5, width) their derivatives by
+    the node's unknowns; a row of zeros is what the model does not estimate.
+    """
+
+    values: np.ndarray
+    slopes: np.ndarray
+
+
+class OdometryModel(Protocol):
+    """Nodes have `width` unknowns: corrections x, y, yaw of the reported pose, then those of the model.
+
+    The path between two nodes is the model's reference path, turned and scaled by `gain`.
+    """
+
+    width: int
+
+    @property
+    def calibrated(self) -> Dict[str, int]:
+        """Columns that the next run may start from, by name."""
+
+    @property
+    def distance_deviation(self) -> float:
+        """Relative standard deviation of reported distances; infinite where none are reported."""
+
+    @property
+    def position_walk(self) -> float:
+        """Random walk of reported positions, m/sqrt(s)."""
+
+    def first_node(self) -> np.ndarray:
+        """Return the unknowns (width,) expected at the first node, where the map's origin is the odometry's."""
+
+    def first_deviations(self) -> np.ndarray:
+        """Return their standard deviations (width,)."""
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        """Return the unknowns (n, width) expected at `after` (n), given those at `before` (n)."""
+
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        """Add what ties the free nodes together. nodes: (n, width), motion: (n), of nodes layout.first to last."""
+
+    def reference(self, motion: Motion) -> np.ndarray:
+        """Return the positions (m,) x + i y [m] of the reference path; even where the motion is."""
+
+    def gain(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the complex factors (n,) of the reference path after `nodes` (n, width)."""
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        """Return how the motion goes on after a node (width,) at which base_link has `heading` [rad] in map."""
+
+    def fading(self, node: np.ndarray) -> Optional[Fading]:
+        """Return how the rates of `drift` change with the time since the node (width,); None where they stay."""
+
+
+def frozen_deviations(deviations: np.ndarray) -> np.ndarray:
+    """Return the deviations (width,) that hold a frozen node; `deviations` are those it was last known with."""
+    result = np.maximum(deviations, HELD_DEVIATION)
+    result[:3] = FIXED_DEVIATION
+    return result
+
+
+class Transition(NamedTuple):
+    """matrix: (width, width) derivatives of the next node by this one. noise: (width, width) covariance."""
+
+    matrix: np.ndarray
+    noise: np.ndarray
+
+    @classmethod
+    def of(cls, odometry: OdometryModel, nodes: np.ndarray, motion: Motion) -> "Transition":
+        """Return that from the first to the second of `nodes` (2, width), where the odometry reported `motion` (2)."""
+        layout = Layout(0, 1, odometry.width)
+        equations = NormalEquations(layout.size)
+        odometry.add_steps(equations, layout, nodes, motion)
+        information, _ = equations.dense()
+        here, there = slice(0, odometry.width), slice(odometry.width, 2 * odometry.width)
+        noise = np.linalg.inv(information[there, there])
+        return cls(-noise @ information[there, here], noise)
+
+    def step_covariance(self, covariance: np.ndarray) -> np.ndarray:
+        """Return that of the next node (width, width), seen from this one's pose; `covariance` is this node's."""
+        known_pose = covariance.copy()
+        known_pose[POSE] = known_pose[:, POSE] = 0.0
+        return self.matrix @ known_pose @ self.matrix.T + self.noise
+
+
+@dataclass(frozen=True)
+class Compass:
+    """How wrong the reported heading may be: standard deviations [rad], how long an error lasts [s].
+
+    It errs differently where iron is near: for some minutes at the speed of a small vehicle. heading_walk: rad/sqrt(s),
+    white noise of the turn rate besides.
+    """
+
+    heading_deviation: float
+    heading_correlation_time: float
+    heading_walk: float
+
+
+@dataclass(frozen=True)
+class DvlOdometry:
+    """How wrong an odometry of DVL and compass may be.
+
+    position_walk: m/sqrt(s), integrated noise of its velocities. direction: rad from reported to true motion, as known
+    beforehand, direction_walk: rad/sqrt(s). scale: true over reported distance minus 1, as known beforehand.
+    """
+
+    compass: Compass
+    position_walk: float
+    direction: float
+    direction_deviation: float
+    direction_walk: float
+    scale: float
+    scale_deviation: float
+
+
+@dataclass(frozen=True)
+class ThrusterOdometry(DvlOdometry):
+    """How wrong a motion may be that was reckoned from the commands of the thrusters.
+
+    The speed that a command means changes with the battery and with what hangs on the vehicle; a current carries it
+    along. scale_walk: 1/sqrt(s). current_deviation: m/s in each direction. current_walk: m/s/sqrt(s).
+    """
+
+    scale_walk: float
+    current_deviation: float
+    current_walk: float
+
+
+class DvlFactors:
+    """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly."""
+
+    width = 5
+
+    def __init__(self, parameters: DvlOdometry) -> None:
+        self._parameters = parameters
+
+    @property
+    def calibrated(self) -> Dict[str, int]:
+        """See OdometryModel."""
+        return {"odometry_scale": SCALE, "odometry_direction": DIRECTION}
+
+    @property
+    def distance_deviation(self) -> float:
+        """See OdometryModel."""
+        return self._parameters.scale_deviation
+
+    @property
+    def position_walk(self) -> float:
+        """See OdometryModel."""
+        return self._parameters.position_walk
+
+    def first_node(self) -> np.ndarray:
+        """See OdometryModel."""
+        return np.array([0.0, 0.0, 0.0, self._parameters.direction, self._parameters.scale])
+
+    def first_deviations(self) -> np.ndarray:
+        """See OdometryModel."""
+        own, fixed = self._parameters, FIXED_DEVIATION * 10.0
+        walking = np.maximum([own.direction_deviation, own.scale_deviation], HELD_DEVIATION)
+        return np.concatenate([[fixed, fixed, own.compass.heading_deviation], walking])
+
+    def reference(self, motion: Motion) -> np.ndarray:
+        """See OdometryModel: the reported positions."""
+        return motion.positions
+
+    def gain(self, nodes: np.ndarray) -> np.ndarray:
+        """See OdometryModel."""
+        return (1.0 + nodes[..., SCALE]) * turned(nodes[..., DIRECTION])
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        """See OdometryModel."""
+        step = after.positions - before.positions
+        error = product(product(self.gain(nodes), turned(nodes[:, YAW])), step) - step
+        result = nodes.copy()
+        result[:, 0] += error.real
+        result[:, 1] += error.imag
+        return result
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        """See OdometryModel."""
+        values, slopes = np.zeros(DRIFT_STATES), np.zeros((DRIFT_STATES, self.width))
+        values[3:] = node[[SCALE, DIRECTION]]
+        slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
+        return Drift(values, slopes)
+
+    def fading(self, node: np.ndarray) -> Optional[Fading]:
+        """See OdometryModel: there are none, or they are a current."""
+        return None
+
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        """See OdometryModel."""
+        starts = layout.node_start(np.arange(layout.first, layout.last))
+        self._add_positions(equations, starts, nodes, motion)
+        add_compass(equations, starts, nodes, motion.durations, self._parameters.compass)
+        walk = self._parameters.direction_walk**2 * motion.durations
+        add_walk(equations, starts, self.width, nodes[:, DIRECTION], DIRECTION, walk)
+        self._add_scale(equations, starts, nodes, motion.durations)
+
+    def _add_scale(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
+    ) -> None:
+        add_walk(equations, starts, self.width, nodes[:, SCALE], SCALE, np.zeros(len(starts)))
+
+    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        """Add the steps. Noise is one of the reported velocities, so the residuals are those per unit of scale.
+
+        The derivative by the scale contains that; else the fit would shrink the world to make them smaller.
+        """
+        step, one = np.diff(motion.positions), np.ones(len(starts))
+        yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
+        turned_step = product(turned(nodes[:-1, DIRECTION] + yaw), step)
+        scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
+        change = np.diff(as_complex(nodes))
+        residual = change - (scaled - step) - self._carried(nodes[:-1], motion.durations)
+        weight = 1.0 / (self._parameters.position_walk**2 * motion.durations + _ROUNDING_VARIANCE)
+        for axis, part in ((0, np.real), (1, np.imag)):
+            places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *self._carriers(axis))
+            by_angle = -part(1j * scaled)
+            slopes = (one, -one, by_angle, -part(turned_step) - part(residual), by_angle / 2.0, by_angle / 2.0)
+            slopes += tuple(-motion.durations for _ in self._carriers(axis))
+            columns = starts[:, np.newaxis] + np.array(places)
+            equations.add(columns, np.column_stack(slopes), part(residual), weight)
+
+    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
+        """Return the moves (n,) x + i y [m] in map that the odometry cannot feel."""
+        return np.zeros(len(nodes), dtype=np.complex128)
+
+    def _carriers(self, axis: int) -> tuple:
+        """Return the columns of the velocities that make those moves along an axis."""
+        return ()
+
+
+class ThrusterFactors(DvlFactors):
+    """Nodes have columns x, y, yaw, direction [rad] and scale as DvlFactors, and the current x, y in map [m/s]."""
+
+    width = 7
+
+    def __init__(self, parameters: ThrusterOdometry) -> None:
+        super().__init__(parameters)
+        self._own = parameters
+
+    def first_node(self) -> np.ndarray:
+        """See OdometryModel."""
+        return np.append(super().first_node(), [0.0, 0.0])
+
+    def first_deviations(self) -> np.ndarray:
+        """See OdometryModel."""
+        current = max(self._own.current_deviation, HELD_DEVIATION)
+        return np.append(super().first_deviations(), [current, current])
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        """See OdometryModel."""
+        result = super().advanced(nodes, before, after)
+        result[:, :2] += nodes[:, _CURRENT] * (after.times - before.times)[:, np.newaxis]
+        return result
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        """See OdometryModel."""
+        known = super().drift(node, heading)
+        values, slopes = known.values, known.slopes
+        to_base = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+        values[:2] = to_base @ node[_CURRENT]
+        slopes[:2, _CURRENT] = to_base
+        return Drift(values, slopes)
+
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        """See OdometryModel."""
+        super().add_steps(equations, layout, nodes, motion)
+        starts = layout.node_start(np.arange(layout.first, layout.last))
+        walk = self._own.current_walk**2 * motion.durations
+        for column in (CURRENT_X, CURRENT_Y):
+            add_walk(equations, starts, self.width, nodes[:, column], column, walk)
+
+    def _add_scale(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
+    ) -> None:
+        walk = self._own.scale_walk**2 * durations
+        add_walk(equations, starts, self.width, nodes[:, SCALE], SCALE, walk)
+
+    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
+        return as_complex(nodes[:, _CURRENT]) * durations
+
+    def _carriers(self, axis: int) -> tuple:
+        return (CURRENT_X + axis,)
+
+
+def add_walk(
+    equations: NormalEquations, starts: np.ndarray, width: int, values: np.ndarray, column: int, variance: np.ndarray
+) -> None:
+    """Add that unknown `column` of nodes changes by nothing but for `variance` (n - 1,) from node to node.
+
+    starts: (n - 1,) columns of all nodes but the last. values: (n,) of the unknown.
+    """
+    add_forgetting(equations, starts, width, values, column, np.ones(len(starts)), variance)
+
+
+def add_forgetting(
+    equations: NormalEquations, starts: np.ndarray, width: int, values: np.ndarray, column: int, kept: np.ndarray,
+    variance: np.ndarray,
+) -> None:  # fmt: skip
+    """Add that of an unknown the share `kept` (n - 1,) is left at the next node, but for `variance` (n - 1,)."""
+    columns = np.column_stack([starts + width + column, starts + column])
+    jacobian = np.column_stack([np.ones(len(starts)), -kept])
+    weight = 1.0 / np.maximum(variance, _CONSTANT_DEVIATION**2)
+    equations.add(columns, jacobian, values[1:] - kept * values[:-1], weight)
+
+
+def add_compass(
+    equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray, compass: Compass
+) -> None:
+    """Add how the correction of the reported heading changes: an error that lasts, and a walk.
+
+    starts: (n - 1,) columns of all nodes but the last. nodes: (n, width). durations: (n - 1,) s between them.
+    """
+    kept = np.exp(-durations / compass.heading_correlation_time)
+    variance = compass.heading_deviation**2 * (1.0 - kept**2) + compass.heading_walk**2 * durations
+    add_forgetting(equations, starts, nodes.shape[1], nodes[:, YAW], YAW, kept, variance)
+
+
+def turned(angle: np.ndarray) -> np.ndarray:
+    """Return the complex numbers that turn by `angle` (...) [rad]."""
+    return np.exp(1j * angle)

@@ -1,0 +1,144 @@
+"""What the odometry reported: over the whole run as far as it is known, and at some times."""
+
+from dataclasses import dataclass
+from typing import Union
+
+import numpy as np
+
+from mlsm_manager.joint_solver.growing import GrowingArray
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import composed, inverse
+
+_WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
+
+
+@dataclass(frozen=True)
+class Motion:
+    """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
+
+    "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
+    """
+
+    times: np.ndarray
+    poses: np.ndarray
+    ahead: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def __getitem__(self, rows: Union[slice, np.ndarray]) -> "Motion":
+        """Return the motion at `rows`: a slice or an array of indices."""
+        return Motion(self.times[rows], self.poses[rows], self.ahead[rows])
+
+    @property
+    def durations(self) -> np.ndarray:
+        """(m - 1,) s between the times."""
+        return np.diff(self.times)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """(m,) complex x + i y [m] in odom."""
+        return as_complex(self.poses)
+
+
+class OdometryLog:
+    """Poses T_odom_base of a run in the order of time; grows at its end, and yaw never jumps by a turn."""
+
+    def __init__(self) -> None:
+        self._times = GrowingArray()
+        self._poses = GrowingArray(3)
+        self._ahead = GrowingArray(2)
+
+    @classmethod
+    def of(cls, track: Track) -> "OdometryLog":
+        """Return the log of a whole track."""
+        log = cls()
+        log.extend(track, np.inf)
+        return log
+
+    def __len__(self) -> int:
+        return len(self._times)
+
+    def shorten(self, count: int) -> None:
+        """Keep the oldest `count` poses."""
+        self._times.shorten(count)
+        self._poses.shorten(count)
+        self._ahead.shorten(count)
+
+    @property
+    def end(self) -> float:
+        """Time of the newest pose [s]; minus infinity without any."""
+        return float(self._times.values[-1]) if len(self._times) else -np.inf
+
+    def extend(self, track: Track, until: float) -> None:
+        """Append the poses of `track` that are newer than the newest known one and not after `until` [s]."""
+        first = int(np.searchsorted(track.times, self.end, side="right"))
+        last = int(np.searchsorted(track.times, until, side="right"))
+        if last <= first:
+            return
+        times, poses = track.times[first:last], track.poses[first:last].copy()
+        if len(self._poses):
+            jump = poses[0, 2] - self._poses.values[-1, 2]
+            poses[:, 2] -= 2.0 * np.pi * np.round(jump / (2.0 * np.pi))
+        self._ahead.extend(self._gone_ahead(times, poses[:, 2]))
+        self._times.extend(times)
+        self._poses.extend(poses)
+
+    def _gone_ahead(self, times: np.ndarray, yaw: np.ndarray) -> np.ndarray:
+        """Return where the newest (m,) poses are on the path of `Motion.ahead`, by the trapezoidal rule."""
+        known = len(self._times) > 0
+        start = self._ahead.values[-1] if known else np.zeros(2)
+        times = np.append(self._times.values[-1] if known else times[0], times)
+        yaw = np.append(self._poses.values[-1, 2] if known else yaw[0], yaw)
+        heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
+        steps = (heading[1:] + heading[:-1]) / 2.0 * np.diff(times)[:, np.newaxis]
+        return start + np.cumsum(steps, axis=0)
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""
+        return _between(times, self._times.values, self._poses.values)
+
+    def between(self, start: float, end: float) -> Motion:
+        """Return the known poses between `start` and `end` [s], and the nearest beyond both."""
+        near = _around(self._times.values, start, end)
+        return Motion(self._times.values[near], self._poses.values[near], self._ahead.values[near])
+
+    def velocity_at(self, time: float) -> np.ndarray:
+        """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
+        before, after = self.at(np.array([time - _WINDOW, time]))
+        return composed(inverse(before), after) / _WINDOW
+
+    def motion(self, times: np.ndarray) -> Motion:
+        """Return the motion at `times` (m,), as `at` does."""
+        return Motion(times, self.at(times), _between(times, self._times.values, self._ahead.values))
+
+
+def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return values (..., c) at `times` (...) between those (n, c) at `known` (n,).
+
+    Only what lies around `times` is touched: the cost does not grow with the run.
+    """
+    if times.size and len(known):
+        near = _around(known, times.min(), times.max())
+        known, values = known[near], values[near]
+    return np.stack([np.interp(times, known, column) for column in values.T], axis=-1)
+
+
+def _around(known: np.ndarray, start: float, end: float) -> slice:
+    """Return which of the times `known` (n,) lie between `start` and `end`, and the nearest beyond."""
+    first, last = np.searchsorted(known, [start, end])
+    return slice(max(first - 1, 0), last + 2)
+
+
+def as_complex(vectors: np.ndarray) -> np.ndarray:
+    """Return x + i y (...) of vectors (..., >= 2)."""
+    return vectors[..., 0] + 1j * vectors[..., 1]
+
+
+def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
+    """Return the products (...) of complex numbers.
+
+    numpy's own product rounds by where in memory the numbers lie, so that equal runs would end differently.
+    """
+    real = first.real * second.real - first.imag * second.imag
+    return real + 1j * (first.real * second.imag + first.imag * second.real)

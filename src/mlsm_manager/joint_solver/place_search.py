@@ -1,0 +1,279 @@
+"""Looks for the newest scans where the solver's own steps do not reach.
+
+A scan whose motion is hardly known is laid on the scans before it. After a silence of the sonar it is sought in the
+whole map, at the places that the motion since then allows; if the echoes do not fit at one of them alone, it is better
+not to know where the vehicle is.
+"""
+
+from typing import List, NamedTuple, Optional, Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.map_support import map_support, nearness
+from mlsm_manager.joint_solver.motion_models import OdometryModel, Transition
+from mlsm_manager.joint_solver.normal_equations import POSE, YAW, State
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.placement import PlacedPoints, place, place_lone
+from mlsm_manager.joint_solver.places import (
+    FEWEST_POINTS,
+    MOST_POINTS,
+    NATS,
+    REACH,
+    PlaceCandidate,
+    Shift,
+    best_place,
+    grid,
+    moved,
+    places_within,
+)
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.submaps import MAP, Islands
+
+_KNOWN = 2.0  # deviations of the motion within the cut, and the solver's own steps do
+_ISLAND_SCANS = 6  # the newest ones of an island that are looked for: older ones may lie in water that the map has not
+_ISLAND_POINTS = 400  # of these
+_MOTIONS = np.linspace(-2.0, 2.0, 5)  # standard deviations of the motion within the newest scan, in each direction
+_ROUNDING = 1e-6  # m^2, keeps a motion that is known from having no variance
+_MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
+_COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
+_POST_NATS = 1.0  # that a point which stands alone is worth where another one stood: there are few
+_FEW_POINTS = 50  # of it, while many turns are compared
+_KNOWN_TURN = 0.1  # rad, deviation: the solver's own steps find turns of less than twice as much
+_TURN_CELL = 0.08  # rad: moves an echo 20 m away by less than twice a cell
+_LEAST_LEFT = 1e-6  # rad^2: of the heading, once a turn is chosen
+
+
+def searched_node(
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    covariance: np.ndarray,
+    parameters: SolverParameters,
+    first: int = 0,
+) -> np.ndarray:
+    """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
+
+    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
+    is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
+    covariance asks (correlative search, Olson 2009).
+    """
+    newest = state.nodes[-1]
+    last = log.scan_count
+    nodes = np.array([last - 1, last])
+    step = Transition.of(odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
+    if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < parameters.cut:
+        return newest
+    before, own = log.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
+    if not len(before) or not len(own):
+        return newest
+    search = _Search(log, odometry, parameters, place(log, odometry, state, before), own)
+    if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
+        state, step = search.turned(state, step)
+    return search.beside(state, step, MOST_POINTS)[1]
+
+
+def silent_scans(log: RunLog) -> int:
+    """Return how many scans before the newest one heard too little to tell a place, one after the other."""
+    return _silent_before(log, log.scan_count - 1)
+
+
+def place_after_silence(
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    islands: Islands,
+    covariance: np.ndarray,
+    silent: int,
+    parameters: SolverParameters,
+    known: Optional[KnownSurfaces] = None,
+) -> Optional[PlaceCandidate]:
+    """Return where the newest scan was taken, after `silent` scans before it that heard nothing.
+
+    covariance: (width, width) of the node before these. known: what was in the map before the run. None where the
+    motion since is known well enough, or the scan hears too little itself.
+    """
+    last = log.scan_count
+    motion = MotionSince(log, odometry, state, covariance, silent)
+    own = log.rows(last - 1, last)
+    if motion.reach * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
+        return None
+    sources = place(log, odometry, state, own[:: max(1, len(own) // MOST_POINTS)])
+    targets = _map_around(log, odometry, state, islands, sources, REACH * motion.reach + parameters.cut, known)
+    return best_place(motion, sources, targets, parameters)
+
+
+def island_place(
+    log: RunLog,
+    odometry: OdometryModel,
+    state: State,
+    islands: Islands,
+    covariance: np.ndarray,
+    parameters: SolverParameters,
+    known: Optional[KnownSurfaces] = None,
+) -> PlaceCandidate:
+    """Return where the newest scans, which lie apart from the map, are in it; covariance: (2, 2) m^2 of the place.
+
+    They are moved together, with the nodes of the silence before them in part. known: what was in the map before the
+    run.
+    """
+    last, first = log.scan_count, islands.start
+    rows = log.rows(max(first, last - _ISLAND_SCANS), last)
+    sources = place(log, odometry, state, rows[:: max(1, len(rows) // _ISLAND_POINTS)])
+    reach = REACH * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) + parameters.cut
+    targets = _map_around(log, odometry, state, islands, sources, reach, known)
+    return best_place(Shift(covariance, _moves_per_m(log, first, odometry.width)), sources, targets, parameters)
+
+
+class _Search(NamedTuple):
+    """What the newest scan is compared with. targets: of earlier scans. own: (n,) rows of the newest scan's points."""
+
+    log: RunLog
+    odometry: OdometryModel
+    parameters: SolverParameters
+    targets: PlacedPoints
+    own: np.ndarray
+
+    def beside(self, state: State, step: np.ndarray, most: int) -> Tuple[float, np.ndarray]:
+        """Return the newest node (width,) at the best place near its own, and what speaks for it [nats].
+
+        step: covariance (width, width) of the node. most: points of the scan that are compared.
+        """
+        log, odometry, parameters = self.log, self.odometry, self.parameters
+        sources = place(log, odometry, state, self.own[:: max(1, len(self.own) // most)])
+        shifts = places_within(step[:2, :2], _MOST_CELLS)
+        ends = np.column_stack([np.zeros_like(shifts), shifts])
+        found = NATS * MOST_POINTS / most * map_support(sources, self.targets, moved(sources, ends), parameters)
+        if parameters.post_confidence:
+            found = found + parameters.post_confidence * _POST_NATS * _post_support(
+                log, odometry, state, ends, parameters
+            )
+        costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
+        best = np.argmax(found - costs)
+        node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])
+        return float((found - costs)[best]), node
+
+    def turned(self, state: State, step: np.ndarray) -> Tuple[State, np.ndarray]:
+        """Return the state whose newest node is turned as its scan fits best, and what is open then of `step`."""
+        deviation = np.sqrt(step[YAW, YAW])
+        by_yaw = step[:, YAW] / step[YAW, YAW]
+        left = step - np.outer(by_yaw, step[YAW])
+        left[YAW, YAW] = max(left[YAW, YAW], _LEAST_LEFT)
+        count = int(np.ceil(REACH * deviation / _TURN_CELL))
+        states, told = [], []
+        for turn in _TURN_CELL * np.arange(-count, count + 1):
+            candidate = state.copy()
+            candidate.nodes[-1] += by_yaw * turn
+            states.append(candidate)
+            told.append(self.beside(candidate, left, _FEW_POINTS)[0] - 0.5 * (turn / deviation) ** 2)
+        return states[int(np.argmax(told))], left
+
+
+def _post_support(
+    log: RunLog, odometry: OdometryModel, state: State, ends: np.ndarray, parameters: SolverParameters
+) -> np.ndarray:
+    """Return how many of the newest scan's lone points (k,) lie on earlier ones at `ends` (k, 4); see moved."""
+    last = log.scan_count
+    sources = place_lone(log, odometry, state, log.lone.rows(last - 1, last))
+    targets = place_lone(log, odometry, state, log.lone.rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
+    if not len(sources) or not len(targets):
+        return np.zeros(len(ends))
+    places = moved(sources, ends)
+    distance, _ = cKDTree(targets.places).query(places.reshape(-1, 2), distance_upper_bound=parameters.cut)
+    return (nearness(distance).reshape(places.shape[:2]) * sources.qualities).sum(axis=1)
+
+
+class MotionSince:
+    """What is known of the nodes since the last scan that told a place, seen from there.
+
+    Beginning and end of the newest scan matter most: with both given, what is expected of all other nodes follows.
+    of_place: (2, 2) m^2, covariance of the end's place. reach: m, the largest deviation of that.
+    """
+
+    def __init__(self, log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int) -> None:
+        """`silent`: number of scans between, above 0. covariance: (width, width) of the node before these."""
+        last, self._width = log.scan_count, odometry.width
+        first = last - 1 - silent
+        steps = [
+            Transition.of(odometry, state.nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
+            for node in range(first, last)
+        ]
+        joint = _joint_covariance(steps, covariance)
+        end = self._width * (len(steps) - 1) + np.arange(2)
+        start = end - self._width
+        ends = np.append(start, end)
+        self._of_ends = joint[np.ix_(ends, ends)]
+        self._gain = joint[:, ends] @ np.linalg.inv(self._of_ends)
+        self.of_place = joint[np.ix_(end, end)]
+        self.reach = float(np.sqrt(np.linalg.eigvalsh(self.of_place)[-1]))
+        self._along = joint[np.ix_(start, end)] @ np.linalg.inv(self.of_place)
+        self._beside = joint[np.ix_(start, start)] - self._along @ joint[np.ix_(end, start)]
+
+    def ends(self, shifts: np.ndarray) -> np.ndarray:
+        """Return the moves (k, 4) of beginning and end of the scan that are expected if its end moves by (k, 2)."""
+        return np.column_stack([shifts @ self._along.T, shifts])
+
+    def beside(self) -> np.ndarray:
+        """Return moves (k, 2) of the scan's beginning beside the expected ones, that are to be tried."""
+        factor = np.linalg.cholesky(self._beside + _ROUNDING * np.eye(2))
+        motions = grid(_MOTIONS)
+        return motions[np.hypot(*motions.T) <= _MOTIONS.max()] @ factor.T
+
+    def cost(self, ends: np.ndarray) -> float:
+        """Return how unlikely moves (4,) of the scan's beginning and end are, nats."""
+        return 0.5 * float(ends @ np.linalg.solve(self._of_ends, ends))
+
+    def moves(self, ends: np.ndarray) -> np.ndarray:
+        """Return the moves (n, width) of the nodes that go with moves (4,) of the scan's beginning and end."""
+        return (self._gain @ ends).reshape(-1, self._width)
+
+
+def _joint_covariance(steps: List[Transition], covariance: np.ndarray) -> np.ndarray:
+    """Return that of the nodes (n width, n width) after n `steps` from a node whose pose is taken as known."""
+    width = len(covariance)
+    joint = np.zeros((len(steps) * width,) * 2)
+    own = covariance.copy()
+    own[POSE] = own[:, POSE] = 0.0
+    for number, step in enumerate(steps):
+        before, here = slice(0, number * width), slice(number * width, (number + 1) * width)
+        if number:
+            joint[here, before] = step.matrix @ joint[(number - 1) * width : number * width, before]
+            joint[before, here] = joint[here, before].T
+        own = step.matrix @ own @ step.matrix.T + step.noise
+        joint[here, here] = own
+    return joint
+
+
+def _silent_before(log: RunLog, scan: int) -> int:
+    """Return how many scans before `scan` heard too little to tell a place, one after the other."""
+    count = 0
+    while count < scan and len(log.rows(scan - count - 1, scan - count)) < FEWEST_POINTS:
+        count += 1
+    return count
+
+
+def _moves_per_m(log: RunLog, first: int, width: int) -> np.ndarray:
+    """Return the moves (k, width) of the newest nodes where the scans from `first` on are moved by 1 m in x and y."""
+    silent = _silent_before(log, first)
+    moves = np.zeros((log.scan_count - first + 1 + silent, width))
+    moves[:, :2] = 1.0
+    if silent:
+        times = log.node_times[first - silent : first + 1]
+        moves[:silent, :2] *= ((times[1:] - times[0]) / (times[-1] - times[0]))[:, np.newaxis]
+    return moves
+
+
+def _map_around(
+    log: RunLog, odometry: OdometryModel, state: State, islands: Islands, sources: PlacedPoints, reach: float,
+    known: Optional[KnownSurfaces],
+) -> PlacedPoints:  # fmt: skip
+    """Return the points of the map that `sources` can meet if they are moved by up to `reach` [m]."""
+    if not len(sources):
+        return sources
+    scans = np.flatnonzero(islands.numbers == MAP)
+    rows = [log.rows(scan, scan + 1) for scan in scans if scan != sources.scans[-1]]
+    targets = place(log, odometry, state, np.concatenate([np.empty(0, dtype=np.int64), *rows]))
+    low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
+    targets = targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
+    return targets if known is None else targets.joined_with(known.around(low, high))

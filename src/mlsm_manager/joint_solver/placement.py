@@ -1,0 +1,173 @@
+"""The vehicle's path at any time: as it was known then, or as it is known from the whole run."""
+
+from dataclasses import dataclass, fields, replace
+from typing import Union
+
+import numpy as np
+
+from mlsm_manager.joint_solver.compiled_placement import placed_rows
+from mlsm_manager.joint_solver.motion_models import OdometryModel, turned
+from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, State
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog, as_complex, product
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.surface_points import SurfacePoints
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import inverse, transformed
+
+
+class NodePath:
+    """The path between nodes: the model's reference path, turned and scaled, stretched from node to node."""
+
+    def __init__(self, odometry: OdometryModel, timeline: OdometryLog, times: np.ndarray, nodes: np.ndarray) -> None:
+        """times: (n,) s of the nodes, n > 1. nodes: (n, width)."""
+        self._odometry, self._timeline, self._times, self._nodes = odometry, timeline, times, nodes
+        motion = timeline.motion(times)
+        self._places = as_complex(motion.poses[:, :2] + nodes[:, :2])
+        self._reference = odometry.reference(motion)
+        gain = odometry.gain(nodes)
+        self._gain, self._last_gain = (gain[:-1] + gain[1:]) / 2.0, gain[-1:]
+
+    @property
+    def table(self) -> np.ndarray:
+        """(n, 8): times of the nodes, places x y, yaw, reference path x y, and the gain x y from each to the next."""
+        gain = np.append(self._gain, self._last_gain)
+        columns = (self._times, self._places, self._nodes[:, YAW], self._reference, gain)
+        parts = [(one.real, one.imag) if np.iscomplexobj(one) else (one,) for one in columns]
+        return np.column_stack([part for pair in parts for part in pair])
+
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return T_map_base (m, 3) at any `times` (m,) [s]; before the first node and after the last as it goes on."""
+        first, last = self._times[0], self._times[-1]
+        inside = np.clip(times, first, last)
+        legs = np.clip(np.searchsorted(self._times, inside, side="right") - 1, 0, len(self._times) - 2)
+        motion, near = self._timeline.motion(times), self._timeline.motion(inside)
+        poses = self._poses_of(near, legs)
+        after = times > last
+        gain = np.where(after, self._last_gain, self._gain[0])
+        beyond = product(gain, turned(self._nodes[np.where(after, -1, 0), YAW]))
+        beyond = product(beyond, self._odometry.reference(motion) - self._odometry.reference(near))
+        turn = motion.poses[:, 2] - near.poses[:, 2]
+        return poses + np.column_stack([beyond.real, beyond.imag, turn])
+
+    def _poses_of(self, motion: Motion, legs: np.ndarray) -> np.ndarray:
+        """Return the poses (m, 3) at times between nodes `legs` (m,) and the next ones."""
+        share = (motion.times - self._times[legs]) / (self._times[legs + 1] - self._times[legs])
+        yaw = (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
+        from_node = self._odometry.reference(motion) - self._reference[legs]
+        bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
+        bow = product(product(self._gain[legs], turned(yaw)), bow)
+        place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1] + bow
+        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw])
+
+
+def solved_path(
+    track: Track, odometry: OdometryModel, node_times: np.ndarray, nodes: np.ndarray, times: np.ndarray
+) -> np.ndarray:
+    """Return T_map_base (m, 3) at `times` (m,): the path through the nodes.
+
+    node_times: (n,) s. nodes: (n, width).
+    """
+    return NodePath(odometry, OdometryLog.of(track), node_times, nodes).at(times)
+
+
+_HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
+
+
+@dataclass(frozen=True)
+class PlacedPoints:
+    """n points in the map.
+
+    scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, by which the nodes' yaw turns them: from
+    base_link to them, and the bow of the path between the nodes. normals: (n, 2). slants: (n,) m. qualities: (n,).
+    shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second. by_run: (n, 2, 2) derivatives of the
+    places by range scale and delay, last axis the unknown.
+    """
+
+    scans: np.ndarray
+    places: np.ndarray
+    arms: np.ndarray
+    normals: np.ndarray
+    slants: np.ndarray
+    qualities: np.ndarray
+    shares: np.ndarray
+    by_run: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.scans)
+
+    def moved_by_run(self, change: np.ndarray) -> "PlacedPoints":
+        """Return the points after the run's unknowns changed a little, by `change` (2,), to first order."""
+        places = self.places + self.by_run @ change
+        return replace(self, places=places)
+
+    def selected(self, rows: Union[np.ndarray, slice]) -> "PlacedPoints":
+        """Return the points in `rows`: indices, (n,) bool, or a slice, which copies nothing."""
+        return PlacedPoints(*(getattr(self, field.name)[rows] for field in fields(self)))
+
+    def joined_with(self, others: "PlacedPoints") -> "PlacedPoints":
+        """Return these points and then the others."""
+        names = [field.name for field in fields(self)]
+        return PlacedPoints(*(np.concatenate([getattr(self, name), getattr(others, name)]) for name in names))
+
+
+def placed(
+    log: RunLog, odometry: OdometryModel, state: State, points: SurfacePoints, scans: np.ndarray
+) -> PlacedPoints:
+    """Return points that `scans` (n,) heard in the map. NodePath says where the vehicle was between two nodes."""
+    if not len(points):
+        return _NO_POINTS
+    times = points.times + state.run[DELAY]
+    nodes = np.unique(np.concatenate([scans, scans + 1]))
+    path = NodePath(odometry, log.odometry, log.node_times[nodes], state.nodes[nodes])
+    known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)
+    rows = placed_rows(
+        times, np.searchsorted(nodes, scans), points.ranges, points.bearings, points.normals, log.sonar_in_base,
+        float(state.run[RANGE_SCALE]), path.table, _knots(odometry, known), _HALF_SECOND,
+    )  # fmt: skip
+    return PlacedPoints(
+        scans=scans, places=rows[:, 0:2], arms=rows[:, 2:4], normals=rows[:, 4:6], slants=points.slants,
+        qualities=points.qualities, shares=rows[:, 10], by_run=rows[:, 6:10].reshape(-1, 2, 2),
+    )  # fmt: skip
+
+
+def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
+    """Return poses of the odometry (k, 4) as `compiled_places` takes them: a reference path is even between them."""
+    reference = odometry.reference(known)
+    return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])
+
+
+def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
+    """Return the surface points in `rows` (n,) int of the log."""
+    return placed(log, odometry, state, log.points(rows), log.scans(rows))
+
+
+def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
+    """Return the lone points in `rows` (n,) int of the log's table of these."""
+    return placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
+
+
+_NO_POINTS = PlacedPoints(
+    scans=np.empty(0, dtype=np.int64), places=np.empty((0, 2)), arms=np.empty((0, 2)), normals=np.empty((0, 2)),
+    slants=np.empty(0), qualities=np.empty(0), shares=np.empty(0), by_run=np.empty((0, 2, 2)),
+)  # fmt: skip
+
+
+def drawn(log: RunLog, odometry: OdometryModel, state: State, points: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return points (n, >= 2) in map of points (n, >= 2) that the odometry placed in odom at `times` (n,) [s].
+
+    Ranges and stamps are corrected as the run's unknowns say. Before the first node and after the last one the
+    motion goes on.
+    """
+    seen = transformed(inverse(log.odometry.at(times)), points)
+    sonar = log.sonar_in_base
+    seen[:, :2] = sonar + (1.0 + state.run[RANGE_SCALE]) * (seen[:, :2] - sonar)
+    return transformed(corrected_path(log, odometry, state, times + state.run[DELAY]), seen)
+
+
+def corrected_path(log: RunLog, odometry: OdometryModel, state: State, times: np.ndarray) -> np.ndarray:
+    """Return T_map_base (m, 3) at `times` (m,) [s]."""
+    if not len(times):
+        return np.empty((0, 3))
+    first, last = np.searchsorted(log.node_times, [times.min(), times.max()])
+    near = slice(max(min(first, len(log.node_times) - 1) - 1, 0), last + 1)
+    return NodePath(odometry, log.odometry, log.node_times[near], state.nodes[near]).at(times)

@@ -1,1 +1,0 @@
-"""Where the vehicle was, and where points lie, given the unknowns."""

@@ -1,0 +1,180 @@
+"""Points of scans, appended scan by scan."""
+
+from dataclasses import fields
+from typing import List, Optional
+
+import numpy as np
+
+from mlsm_manager.joint_solver.growing import GrowingArray
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, lone_points
+from mlsm_manager.scan_matching.scan import Scan
+from node_support.errors import RefusedInput
+
+
+class PointTable:
+    """The points of scans 0, 1, ... in the order of time."""
+
+    def __init__(self) -> None:
+        self._starts: List[int] = [0]
+        self._scans = GrowingArray()
+        self._points = {field.name: GrowingArray() for field in fields(SurfacePoints)}
+        self._points["normals"] = GrowingArray(2)
+
+    @property
+    def scan_count(self) -> int:
+        """Number of scans so far."""
+        return len(self._starts) - 1
+
+    @property
+    def counts(self) -> np.ndarray:
+        """(scan_count,) int, number of points of each scan."""
+        return np.diff(self._starts)
+
+    def append(self, points: SurfacePoints) -> None:
+        """Append the points of one scan."""
+        for name, array in self._points.items():
+            array.extend(getattr(points, name))
+        self._scans.extend(np.full(len(points), self.scan_count))
+        self._starts.append(self._starts[-1] + len(points))
+
+    def since(self, scan: int) -> "PointTable":
+        """Return a table of `scan` and all later ones, the first of which is number 0 there."""
+        later = PointTable()
+        for number in range(scan, self.scan_count):
+            later.append(self.points(self.rows(number, number + 1)))
+        return later
+
+    def remove_newest(self) -> None:
+        """Take back the last `append`."""
+        self._starts.pop()
+        for array in (*self._points.values(), self._scans):
+            array.shorten(self._starts[-1])
+
+    def rows(self, first: int, last: int) -> np.ndarray:
+        """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
+        return np.arange(self._starts[first], self._starts[last])
+
+    def points(self, rows: np.ndarray) -> SurfacePoints:
+        """Return the points in `rows` (n,) int."""
+        return SurfacePoints(**{name: array.values[rows] for name, array in self._points.items()})
+
+    def scans(self, rows: np.ndarray) -> np.ndarray:
+        """Return the scan (n,) int of each point in `rows`."""
+        return self._scans.values[rows].astype(np.int64)
+
+
+_SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
+
+
+class RunLog:
+    """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
+
+    sonar_in_base: (2,) m. lone: points of what is small.
+    """
+
+    def __init__(self, sonar_in_base: np.ndarray) -> None:
+        # Compiled loops take no column of a matrix.
+        self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
+        self.odometry = OdometryLog()
+        self._node_times = GrowingArray()
+        self._surfaces, self.lone = PointTable(), PointTable()
+        self._odometry_lengths: List[int] = []
+
+    @property
+    def scan_count(self) -> int:
+        """Number of scans so far."""
+        return self._surfaces.scan_count
+
+    @property
+    def node_times(self) -> np.ndarray:
+        """(scan_count + 1,) s; a view that the next scan makes invalid."""
+        return self._node_times.values
+
+    @property
+    def point_counts(self) -> np.ndarray:
+        """(scan_count,) int, number of points on surfaces of each scan."""
+        return self._surfaces.counts
+
+    def append(self, scan: Scan, lookahead: float) -> None:
+        """Append a scan and the odometry of its track up to `lookahead` seconds after its end.
+
+        Raises RefusedInput for a scan that does not end later than the one before.
+        """
+        points = SurfacePoints.of(scan, self.sonar_in_base)
+        lone = lone_points(scan, self.sonar_in_base, points)
+        if not len(self._node_times):
+            self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
+        newest = self.node_times[-1]
+        if scan.reference_time <= newest:
+            text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
+            raise RefusedInput("scans out of order", text)
+        self._odometry_lengths.append(len(self.odometry))
+        self._node_times.extend([scan.reference_time])
+        self.odometry.extend(scan.track, scan.reference_time + lookahead)
+        self._surfaces.append(points)
+        self.lone.append(lone)
+
+    def remove_newest(self) -> None:
+        """Take back the last `append`, as if that scan had not been."""
+        self._surfaces.remove_newest()
+        self.lone.remove_newest()
+        self.odometry.shorten(self._odometry_lengths.pop())
+        # Without scans no node is known: the next scan begins the run.
+        self._node_times.shorten(self.scan_count + 1 if self.scan_count else 0)
+
+    def since(self, scan: int) -> "RunLog":
+        """Return a log of `scan` and all later ones, the first of which is number 0 there. It shares the odometry."""
+        later = RunLog(self.sonar_in_base)
+        later.odometry = self.odometry
+        later._node_times.extend(self.node_times[scan:])
+        later._surfaces, later.lone = self._surfaces.since(scan), self.lone.since(scan)
+        return later
+
+    def rows(self, first: int, last: int) -> np.ndarray:
+        """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
+        return self._surfaces.rows(first, last)
+
+    def points(self, rows: np.ndarray) -> SurfacePoints:
+        """Return the points in `rows` (n,) int."""
+        return self._surfaces.points(rows)
+
+    def scans(self, rows: np.ndarray) -> np.ndarray:
+        """Return the scan (n,) int of each point in `rows`."""
+        return self._surfaces.scans(rows)
+
+    def node_motion(self, nodes: np.ndarray) -> Motion:
+        """Return what the odometry reported up to `nodes` (n,)."""
+        return self.odometry.motion(self.node_times[nodes])
+
+    def node_poses(self, nodes: np.ndarray) -> np.ndarray:
+        """Return T_odom_base (n, 3) at `nodes` (n,)."""
+        return self.odometry.at(self.node_times[nodes])
+
+
+_SHORTEST_TURN = 1.0  # s: a first scan without points still needs a beginning before its end
+
+
+def parts_of(scan: Scan, count: int, newest: Optional[float]) -> List[Scan]:
+    """Return `count` scans of equal durations that follow each other, with the points of each.
+
+    newest: s, end of the scan before; None without one.
+    """
+    if count == 1:
+        return [scan]
+    start = _start(scan, newest)
+    ends = np.linspace(start, scan.reference_time, count + 1)[1:]
+    ends[-1] = scan.reference_time
+    part_of_point = np.minimum(np.searchsorted(ends, scan.times), count - 1)
+    return [_selected(scan, part_of_point == part, end) for part, end in enumerate(ends)]
+
+
+def _start(scan: Scan, newest: Optional[float]) -> float:
+    """Return when the turn began [s]; a scan without points, or with one beam, does not tell."""
+    if newest is None:
+        return min(scan.start, scan.reference_time - _SHORTEST_TURN)
+    return max(scan.start, newest) if scan.start < scan.reference_time else newest
+
+
+def _selected(scan: Scan, rows: np.ndarray, end: float) -> Scan:
+    return Scan(scan.points[rows], scan.times[rows], scan.moving[rows], scan.track, float(end))

@@ -1,1 +1,0 @@
-"""The solvers: live, scan by scan, and in batch, over the whole run."""

@@ -1,0 +1,253 @@
+"""Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
+
+from dataclasses import dataclass, replace
+from typing import Dict
+
+import numpy as np
+
+from mlsm_manager.joint_solver.motion_models import (
+    DRIFT_STATES,
+    FIXED_DEVIATION,
+    HELD_DEVIATION,
+    Compass,
+    Drift,
+    add_compass,
+    add_forgetting,
+    add_walk,
+    turned,
+)
+from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
+from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product
+from mlsm_manager.scan_matching.prediction import Fading
+
+AHEAD, ASIDE, TRAVEL, TURN_RATE = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw
+_ROUNDING_VARIANCE = 1e-4  # m^2: of a step, so that steps of no duration do not divide by zero
+
+
+@dataclass(frozen=True)
+class Speeds:
+    """How a vehicle changes its speed, in its own frame, since it keeps its speed ahead while it turns.
+
+    The speed ahead changes around a speed of travel, which changes slowly; sideways the vehicle slips. Deviations in
+    m/s, how long a difference lasts in s, travel_walk in m/s/sqrt(s).
+    """
+
+    start_speed_deviation: float
+    speed_deviation: float
+    speed_correlation_time: float
+    travel_walk: float
+    slip_deviation: float
+    slip_correlation_time: float
+
+
+@dataclass(frozen=True)
+class HeadingOdometry:
+    """What is known of the motion of a vehicle that reports its heading only."""
+
+    speeds: Speeds
+    compass: Compass
+
+
+@dataclass(frozen=True)
+class UnaidedOdometry:
+    """What is known of the motion of a vehicle that reports nothing.
+
+    turn_rate_deviation: rad/s. turn_rate_correlation_time: s. heading_walk: rad/sqrt(s), besides the turn rate.
+    """
+
+    speeds: Speeds
+    turn_rate_deviation: float
+    turn_rate_correlation_time: float
+    heading_walk: float
+
+
+class HeadingFactors:
+    """Nodes have columns x, y, yaw, then in base_link the speeds ahead and aside, and the speed of travel [m/s].
+
+    The speed ahead forgets its difference from the speed of travel (an Ornstein-Uhlenbeck process), the speed aside
+    forgets itself. Between nodes both speeds change evenly, which is where such a process is expected; what it strays
+    from there by is the variance of the steps. Reported positions are not used.
+    """
+
+    width = 6
+    distance_deviation = np.inf
+    position_walk = np.inf
+
+    def __init__(self, parameters: HeadingOdometry) -> None:
+        self._speeds, self._compass = parameters.speeds, parameters.compass
+
+    @property
+    def calibrated(self) -> Dict[str, int]:
+        """See OdometryModel: no speed of this run is one of the next."""
+        return {}
+
+    def first_node(self) -> np.ndarray:
+        """See OdometryModel."""
+        return np.zeros(self.width)
+
+    def first_deviations(self) -> np.ndarray:
+        """See OdometryModel."""
+        own, fixed = self._speeds, FIXED_DEVIATION * 10.0
+        ahead = np.hypot(own.start_speed_deviation, own.speed_deviation)
+        speeds = np.maximum([ahead, own.slip_deviation, own.start_speed_deviation], HELD_DEVIATION)
+        return np.concatenate([[fixed, fixed, self._first_heading()], speeds])
+
+    def reference(self, motion: Motion) -> np.ndarray:
+        """See OdometryModel: the path of a vehicle that always goes ahead."""
+        return as_complex(motion.ahead)
+
+    def gain(self, nodes: np.ndarray) -> np.ndarray:
+        """See OdometryModel."""
+        return nodes[..., AHEAD] + 1j * nodes[..., ASIDE]
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        """See OdometryModel."""
+        result, durations = nodes.copy(), after.times - before.times
+        kept, slipping = self._kept(durations)
+        result[:, AHEAD] = nodes[:, TRAVEL] + kept * (nodes[:, AHEAD] - nodes[:, TRAVEL])
+        result[:, ASIDE] = slipping * nodes[:, ASIDE]
+        mean = (self.gain(nodes) + self.gain(result)) / 2.0
+        step = product(product(mean, turned(nodes[:, YAW])), self.reference(after) - self.reference(before))
+        error = step - (after.positions - before.positions)
+        result[:, 0] += error.real
+        result[:, 1] += error.imag
+        return result
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        """See OdometryModel: a scale of -1 leaves nothing of reported steps."""
+        values, slopes = np.zeros(DRIFT_STATES), np.zeros((DRIFT_STATES, self.width))
+        values[:2], values[3] = node[[AHEAD, ASIDE]], -1.0
+        slopes[[0, 1], [AHEAD, ASIDE]] = 1.0
+        return Drift(values, slopes)
+
+    def fading(self, node: np.ndarray) -> Fading:
+        """See OdometryModel."""
+        own = self._speeds
+        return Fading(
+            np.array([node[TRAVEL], 0.0, 0.0]),
+            np.array([own.speed_correlation_time, own.slip_correlation_time, np.inf]),
+        )
+
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        """See OdometryModel."""
+        starts = layout.node_start(np.arange(layout.first, layout.last))
+        self._add_positions(equations, starts, nodes, motion)
+        self._add_yaw(equations, starts, nodes, motion.durations)
+        self._add_speeds(equations, starts, nodes, motion.durations)
+
+    def _first_heading(self) -> float:
+        return self._compass.heading_deviation
+
+    def _kept(self, durations: np.ndarray) -> tuple:
+        """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
+        return np.exp(-durations / self._speeds.speed_correlation_time), np.exp(
+            -durations / self._speeds.slip_correlation_time
+        )
+
+    def _add_yaw(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
+    ) -> None:
+        add_compass(equations, starts, nodes, durations, self._compass)
+
+    def _add_speeds(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
+    ) -> None:
+        own, (kept, slipping) = self._speeds, self._kept(durations)
+        add_walk(equations, starts, self.width, nodes[:, TRAVEL], TRAVEL, own.travel_walk**2 * durations)
+        variance = own.slip_deviation**2 * (1.0 - slipping**2)
+        add_forgetting(equations, starts, self.width, nodes[:, ASIDE], ASIDE, slipping, variance)
+        columns = starts[:, np.newaxis] + np.array([self.width + AHEAD, AHEAD, TRAVEL])
+        jacobian = np.column_stack([np.ones(len(starts)), -kept, kept - 1.0])
+        residual = nodes[1:, AHEAD] - kept * nodes[:-1, AHEAD] - (1.0 - kept) * nodes[:-1, TRAVEL]
+        weight = 1.0 / np.maximum(own.speed_deviation**2 * (1.0 - kept**2), HELD_DEVIATION**2)
+        equations.add(columns, jacobian, residual, weight)
+
+    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
+        speeds = self.gain(nodes)
+        ahead = product(turned(yaw), np.diff(self.reference(motion)))
+        step = product((speeds[:-1] + speeds[1:]) / 2.0, ahead)
+        residual = np.diff(as_complex(nodes)) + np.diff(motion.positions) - step
+        weight = 1.0 / (self._step_variance(motion.durations) + _ROUNDING_VARIANCE)
+        one, own = np.ones(len(starts)), np.array([AHEAD, ASIDE, YAW])
+        for axis, part in ((0, np.real), (1, np.imag)):
+            places = np.concatenate([[self.width + axis, axis], own, self.width + own])
+            by_node = [-part(ahead) / 2.0, -part(1j * ahead) / 2.0, -part(1j * step) / 2.0]
+            jacobian = np.column_stack([one, -one, *by_node, *by_node])
+            columns = starts[:, np.newaxis] + places
+            equations.add(columns, jacobian, part(residual), weight)
+
+    def _step_variance(self, durations: np.ndarray) -> np.ndarray:
+        """Return the variances (n,) [m^2] of steps whose speeds at both ends are known, in each direction."""
+        own = self._speeds
+        of_axes = (
+            _bridged(own.speed_deviation, own.speed_correlation_time, durations),
+            _bridged(own.slip_deviation, own.slip_correlation_time, durations),
+        )
+        return (of_axes[0] + of_axes[1]) / 2.0
+
+
+class UnaidedFactors(HeadingFactors):
+    """Nodes have the columns of HeadingFactors, and the turn rate [rad/s], which forgets itself."""
+
+    width = 7
+
+    def __init__(self, parameters: UnaidedOdometry) -> None:
+        self._speeds, self._own = parameters.speeds, parameters
+
+    def first_deviations(self) -> np.ndarray:
+        """See OdometryModel: the first heading defines the map."""
+        return np.append(super().first_deviations(), self._own.turn_rate_deviation)
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        """See OdometryModel."""
+        durations = after.times - before.times
+        rate = nodes[:, TURN_RATE]
+        half = nodes.copy()
+        later = np.exp(-durations / self._own.turn_rate_correlation_time) * rate
+        turn = (rate + later) / 2.0 * durations
+        half[:, YAW] += turn / 2.0
+        result = super().advanced(half, before, after)
+        result[:, YAW] += turn / 2.0
+        result[:, TURN_RATE] = later
+        return result
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        """See OdometryModel."""
+        known = super().drift(node, heading)
+        values, slopes = known.values, known.slopes
+        values[2], slopes[2, TURN_RATE] = node[TURN_RATE], 1.0
+        return Drift(values, slopes)
+
+    def fading(self, node: np.ndarray) -> Fading:
+        """See OdometryModel."""
+        known = super().fading(node)
+        return replace(known, times=np.append(known.times[:2], self._own.turn_rate_correlation_time))
+
+    def _first_heading(self) -> float:
+        return FIXED_DEVIATION * 10.0
+
+    def _add_yaw(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
+    ) -> None:
+        own = self._own
+        kept = np.exp(-durations / own.turn_rate_correlation_time)
+        variance = own.turn_rate_deviation**2 * (1.0 - kept**2)
+        add_forgetting(equations, starts, self.width, nodes[:, TURN_RATE], TURN_RATE, kept, variance)
+        places = np.array([self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE])
+        one, half = np.ones(len(starts)), durations / 2.0
+        residual = np.diff(nodes[:, YAW]) - half * (nodes[1:, TURN_RATE] + nodes[:-1, TURN_RATE])
+        short = own.turn_rate_deviation**2 * np.minimum(
+            durations**3 / (6.0 * own.turn_rate_correlation_time), durations**2
+        )
+        weight = 1.0 / (short + own.heading_walk**2 * durations)
+        jacobian = np.column_stack([one, -one, -half, -half])
+        equations.add(starts[:, np.newaxis] + places, jacobian, residual, weight)
+
+
+def _bridged(deviation: float, time: float, durations: np.ndarray) -> np.ndarray:
+    """Return the variances of an integral over `durations` (n,) of a process that forgets, whose ends are known.
+
+    The integral less the mean of both ends times the duration; for short durations that is a random walk's bridge.
+    """
+    return deviation**2 * np.minimum(durations**3 / (6.0 * time), 2.0 * time * durations)
