@@ -45,12 +45,11 @@ class Calibration:
     @classmethod
     def expected(cls, solver: LiveSolver) -> "Calibration":
         """Return what was known before the run."""
-        columns, parameters = solver.odometry.calibrated, solver.parameters
-        of_node = list(columns.values())
-        values = np.append(parameters.run_mean, solver.odometry.first_node()[of_node])
-        deviations = np.append(parameters.run_deviations, solver.odometry.first_deviations()[of_node])
-        deviations = np.maximum(deviations, HELD_DEVIATION)
-        return cls((*_OF_RUN, *columns), values, deviations)
+        odometry, parameters = solver.odometry, solver.parameters
+        columns = list(odometry.calibrated.values())
+        deviations = np.append(parameters.run_deviations, odometry.first_deviations()[columns])
+        values = np.append(parameters.run_mean, odometry.first_node()[columns])
+        return cls((*_OF_RUN, *odometry.calibrated), values, np.maximum(deviations, HELD_DEVIATION))
 
     @classmethod
     def of_live(cls, solver: LiveSolver) -> "Calibration":
@@ -60,27 +59,33 @@ class Calibration:
     @classmethod
     def of_estimate(cls, solver: LiveSolver, estimate: LiveEstimate) -> "Calibration":
         """Return what one of the estimates of `solver` knows."""
-        columns = solver.odometry.calibrated
-        of_node, of_run = list(columns.values()), list(_OF_RUN.values())
-        of_nodes = np.sqrt(np.diag(estimate.covariance)[of_node])
-        deviations = np.append(_of_run(estimate.run_deviations, solver), of_nodes)
-        return cls((*_OF_RUN, *columns), np.append(estimate.run[of_run], estimate.node[of_node]), deviations)
+        deviations = np.sqrt(np.diag(estimate.covariance))
+        return cls._of(solver, estimate.run, estimate.node, deviations[-RUN_COLUMNS:], deviations)
 
     @classmethod
     def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
         """Return what the fit of a whole run found; scale and direction are those of the last node."""
-        live, of_run = cls.of_live(solver), list(_OF_RUN.values())
-        deviations = _of_run(np.sqrt(np.diag(batch.run_covariance)), solver)
-        values = np.append(batch.state.run[of_run], batch.state.nodes[-1, list(solver.odometry.calibrated.values())])
-        return cls(live.names, values, np.append(deviations, live.deviations[len(of_run) :]))
+        of_run, of_node = (np.sqrt(np.diag(one)) for one in (batch.run_covariance, solver.estimates[-1].covariance))
+        return cls._of(solver, batch.state.run, batch.state.nodes[-1], of_run, of_node)
 
     @classmethod
     def of_part(cls, solver: LiveSolver, part: PartResult) -> "Calibration":
         """Return what the fit of a part of a run found; scale and direction are those of the last node."""
-        columns, of_run = solver.odometry.calibrated, list(_OF_RUN.values())
-        deviations, of_node = np.sqrt(np.diag(part.covariance)), list(columns.values())
-        known = np.append(_of_run(deviations[-RUN_COLUMNS:], solver), deviations[of_node])
-        return cls((*_OF_RUN, *columns), np.append(part.run[of_run], part.node[of_node]), known)
+        deviations = np.sqrt(np.diag(part.covariance))
+        return cls._of(solver, part.run, part.node, deviations[-RUN_COLUMNS:], deviations)
+
+    @classmethod
+    def _of(
+        cls, solver: LiveSolver, run: np.ndarray, node: np.ndarray, of_run: np.ndarray, of_node: np.ndarray
+    ) -> "Calibration":
+        """Return that of the unknowns of run (2,) and node, with their deviations.
+
+        A range scale that the run could not tell is as uncertain as before.
+        """
+        rows, columns = list(_OF_RUN.values()), list(solver.odometry.calibrated.values())
+        deviations = np.append(of_run[rows], of_node[columns])
+        deviations[0] = np.hypot(deviations[0], solver.parameters.world_scale_deviation)
+        return cls((*_OF_RUN, *solver.odometry.calibrated), np.append(run[rows], node[columns]), deviations)
 
     @property
     def by_name(self) -> Dict[str, Tuple[float, float]]:
@@ -104,13 +109,6 @@ class Calibration:
         value["range_scale_deviation"] = deviation["range_scale_error"]
         value["sonar_delay_deviation"] = deviation["sonar_delay"]
         return parameters.changed(_allowed(value))
-
-
-def _of_run(deviations: np.ndarray, solver: LiveSolver) -> np.ndarray:
-    """Return deviations (2,) as _OF_RUN; a range scale that the run could not tell is as uncertain as before."""
-    result = deviations[list(_OF_RUN.values())].copy()
-    result[0] = np.hypot(result[0], solver.parameters.world_scale_deviation)
-    return result
 
 
 def _allowed(values: Dict[str, float]) -> Dict[str, float]:
