@@ -3,7 +3,7 @@
 import math
 import threading
 from collections import deque
-from typing import Callable, Deque, NamedTuple, Optional, Tuple
+from typing import Deque, Optional, Tuple
 
 import numpy as np
 
@@ -133,42 +133,6 @@ class LiveCorrection:
         if self.blend_time <= 0.0:
             return 0.0
         return min(max(1.0 - seconds / self.blend_time, 0.0), 1.0)
-
-
-class _Arrival(NamedTuple):
-    """Of a scan: its own time [s], and when it came by the clock [s]."""
-
-    scan_time: float
-    came_at: float
-
-
-class StandingCorrection:
-    """Blends in a new correction by the wall clock after each scan, and then holds it.
-
-    Such an odometry says nothing of the time between scans. Safe to use from several threads.
-    """
-
-    def __init__(self, live: LiveCorrection, clock: Callable[[], float]) -> None:
-        """`clock`: s, tells how long ago the newest scan came."""
-        self._live = live
-        self._clock = clock
-        self.forget()
-
-    def forget(self) -> None:
-        """Forget the newest scan."""
-        self._newest: Optional[_Arrival] = None
-
-    def take_scan_time(self, time: float) -> None:
-        """Learn that a scan of `time` [s] came now."""
-        self._newest = _Arrival(time, self._clock())
-
-    def sample(self, odometry: np.ndarray) -> Optional[np.ndarray]:
-        """Return T_map_odom (3,) to be shown now, where the odometry says T_odom_base (3,); None before any scan."""
-        newest = self._newest
-        if newest is None:
-            return None
-        seconds = min(max(self._clock() - newest.came_at, 0.0), self._live.blend_time)
-        return self._live.sample(newest.scan_time + seconds, odometry)
 
 
 def _correction(T_map_base: np.ndarray, T_odom_base: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ import numpy as np
 
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator
-from mlsm_manager.localisation.live_correction import LiveCorrection, StandingCorrection
+from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
@@ -60,7 +60,8 @@ class Localiser:
         self._lock = threading.RLock()
         self._changes = 0
         self._live = LiveCorrection(settings.blend_time)
-        self._standing = StandingCorrection(self._live, clock)
+        self._clock = clock
+        self._came: Optional[Tuple[float, float]] = None
         self._newest: Optional[Scan] = None
         self._search = PlaceSearch()
         self._resumed_at: Optional[StoredPlace] = None
@@ -112,7 +113,7 @@ class Localiser:
             self.notice_time(scan.reference_time)
             self._changes += 1
             self._newest = scan
-            self._standing.take_scan_time(scan.reference_time)
+            self._came = scan.reference_time, self._clock()
             update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
             self._search.learn(update.accepted)
             if update.belief is not None:
@@ -141,9 +142,16 @@ class Localiser:
         return self._live.sample(time, odometry)
 
     def standing_correction(self, odometry: np.ndarray) -> np.ndarray:
-        """Return T_map_odom (3,) to be shown now by an odometry without stamps; see StandingCorrection."""
-        found = self._standing.sample(odometry)
-        return self.last_correction if found is None else found
+        """Return T_map_odom (3,) to be shown now by an odometry without stamps, as a static transform is.
+
+        Such an odometry says nothing of the time between scans: a new correction is blended in by the wall clock, and
+        then holds.
+        """
+        if self._came is None:
+            return self.last_correction
+        scan_time, came_at = self._came
+        since = min(max(self._clock() - came_at, 0.0), self._live.blend_time)
+        return self._live.sample(scan_time + since, odometry)
 
     @property
     def last_correction(self) -> np.ndarray:
@@ -299,5 +307,4 @@ class Localiser:
 
     def _forget_scans(self) -> None:
         self._live.clear()
-        self._standing.forget()
-        self._newest = self._resumed_at = None
+        self._newest = self._came = self._resumed_at = None

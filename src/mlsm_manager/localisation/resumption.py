@@ -1,4 +1,8 @@
-"""Where the vehicle was in a stored map, and whether that still holds."""
+"""What is stored to go on after a restart, the vehicle's place and its joint run, and whether that still holds.
+
+Points of a run are kept as they were heard, not where they were drawn, so that they may move as if the node had never
+been away. What the maps hold without those that may still move is kept for the cells that these lie in.
+"""
 
 from dataclasses import dataclass
 from typing import Callable, Dict, List, Mapping, Optional, Sequence
@@ -26,6 +30,7 @@ _LEAST_SHARE = 0.75
 _MOST_BY_CHANCE = 0.75  # of those near the map, that may be near it beside their place: else blocks are everywhere
 _ASIDE = 0.3  # of the points' median distance, by which they are shifted to see that
 _DIRECTIONS = np.linspace(0.0, 2.0 * np.pi, 8, endpoint=False)
+_PREFIX, _SOLVER = "run.", "solver."
 
 
 @dataclass(frozen=True)
@@ -120,26 +125,6 @@ class PlaceSearch:
             self._left -= 1
 
 
-def resumed_if_it_fits(session: JointSession, scan: Scan, surface_map: MultiLevelSurfaceMap) -> Optional[JointSession]:
-    """Return the run with one more scan where the scan lies on the map; None where it does not.
-
-    surface_map: of the matched echoes, without this scan. `session` itself stays as it is.
-    """
-    longer = session.copied()
-    try:
-        agreement = longer.add(scan).agreement
-    except RefusedInput:
-        return None
-    points = longer.points(MapCloud.of_scan(scan))[:, :2]
-    near = _share_near_blocks(points, surface_map)
-    if near * agreement < _LEAST_SHARE:
-        return None
-    return longer if _share_by_chance(points, longer, surface_map) <= _MOST_BY_CHANCE * near else None
-
-
-_PREFIX, _SOLVER = "run.", "solver."
-
-
 @dataclass(frozen=True)
 class StoredRun:
     """T_map_odom: (3,) that moves the scans before they are solved. sonar_in_base: (2,) m. scans: all, oldest first.
@@ -183,6 +168,23 @@ class StoredRun:
             return _run_of(lambda name: arrays[_PREFIX + name], solver)
         except (KeyError, ValueError, IndexError, RefusedInput):
             return None
+
+
+def resumed_if_it_fits(session: JointSession, scan: Scan, surface_map: MultiLevelSurfaceMap) -> Optional[JointSession]:
+    """Return the run with one more scan where the scan lies on the map; None where it does not.
+
+    surface_map: of the matched echoes, without this scan. `session` itself stays as it is.
+    """
+    longer = session.copied()
+    try:
+        agreement = longer.add(scan).agreement
+    except RefusedInput:
+        return None
+    points = longer.points(MapCloud.of_scan(scan))[:, :2]
+    near = _share_near_blocks(points, surface_map)
+    if near * agreement < _LEAST_SHARE:
+        return None
+    return longer if _share_by_chance(points, longer, surface_map) <= _MOST_BY_CHANCE * near else None
 
 
 def _run_of(part: Callable[[str], np.ndarray], solver: Mapping[str, np.ndarray]) -> StoredRun:
