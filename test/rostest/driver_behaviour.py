@@ -55,7 +55,7 @@ class DriverBehaviour:
         now = rospy.Time.now()
 
         def fresh() -> List[Any]:
-            return [beam for beam in self.beams.received if beam.header.stamp > now][PINGS_BEFORE_A_CHANGE:]
+            return [beam for beam in self.beams.messages if beam.header.stamp > now][PINGS_BEFORE_A_CHANGE:]
 
         assert self.beams.wait(lambda _: len(fresh()) >= count), f"no {count} beams after {now.to_sec():.3f}"
         return fresh()[:count]
@@ -63,7 +63,7 @@ class DriverBehaviour:
     def wait_for_beam(self, wanted: Callable[[Any], bool]) -> Any:
         """Return the newest beam once it is as wanted."""
         assert self.beams.wait(lambda received: bool(received) and wanted(received[-1]))
-        return self.beams.received[-1]
+        return self.beams.messages[-1]
 
     @property
     def beams_per_turn(self) -> int:
@@ -115,7 +115,7 @@ class DriverBehaviour:
         assert self.order_fault("disappearance", 1).success
         assert health.wait(lambda arrays: any(level(array) == ERROR for array in arrays))
         self.wait_for_beam(lambda beam: beam.header.stamp.to_sec() > last + absence)
-        gap = max(np.diff([beam.header.stamp.to_sec() for beam in self.beams.received]))
+        gap = max(np.diff([beam.header.stamp.to_sec() for beam in self.beams.messages]))
         print(f"port gone for {absence:g} s, {gap - absence:.2f} s from its return to the next beam")
         assert gap > absence
         assert health.wait(lambda arrays: values(arrays[-1])["connected"] == "true")

@@ -64,8 +64,9 @@ def _report_skip(name: str, reason: str) -> None:
 class Inbox:
     """What came on a topic, and a wait for a message that fits."""
 
-    def __init__(self, topic: str, kind: Any) -> None:
-        self._topic = topic
+    def __init__(self, topic: str, kind: Any, wanted: Callable[[Any], bool] = lambda _: True) -> None:
+        """`wanted`: returns whether a message is kept."""
+        self._topic, self._wanted = topic, wanted
         self._condition = threading.Condition()
         self._messages: List[Any] = []
         self._subscriber = rospy.Subscriber(topic, kind, self._take, queue_size=1000)
@@ -81,6 +82,8 @@ class Inbox:
         self._subscriber.unregister()
 
     def _take(self, message: Any) -> None:
+        if not self._wanted(message):
+            return
         with self._condition:
             self._messages.append(message)
             self._condition.notify_all()
@@ -108,6 +111,16 @@ class Inbox:
                 seen = len(self._messages)
                 if not self._condition.wait(max(end - time.monotonic(), 0.0)):
                     raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {seen} messages came")
+
+    def wait(self, ready: Callable[[List[Any]], bool], timeout: float = PATIENCE) -> bool:
+        """Wait until the messages satisfy `ready`; return whether they do."""
+        with self._condition:
+            return self._condition.wait_for(lambda: ready(self._messages), timeout)
+
+    def wait_for_more(self, count: int = 1) -> List[Any]:
+        """Return the next `count` messages; raises AssertionError when they do not come."""
+        start = len(self.messages)
+        return self.wait_for_number(start + count)[start : start + count]
 
     def wait_for_number(self, number: int, timeout: float = PATIENCE) -> List[Any]:
         """Return all messages once at least `number` have come; raises AssertionError after `timeout` seconds."""

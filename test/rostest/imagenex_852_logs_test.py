@@ -52,7 +52,7 @@ class TestLogs(unittest.TestCase):
         assert done.returncode == 0, done.stdout
         published = int(done.stdout.split(" beams published")[0].split()[-1])
         assert listener.wait(lambda received: len(received) >= published)
-        return listener.received, done.stdout
+        return listener.messages, done.stdout
 
     def test_play_publishes_every_ping_in_order(self):
         received, _ = self.play(self.log)
