@@ -1,7 +1,7 @@
 """sonar_to_cloud and the chain of stages in one process: arrays go from stage to stage, nothing is copied."""
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Collection, Dict, Iterable, List, Mapping, Optional, Sequence
+from typing import TYPE_CHECKING, Collection, Dict, List, Mapping, Optional, Sequence
 
 import rospy
 
@@ -14,9 +14,8 @@ from sonar_processing.ros.sonar_to_cloud import SonarToCloud
 from sonar_processing.ros.stage_runner import StageRunner
 
 if TYPE_CHECKING:
-    from sonar_processing.ros.shape_detectors import HostedDetector
+    from sonar_processing.ros.shape_detectors import ShapeDetectorNode
 
-DETECTORS = ("line_detector", "circle_detector")
 DEFAULT_CHAIN = ["thresholder", "outlier_remover", "echo_extractor"]
 
 
@@ -25,7 +24,7 @@ class StageChain:
 
     def __init__(self, runners: List[StageRunner], sinks: Mapping[str, Sequence[CloudSink]]) -> None:
         """`sinks` receive what stages make, by the output topics of these stages."""
-        self._links = [(runner, sinks.get(runner.output_topic, ())) for runner in runners]
+        self._links = [(runner, sinks.get(runner.type.output_topic, ())) for runner in runners]
 
     def is_wanted(self) -> bool:
         """Return whether anybody takes anything that the stages make."""
@@ -55,12 +54,13 @@ class Pipeline:
 
         Raises ParameterError for a bad parameter of any stage or detector.
         """
-        runners = [StageRunner(name, rospy.resolve_name(name)) for name in _chain()]
-        detectors = _detectors({runner.output_topic for runner in runners})
-        clouds, polar = (
-            _stage_chain([runner for runner in runners if runner.takes_polar_scans is is_polar], sink, detectors)
-            for is_polar, sink in ((False, cloud_sink), (True, echo_sink))
-        )
+        runners = [StageRunner(name, rospy.resolve_name(name)) for name in _names("chain", DEFAULT_CHAIN, STAGES)]
+        detectors = _detectors({runner.type.output_topic for runner in runners})
+        sinks: Dict[str, List[CloudSink]] = defaultdict(list)
+        for detector in detectors:
+            sinks[detector.input_topic].append(detector.sink())
+        clouds = _stage_chain([runner for runner in runners if not runner.type.takes_polar_scans], sinks, cloud_sink)
+        polar = _stage_chain([runner for runner in runners if runner.type.takes_polar_scans], sinks, echo_sink)
         self._source = SonarToCloud(
             rospy.resolve_name("sonar_to_cloud"),
             CloudSink(clouds.process, clouds.is_wanted),
@@ -72,19 +72,15 @@ class Pipeline:
         """The health of everything that is hosted."""
 
 
-def _chain() -> List[str]:
-    return _names("chain", DEFAULT_CHAIN, STAGES)
-
-
-def _detectors(made: Collection[str]) -> List["HostedDetector"]:
+def _detectors(made: Collection[str]) -> List["ShapeDetectorNode"]:
     """Return the detectors; each needs a stage whose output, one of the topics `made`, is its input."""
-    names = _names("detectors", [], DETECTORS)
-    if not names:
+    if not rospy.get_param("~detectors", []):
         return []
     # Here, because it loads scipy.optimize.
-    from sonar_processing.ros.shape_detectors import HostedDetector
+    from sonar_processing.ros.shape_detectors import DETECTORS
 
-    detectors = [HostedDetector.named(name) for name in names]
+    names = _names("detectors", [], DETECTORS)
+    detectors = [DETECTORS[name](rospy.resolve_name(name)) for name in names]
     for detector in detectors:
         if detector.input_topic not in made:
             raise ParameterError(f"detectors = {names!r}: no stage of chain makes {detector.input_topic}")
@@ -99,12 +95,9 @@ def _names(parameter: str, default: List[str], known: Collection[str]) -> List[s
 
 
 def _stage_chain(
-    runners: List[StageRunner], last: Optional[CloudSink], detectors: Iterable["HostedDetector"]
+    runners: List[StageRunner], sinks: Dict[str, List[CloudSink]], last: Optional[CloudSink]
 ) -> StageChain:
-    """Return a chain that gives detectors what they take, and the sink `last` what leaves the last stage."""
-    sinks: Dict[str, List[CloudSink]] = defaultdict(list)
+    """Return a chain that gives what the last stage makes to `last` too."""
     if runners and last is not None:
-        sinks[runners[-1].output_topic].append(last)
-    for detector in detectors:
-        sinks[detector.input_topic].append(CloudSink(detector.take, lambda one=detector: one.is_read))
+        sinks[runners[-1].type.output_topic].append(last)
     return StageChain(runners, sinks)

@@ -16,7 +16,7 @@ from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import TfBuffer, stamp_of
-from sonar_processing.cloud import Cloud
+from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import PointsPublisher, report_broken, subscribe_to_clouds
 from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
@@ -94,9 +94,13 @@ class ShapeDetectorNode(ABC):
         subscribe_to_clouds(cls.input_topic, detector.process, detector.health)
         return detector
 
+    def sink(self) -> CloudSink:
+        """Return where the process that hosts the detector hands its clouds to."""
+        return CloudSink(DetectorQueue(self).take, lambda: self.is_read)
+
     @property
     def is_read(self) -> bool:
-        """Whether anybody listens to any of the detector's topics."""
+        """Whether anybody listens to any of the detector's topics; a hosted one gets no clouds otherwise."""
         publishers = (self._coefficients, self._markers)
         return self._inliers.is_read or any(publisher.get_num_connections() for publisher in publishers)
 
@@ -168,40 +172,25 @@ def _part(cloud: Cloud, shapes: Sequence[Any]) -> Cloud:
     return cloud.select(keep)
 
 
-_DETECTORS = {kind.name: kind for kind in (LineDetectorNode, CircleDetectorNode)}
+DETECTORS = {kind.name: kind for kind in (LineDetectorNode, CircleDetectorNode)}
 
 
-class HostedDetector:
-    """A detector with a thread of its own: neither beams nor map wait until it is done, or until tf answers it."""
-
-    @classmethod
-    def named(cls, name: str) -> "HostedDetector":
-        """Return a detector with the parameters and topics it has as a node.
-
-        Raises KeyError for an unknown name and ParameterError for a bad parameter.
-        """
-        return cls(_DETECTORS[name](rospy.resolve_name(name)))
+class DetectorQueue:
+    """A thread of its own for a detector that is hosted: neither beams nor map wait until it is done, or for its tf."""
 
     def __init__(self, detector: ShapeDetectorNode) -> None:
-        self.health = detector.health
-        self.input_topic = detector.input_topic
-        self._detector = detector
+        self._health = detector.health
         self._process: Callable[[Cloud], None] = guarded(detector.health, detector.process)
         self._clouds: Deque[Cloud] = deque()
         self._condition = threading.Condition()
         threading.Thread(target=self._work, daemon=True).start()
-
-    @property
-    def is_read(self) -> bool:
-        """Whether anybody listens to what the detector finds; otherwise it gets no clouds."""
-        return self._detector.is_read
 
     def take(self, cloud: Cloud) -> None:
         """Queue a cloud; returns at once. The oldest one that waits goes when there are too many."""
         with self._condition:
             if len(self._clouds) == _WAITING:
                 self._clouds.popleft()
-                self.health.problem("clouds dropped", f"{_WAITING} newer ones wait, the machine is too slow")
+                self._health.problem("clouds dropped", f"{_WAITING} newer ones wait, the machine is too slow")
             self._clouds.append(cloud)
             self._condition.notify()
 

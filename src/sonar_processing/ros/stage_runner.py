@@ -22,26 +22,16 @@ class StageRunner:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health(name)
         self.healths = [self.health]
-        self._type = STAGES[name]
+        self.type = STAGES[name]
         self._emptied = EmptiedScans()
         self._live = ReconfigurableParameters(
-            self._type.parameters, namespace, config_name(name), self.health, self._use_parameters
+            self.type.parameters, namespace, config_name(name), self.health, self._use_parameters
         )
-        self._publisher = CloudPublisher(self._type.output_topic)
-        self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self._type.figures]
+        self._publisher = CloudPublisher(self.type.output_topic)
+        self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self.type.figures]
 
     def _use_parameters(self, parameters: ParameterSet) -> None:
-        self._stage = self._type.build(parameters)
-
-    @property
-    def takes_polar_scans(self) -> bool:
-        """Whether the stage works beside the chain of clouds."""
-        return self._type.takes_polar_scans
-
-    @property
-    def output_topic(self) -> str:
-        """The topic of what the stage makes."""
-        return self._type.output_topic
+        self._stage = self.type.build(parameters)
 
     @property
     def is_read(self) -> bool:
@@ -52,7 +42,7 @@ class StageRunner:
     def as_node(cls, name: str) -> "StageRunner":
         """Return the stage `name` as a node of its own, which takes clouds from its input topic."""
         runner = cls(name, "~")
-        subscribe_to_clouds(runner._type.input_topic, runner.process, runner.health)
+        subscribe_to_clouds(runner.type.input_topic, runner.process, runner.health)
         return runner
 
     def process(self, cloud: Cloud) -> Optional[Cloud]:
@@ -70,7 +60,7 @@ class StageRunner:
         self._count_out(cloud, result)
         self._publisher.publish(result)
         for figure in self._figures:
-            figure.publish(self._type.figures[figure.name](stage))
+            figure.publish(self.type.figures[figure.name](stage))
         return result
 
     def _count_out(self, cloud: Cloud, result: Cloud) -> None:
@@ -78,7 +68,7 @@ class StageRunner:
         self.health.count("clouds out")
         self.health.count("points out", points)
         if self._emptied.take(int(np.count_nonzero(cloud.valid)), points):
-            self.health.problem("scans in a row lost all points", self._type.when_empty, SCANS_IN_A_ROW)
+            self.health.problem("scans in a row lost all points", self.type.when_empty, SCANS_IN_A_ROW)
 
 
 def run_stage(name: str) -> None:
