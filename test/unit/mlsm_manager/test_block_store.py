@@ -13,6 +13,7 @@ from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex, cell_keys
 from mlsm_manager.surface_map.large_array import LargeArray
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
+SMALL, LARGE = 1000, 1_000_000
 CLUSTERED = st.integers(-40, 40)
 FAR = st.sampled_from([-(10**8), -(2**31) + 1, -65536, -1, 0, 1, 65536, 10**8, 2**31 - 1])
 CELLS = st.one_of(st.tuples(CLUSTERED, CLUSTERED), st.tuples(FAR, FAR), st.tuples(CLUSTERED, FAR))
@@ -56,11 +57,6 @@ def test_a_table_that_takes_many_cells_at_once_finds_them_all():
     assert index.find(keys).tolist() == list(range(len(keys)))
 
 
-def test_cells_have_slots_of_their_own():
-    slots = CellIndex(0).slots(_keys([(x * 1024, y * 1024) for x in range(50) for y in range(50)]))
-    assert len(set(slots.tolist())) == 2500
-
-
 @given(st.lists(CELLS, unique=True, max_size=60))
 def test_different_cells_have_different_keys_that_sort_by_x_then_y(cells):
     keys = _keys(sorted(cells))
@@ -71,32 +67,20 @@ def test_no_cells_need_no_slots():
     assert CellIndex(0).slots(_keys([])).tolist() == []
 
 
-def test_a_crowded_table_does_not_grow_before_it_must():
-    index = CellIndex(0)
+@pytest.mark.parametrize(
+    ("expected", "cells"),
+    [
+        pytest.param(0, [[(x, -x)] for x in range(600)], id="crowded, but not full"),
+        pytest.param(14400, [[(x, y) for x in range(120) for y in range(120)]], id="as many as expected"),
+        pytest.param(0, [[(x, 0) for x in range(10)]] * 200, id="known already"),
+    ],
+)
+def test_a_table_does_not_grow_before_it_must(expected, cells):
+    index = CellIndex(expected)
     before = index.nbytes
-    for x in range(600):
-        index.slots(_keys([(x, -x)]))
+    for part in cells:
+        index.slots(_keys(part))
     assert index.nbytes == before
-
-
-def test_an_expected_number_of_cells_is_reserved_at_once():
-    index = CellIndex(14400)
-    before = index.nbytes
-    index.slots(_keys([(x, y) for x in range(120) for y in range(120)]))
-    assert index.nbytes == before
-
-
-def test_known_cells_take_no_more_memory():
-    index = CellIndex(0)
-    keys = _keys([(x, 0) for x in range(10)])
-    index.slots(keys)
-    before = index.nbytes
-    for _ in range(200):
-        index.slots(keys)
-    assert index.nbytes == before
-
-
-SMALL, LARGE = 1000, 1_000_000
 
 
 @pytest.mark.parametrize("length", [SMALL, LARGE])
