@@ -32,12 +32,12 @@ class DeviceStats(LineStats):
     parser: ParserCounts = field(default_factory=ParserCounts)
     problems = {  # noqa: RUF012
         "timeouts": "no reply; check the head's power, the cable, baud_rate and head_id",
-        "bad_frames": "a broken reply; check the cable",
-        "unexpected_replies": "a reply came late or twice and was dropped",
-        "early_replies": "a reply came before the sound can have returned and was dropped; check speed_of_sound, "
+        "bad frames": "a broken reply; check the cable",
+        "unexpected replies": "a reply came late or twice and was dropped",
+        "early replies": "a reply came before the sound can have returned and was dropped; check speed_of_sound, "
         "baud_rate and whether another head is on the line",
         "overruns": "the head lost characters of a command; check the cable",
-        "rejected_switches": "the head did not accept the switches of a command",
+        "rejected switches": "the head did not accept the switches of a command",
     }
 
 

@@ -40,10 +40,10 @@ class Ping360Stats(LineStats):
     pulse: PulseSettings = field(default_factory=PulseSettings)
     problems = {  # noqa: RUF012
         "timeouts": "no reply; check the head's power and the cable",
-        "bad_frames": "a broken message; check the cable, lower baud_rate",
-        "unexpected_replies": "a reply came late or twice and was dropped",
+        "bad frames": "a broken message; check the cable, lower baud_rate",
+        "unexpected replies": "a reply came late or twice and was dropped",
         "refusals": "the head did not accept a command",
-        "missing_beams": "the head scanned on, but not every beam arrived; check the cable, lower baud_rate",
+        "missing beams": "the head scanned on, but not every beam arrived; check the cable, lower baud_rate",
     }
 
     def details(self) -> Dict[str, str]:

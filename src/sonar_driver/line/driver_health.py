@@ -32,7 +32,7 @@ class LineStats:
         return max(0, self.connections - int(self.connected))
 
     problems: ClassVar[Mapping[str, str]] = {}
-    """What the user should check when a count that should stay zero does not, by fields."""
+    """What to check when a count that should stay zero does not, by the name of its field with spaces."""
 
     def details(self) -> Dict[str, str]:
         """Return what else /diagnostics shows of this sonar."""
@@ -71,8 +71,8 @@ class DriverHealth(Health):
         self.total("replies", stats.replies)
         for name, value in stats.details().items():
             self.show(name, value)
-        for field, hint in stats.problems.items():
-            self._note_problem(field.replace("_", " "), hint, getattr(stats, field))
+        for kind, hint in stats.problems.items():
+            self._note_problem(kind, hint, getattr(stats, kind.replace(" ", "_")))
         self._note_problem("losses of the port", stats.last_error, stats.losses)
 
     def _note_problem(self, kind: str, detail: str, total: int) -> None:
