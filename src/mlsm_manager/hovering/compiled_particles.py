@@ -82,10 +82,7 @@ def _lower(least, places, source, deviations, across_x, across_y, along_x, along
         least[source, lane] = min(least[source, lane], across * across + along * along)
 
 
-@compiled(
-    "f8[::1](f8[:,:,::1], i8[::1], i8[::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1], f8)",
-    error_model="numpy",
-)
+@compiled("f8[::1](f8[:,:,::1], i8[::1], i8[::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1], f8)", error_model="numpy")
 def log_likelihoods(paths, starts, candidates, sources, weights, target_nodes, targets, farthest):
     """Return how much (n,) sources speak for n particles: a weight for each nearest target, fading with its distance.
 
@@ -175,7 +172,7 @@ def _add(sums, x, y, place, normal, is_post, weight, share):
 )
 def moves_onto_echoes(
     paths, starts, candidates, arms, shares, weights, post, target_nodes, target_arms, target_shares, target_normals,
-    information, farthest, fading, stiffness,
+    information, farthest, fading, stiffness
 ):  # fmt: skip
     """Return moves (n, 2) [m] of the ends of n particles, to where the sources lie better on their nearest targets.
 

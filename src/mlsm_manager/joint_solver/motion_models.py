@@ -35,7 +35,9 @@ class Drift:
 
 
 class OdometryModel(Protocol):
-    """Nodes have `width` unknowns: corrections x, y, yaw of the reported pose, then those of the model.
+    """Interface of the models; what they override is described here.
+
+    Nodes have `width` unknowns: corrections x, y, yaw of the reported pose, then those of the model.
 
     The path between two nodes is the model's reference path, turned and scaled by `gain`.
     """
@@ -45,6 +47,7 @@ class OdometryModel(Protocol):
     @property
     def calibrated(self) -> Dict[str, int]:
         """Columns that the next run may start from, by name."""
+        return {}
 
     @property
     def distance_deviation(self) -> float:
@@ -77,6 +80,7 @@ class OdometryModel(Protocol):
 
     def fading(self, node: np.ndarray) -> Optional[Fading]:
         """Return how the rates of `drift` change with the time since the node (width,); None where they stay."""
+        return None
 
 
 def frozen_deviations(deviations: np.ndarray) -> np.ndarray:
@@ -153,7 +157,7 @@ class ThrusterOdometry(DvlOdometry):
     current_walk: float
 
 
-class DvlFactors:
+class DvlFactors(OdometryModel):
     """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly."""
 
     width = 5
@@ -163,39 +167,32 @@ class DvlFactors:
 
     @property
     def calibrated(self) -> Dict[str, int]:
-        """See OdometryModel."""
         return {"odometry_scale": SCALE, "odometry_direction": DIRECTION}
 
     @property
     def distance_deviation(self) -> float:
-        """See OdometryModel."""
         return self._parameters.scale_deviation
 
     @property
     def position_walk(self) -> float:
-        """See OdometryModel."""
         return self._parameters.position_walk
 
     def first_node(self) -> np.ndarray:
-        """See OdometryModel."""
         return np.array([0.0, 0.0, 0.0, self._parameters.direction, self._parameters.scale])
 
     def first_deviations(self) -> np.ndarray:
-        """See OdometryModel."""
         own, fixed = self._parameters, FIXED_DEVIATION * 10.0
         walking = np.maximum([own.direction_deviation, own.scale_deviation], HELD_DEVIATION)
         return np.concatenate([[fixed, fixed, own.compass.heading_deviation], walking])
 
     def reference(self, motion: Motion) -> np.ndarray:
-        """See OdometryModel: the reported positions."""
+        """The reported positions."""
         return motion.positions
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
-        """See OdometryModel."""
         return (1.0 + nodes[..., SCALE]) * turned(nodes[..., DIRECTION])
 
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        """See OdometryModel."""
         step = after.positions - before.positions
         error = product(product(self.gain(nodes), turned(nodes[:, YAW])), step) - step
         result = nodes.copy()
@@ -204,18 +201,12 @@ class DvlFactors:
         return result
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
-        """See OdometryModel."""
         values, slopes = np.zeros(DRIFT_STATES), np.zeros((DRIFT_STATES, self.width))
         values[3:] = node[[SCALE, DIRECTION]]
         slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
         return Drift(values, slopes)
 
-    def fading(self, node: np.ndarray) -> Optional[Fading]:
-        """See OdometryModel: there are none, or they are a current."""
-        return None
-
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        """See OdometryModel."""
         starts = layout.node_start(np.arange(layout.first, layout.last))
         self._add_positions(equations, starts, nodes, motion)
         add_compass(equations, starts, nodes, motion.durations, self._parameters.compass)
@@ -267,22 +258,18 @@ class ThrusterFactors(DvlFactors):
         self._own = parameters
 
     def first_node(self) -> np.ndarray:
-        """See OdometryModel."""
         return np.append(super().first_node(), [0.0, 0.0])
 
     def first_deviations(self) -> np.ndarray:
-        """See OdometryModel."""
         current = max(self._own.current_deviation, HELD_DEVIATION)
         return np.append(super().first_deviations(), [current, current])
 
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        """See OdometryModel."""
         result = super().advanced(nodes, before, after)
         result[:, :2] += nodes[:, _CURRENT] * (after.times - before.times)[:, np.newaxis]
         return result
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
-        """See OdometryModel."""
         known = super().drift(node, heading)
         values, slopes = known.values, known.slopes
         to_base = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
@@ -291,7 +278,6 @@ class ThrusterFactors(DvlFactors):
         return Drift(values, slopes)
 
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        """See OdometryModel."""
         super().add_steps(equations, layout, nodes, motion)
         starts = layout.node_start(np.arange(layout.first, layout.last))
         walk = self._own.current_walk**2 * motion.durations

@@ -1,7 +1,6 @@
 """Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
 
 from dataclasses import dataclass, replace
-from typing import Dict
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from mlsm_manager.joint_solver.motion_models import (
     HELD_DEVIATION,
     Compass,
     Drift,
+    OdometryModel,
     add_compass,
     add_forgetting,
     add_walk,
@@ -61,7 +61,7 @@ class UnaidedOdometry:
     heading_walk: float
 
 
-class HeadingFactors:
+class HeadingFactors(OdometryModel):
     """Nodes have columns x, y, yaw, then in base_link the speeds ahead and aside, and the speed of travel [m/s].
 
     The speed ahead forgets its difference from the speed of travel (an Ornstein-Uhlenbeck process), the speed aside
@@ -76,32 +76,23 @@ class HeadingFactors:
     def __init__(self, parameters: HeadingOdometry) -> None:
         self._speeds, self._compass = parameters.speeds, parameters.compass
 
-    @property
-    def calibrated(self) -> Dict[str, int]:
-        """See OdometryModel: no speed of this run is one of the next."""
-        return {}
-
     def first_node(self) -> np.ndarray:
-        """See OdometryModel."""
         return np.zeros(self.width)
 
     def first_deviations(self) -> np.ndarray:
-        """See OdometryModel."""
         own, fixed = self._speeds, FIXED_DEVIATION * 10.0
         ahead = np.hypot(own.start_speed_deviation, own.speed_deviation)
         speeds = np.maximum([ahead, own.slip_deviation, own.start_speed_deviation], HELD_DEVIATION)
         return np.concatenate([[fixed, fixed, self._first_heading()], speeds])
 
     def reference(self, motion: Motion) -> np.ndarray:
-        """See OdometryModel: the path of a vehicle that always goes ahead."""
+        """The path of a vehicle that always goes ahead."""
         return as_complex(motion.ahead)
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
-        """See OdometryModel."""
         return nodes[..., AHEAD] + 1j * nodes[..., ASIDE]
 
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        """See OdometryModel."""
         result, durations = nodes.copy(), after.times - before.times
         kept, slipping = self._kept(durations)
         result[:, AHEAD] = nodes[:, TRAVEL] + kept * (nodes[:, AHEAD] - nodes[:, TRAVEL])
@@ -114,14 +105,13 @@ class HeadingFactors:
         return result
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
-        """See OdometryModel: a scale of -1 leaves nothing of reported steps."""
+        """A scale of -1 leaves nothing of reported steps."""
         values, slopes = np.zeros(DRIFT_STATES), np.zeros((DRIFT_STATES, self.width))
         values[:2], values[3] = node[[AHEAD, ASIDE]], -1.0
         slopes[[0, 1], [AHEAD, ASIDE]] = 1.0
         return Drift(values, slopes)
 
     def fading(self, node: np.ndarray) -> Fading:
-        """See OdometryModel."""
         own = self._speeds
         return Fading(
             np.array([node[TRAVEL], 0.0, 0.0]),
@@ -129,7 +119,6 @@ class HeadingFactors:
         )
 
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        """See OdometryModel."""
         starts = layout.node_start(np.arange(layout.first, layout.last))
         self._add_positions(equations, starts, nodes, motion)
         self._add_yaw(equations, starts, nodes, motion.durations)
@@ -196,11 +185,10 @@ class UnaidedFactors(HeadingFactors):
         self._speeds, self._own = parameters.speeds, parameters
 
     def first_deviations(self) -> np.ndarray:
-        """See OdometryModel: the first heading defines the map."""
+        """The first heading defines the map."""
         return np.append(super().first_deviations(), self._own.turn_rate_deviation)
 
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        """See OdometryModel."""
         durations = after.times - before.times
         rate = nodes[:, TURN_RATE]
         half = nodes.copy()
@@ -213,14 +201,12 @@ class UnaidedFactors(HeadingFactors):
         return result
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:
-        """See OdometryModel."""
         known = super().drift(node, heading)
         values, slopes = known.values, known.slopes
         values[2], slopes[2, TURN_RATE] = node[TURN_RATE], 1.0
         return Drift(values, slopes)
 
     def fading(self, node: np.ndarray) -> Fading:
-        """See OdometryModel."""
         known = super().fading(node)
         return replace(known, times=np.append(known.times[:2], self._own.turn_rate_correlation_time))
 

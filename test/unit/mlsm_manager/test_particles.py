@@ -31,6 +31,11 @@ def particles_of(seed, count=40, nodes=4):
     return Particles(rng.normal(0.0, 2.0, (count, nodes, 2)), rng.normal(0.0, 0.3, (count, 2)), rng.normal(size=count))
 
 
+def resting(count, nodes):
+    """Return particles that stay at the origin."""
+    return Particles(np.zeros((count, nodes, 2)), np.zeros((count, 2)), np.zeros(count))
+
+
 def echoes_of(rng, node, count):
     normals = rng.normal(size=(count, 2))
     return Echoes(
@@ -104,7 +109,7 @@ def test_each_source_pulls_to_its_nearest_target(seed, sources, targets):
 
 
 def test_a_post_pulls_a_particle_towards_an_earlier_one():
-    particles, heard = Particles(np.zeros((1, 3, 2)), np.zeros((1, 2)), np.zeros(1)), post(1, [5.0, 0.0], 1.0)
+    particles, heard = resting(1, 3), post(1, [5.0, 0.0], 1.0)
     nearby = nearby_of(particles, heard, post(0, [5.5, 0.5]))
     move = pulls_of(particles, heard, nearby)[0]
     assert 0.2 < move[0] < 0.5
@@ -112,7 +117,7 @@ def test_a_post_pulls_a_particle_towards_an_earlier_one():
 
 
 def test_a_wall_pulls_a_particle_across_itself_only():
-    particles = Particles(np.zeros((1, 3, 2)), np.zeros((1, 2)), np.zeros(1))
+    particles = resting(1, 3)
     heard, wall = (replace(echo, post=np.array([False])) for echo in (post(1, [5.0, 0.0]), post(0, [5.5, 1.0])))
     move = pulls_of(particles, heard, nearby_of(particles, heard, wall))[0]
     assert 0.1 < move[0] < 1.0
@@ -120,7 +125,7 @@ def test_a_wall_pulls_a_particle_across_itself_only():
 
 
 def test_some_particles_are_pulled_and_their_speeds_with_them():
-    particles = Particles(np.zeros((400, 3, 2)), np.zeros((400, 2)), np.zeros(400))
+    particles = resting(400, 3)
     heard = post(1, [5.0, 0.0], 1.0)
     nearby, rng = nearby_of(particles, heard, post(0, [6.0, 0.0])), np.random.RandomState(0)
     moved = pulled(particles, heard, nearby, PART, rng)
@@ -152,7 +157,7 @@ def test_a_particle_on_which_an_echo_lies_on_an_earlier_one_is_worth_that_echo()
 
 
 def test_a_surface_tells_nothing_to_one_that_faces_the_other_way():
-    particles = Particles(np.zeros((1, 3, 2)), np.zeros((1, 2)), np.zeros(1))
+    particles = resting(1, 3)
     wall = replace(post(0, [5.0, 0.0]), post=np.array([False]))
     behind = replace(wall, nodes=np.array([1]), normals=-wall.normals)
     assert likelihoods(particles, behind, wall) == 0.0
@@ -165,10 +170,8 @@ def test_a_part_of_a_turn_that_heard_nothing_changes_no_weight():
 
 
 def test_some_particles_are_led_to_where_posts_meet():
-    rng, particles = np.random.RandomState(0), Particles.begun(400, np.zeros(2), 0.0, np.random.RandomState(0))
-    particles = particles.continued(np.zeros((400, 2)), particles.speeds, 9)
-    far = particles.paths[:, -1] + 100.0
-    ends, speeds = led(particles, (far, particles.speeds), post(1, [3.0, 0.0], 1.0), post(0, [6.0, 1.0]), PART, rng)
+    rng, particles, far = np.random.RandomState(0), resting(400, 2), np.full((400, 2), 100.0)
+    ends, speeds = led(particles, (far, np.zeros((400, 2))), post(1, [3.0, 0.0], 1.0), post(0, [6.0, 1.0]), PART, rng)
     moved = ends[:, 0] < 50.0
     assert 50 < moved.sum() < 200
     np.testing.assert_allclose(ends[moved], np.tile([3.0, 1.0], (moved.sum(), 1)), atol=1.5)
@@ -176,11 +179,8 @@ def test_some_particles_are_led_to_where_posts_meet():
 
 
 def test_no_particle_is_led_faster_than_a_small_vehicle_goes():
-    rng, particles = np.random.RandomState(0), Particles.begun(400, np.zeros(2), 0.0, np.random.RandomState(0))
-    particles = particles.continued(np.zeros((400, 2)), particles.speeds, 9)
-    ends, _ = led(
-        particles, (np.zeros((400, 2)), particles.speeds), post(1, [3.0, 0.0]), post(0, [60.0, 1.0]), PART, rng
-    )
+    draw, rng = (np.zeros((400, 2)), np.zeros((400, 2))), np.random.RandomState(0)
+    ends, _ = led(resting(400, 2), draw, post(1, [3.0, 0.0]), post(0, [60.0, 1.0]), PART, rng)
     np.testing.assert_array_equal(ends, np.zeros((400, 2)))
 
 
