@@ -128,9 +128,9 @@ class ParameterSet:
         for key in [key for key in given if key not in known]:
             if RENAMED.get(key) in known:
                 found[RENAMED[key]] = given[key]
-                remarks.append(f"{key} is taken as {RENAMED[key]}")
+                remarks.append(f"{key} -> {RENAMED[key]}")
             elif key in GONE:
-                remarks.append(f"{key} has no effect ({GONE[key]})")
+                remarks.append(f"{key} -> nothing ({GONE[key]})")
             else:
                 raise ParameterError(f"{key} = {given[key]!r}: no such parameter; {_names_like(key, known)}")
         return found, remarks

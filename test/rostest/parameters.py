@@ -23,7 +23,7 @@ class Parameters(unittest.TestCase):
             node.send_signal(signal.SIGINT)
             told = [line for line in node.communicate(timeout=PATIENCE)[0].splitlines() if "an older version" in line]
         self.assertEqual(len(told), 1, told)
-        self.assertIn("kernel has no effect", told[0])
+        self.assertIn("kernel -> nothing", told[0])
         self.assertIn("under expert belong free_scans, min_points", told[0])
         self.assertEqual((held["expert"]["free_scans"], held["expert"]["min_points"]), (30, 20))
         self.assertNotIn("min_points", held)

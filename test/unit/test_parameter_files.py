@@ -9,7 +9,7 @@ from document import LIVE_NODES, START_UP_NODES, LiveNode, generated
 
 from node_support.node_table import NODES
 from node_support.parameters import describe
-from sonar_processing.filters.stage_table import STAGES
+from sonar_processing.filters.stage_table import STAGES, config_name
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -73,4 +73,4 @@ def test_dynamic_reconfigure_accepts_what_it_offers(live):
 
 @pytest.mark.parametrize("name", STAGES)
 def test_every_stage_of_the_table_is_checked_here(name):
-    assert LIVE_NODES[name] == LiveNode(STAGES[name].parameters, STAGES[name].config_name)
+    assert LIVE_NODES[name] == LiveNode(STAGES[name].parameters, config_name(name))

@@ -172,7 +172,7 @@ def _values(options: argparse.Namespace) -> Dict[str, Any]:
     assigned, told = ReplayParameters.by_name(assigned_values(options.set))
     values.update(assigned)
     if remarks + told:
-        print(f"map_bag: {OLD_KEYS}: {'; '.join(remarks + told)}", file=sys.stderr)
+        print(f"map_bag: {OLD_KEYS}: {'; '.join(dict.fromkeys(remarks + told))}", file=sys.stderr)
     if options.matcher:
         values.update(estimator=_ESTIMATORS[options.matcher].value)
     if not options.calibrate:

@@ -115,10 +115,14 @@ def test_plain_keys_stay_as_they_are_and_those_for_experts_may_stand_under_a_key
 
 
 def test_a_file_of_an_older_version_is_taken_and_its_keys_are_named():
-    old = {"mlsm_core": {"solver_kernel": "NUMPY", "matcher": "DISTRIBUTIONS", "free_scans": 30, "min_points": 20}}
+    old = {"mlsm_core": {"solver_kernel": "NUMPY", "matcher": "DISTRIBUTIONS", "rate_time": 20.0, "free_scans": 30}}
     values, remarks = replay_values(old)
-    assert values == {"free_scans": 30, "min_points": 20}
-    assert [remark.split(" (")[0] for remark in remarks] == ["solver_kernel has no effect", "matcher has no effect"]
+    assert values == {"free_scans": 30, "rate_correlation_time": 20.0}
+    assert [remark.split(" (")[0] for remark in remarks] == [
+        "solver_kernel -> nothing",
+        "matcher -> nothing",
+        "rate_time -> rate_correlation_time",
+    ]
 
 
 def test_what_only_the_live_node_knows_is_left_out():

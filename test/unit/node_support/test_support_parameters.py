@@ -80,7 +80,7 @@ def test_keys_of_older_versions_are_taken_over_or_left_out_and_named(monkeypatch
     monkeypatch.setitem(parameters_module.GONE, "engine", "there is one engine")
     values, remarks = ExampleParameters.by_name({"radius": 1.0, "reach": 2.0, "engine": "steam"})
     assert values == {"radius": 2.0}
-    assert remarks == ["reach is taken as radius", "engine has no effect (there is one engine)"]
+    assert remarks == ["reach -> radius", "engine -> nothing (there is one engine)"]
 
 
 def test_values_that_do_not_fit_together_are_refused():
