@@ -58,6 +58,7 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, sc
 
 @pytest.mark.parametrize("instruments", ["DVL", "COMPASS", "NONE"])
 def test_moments_written_together_are_written_as_one_by_one(tmp_path, script, monkeypatch, instruments):
+    script.write_text("moves: [{wait: 0.2}, {x: 1, yaw_deg: 20, seconds: 1}, {tilt_deg: 20}, {wait: 0.5}]")
     asked, add = ("--set", f"instruments={instruments}"), SimulatedBag.add
     _, together = _write(tmp_path, script, "together.bag", *asked)
     monkeypatch.setattr(SimulatedBag, "add", lambda bag, moments: [add(bag, [moment]) for moment in moments])
