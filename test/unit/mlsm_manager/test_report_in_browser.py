@@ -77,19 +77,3 @@ def test_the_slider_shows_the_scan_of_its_moment(report):
     slider.send_keys(Keys.END)
     assert report.find_element(By.ID, "told").text.startswith("200 of 200")
     assert severe(report) == []
-
-
-def test_the_part_of_a_report_that_the_documentation_shows_is_photographed(browser, tmp_path):
-    photographs = pytest.importorskip("report_photographs", reason="pillow is not installed")
-    reports = photographs.Reports(tmp_path, browser)
-    bag = tmp_path / "scale_0.02/harbour.bag"
-    bag.parent.mkdir()
-    bag.touch()
-    # What is mapped already is not mapped again.
-    mapped = tmp_path / "scale_0.02_harbour_--truth_ground_truth"
-    mapped.mkdir()
-    page.write_report(mapped / "report.html", mission(block_count=1000, scans=20))
-    taken = photographs.trust(reports)
-    assert taken.width > photographs.WIDTH // 2
-    assert taken.height > 100
-    assert len(taken.getcolors(taken.width * taken.height)) > 20
