@@ -1,4 +1,4 @@
-"""Which modules import ROS, which packages import each other, and that no folders import each other in a circle.
+"""Which modules import ROS, which packages import each other, and that neither folders nor files do so in a circle.
 
 Everything is derived from paths: what imports ROS stands in a folder `ros/` of its package.
 """
@@ -106,7 +106,7 @@ def _folder(path):
 
 
 def _circles(imports):
-    """Return the folders that import themselves through others."""
+    """Return the folders, or files, that import themselves through others."""
 
     def reached(start):
         found, waiting = set(), list(imports.get(start, ()))
@@ -168,13 +168,13 @@ def test_every_module_in_a_folder_ros_needs_ros(package):
     assert needless == []
 
 
-def test_folders_do_not_import_each_other_in_a_circle():
+@pytest.mark.parametrize("place", [_folder, str], ids=["folders", "files"])
+def test_no_two_import_each_other_in_a_circle(place):
     imports = {}
     for package in ALLOWED:
         for path in _modules(package).values():
-            folder = _folder(path)
-            targets = {_folder(_path_of(target)) for target in _imported_modules(path)}
-            imports.setdefault(folder, set()).update(targets - {folder})
+            targets = {place(_path_of(target)) for target in _imported_modules(path)}
+            imports.setdefault(place(path), set()).update(targets - {place(path)})
     assert _circles(imports) == []
 
 
