@@ -27,6 +27,7 @@ from mlsm_manager.self_check.verdict import Verdict
 from node_support.parameters import describe
 from sonar_processing.beams.parameters import BeamCorrection
 
+_FEWEST_SCANS = 20  # a window's worth: fewer say too little of scale and delay
 _OF_RUN = {"range_scale_error": RANGE_SCALE, "sonar_delay": DELAY}
 
 
@@ -117,29 +118,13 @@ def _allowed(values: Dict[str, float]) -> Dict[str, float]:
     return {name: float(np.clip(value, ranges[name].low, ranges[name].high)) for name, value in values.items()}
 
 
-# A window's worth of scans: fewer say too little of scale and delay.
-_FEWEST_SCANS = 20
-
-
-@dataclass(frozen=True)
-class Deviations:
-    """How certain the path is. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map."""
-
-    times: np.ndarray
-    covariances: np.ndarray
-
-    @property
-    def radii(self) -> np.ndarray:
-        """(k,) m, root of the sum of both variances."""
-        return np.sqrt(np.trace(self.covariances, axis1=1, axis2=2))
-
-
 @dataclass(frozen=True)
 class Trust:
-    """verdicts: of all checks. deviations: of the path that is told."""
+    """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then."""
 
     verdicts: List[Verdict]
-    deviations: Deviations
+    times: np.ndarray
+    covariances: np.ndarray
 
     @property
     def line(self) -> str:
@@ -152,7 +137,7 @@ class Trust:
     @property
     def uncertainty(self) -> Uncertainty:
         """What picture and report show of it."""
-        return Uncertainty(self.deviations.times, self.deviations.covariances, self.doubtful)
+        return Uncertainty(self.times, self.covariances, self.doubtful)
 
     @property
     def doubtful(self) -> np.ndarray:
@@ -170,38 +155,45 @@ class Trust:
             }
             for verdict in self.verdicts
         }
-        minutes = per_minute(self.deviations.times, self.deviations.radii)
+        minutes = per_minute(self.times, _radii(self.covariances))
         told = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
         return {"checks": checks, "deviation_per_minute": told}
 
 
-def trust(replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> Trust:
+def trust(
+    replayed: Replayed, refined: Optional[Refined], calibration: Calibration, further: Sequence[Verdict] = ()
+) -> Trust:
     """Return what the checks say of a run of the joint solver; of the refined path where there is one.
 
-    further: what other checks say.
+    calibration: what was found. further: what other checks say.
     """
     solver = replayed.solver
     parts, apart = solver.parameters.parts_per_turn, solver.islands.apart
     turns = Turns.of(solver.estimates, apart, parts)
     heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
-    path = replayed.corrected if refined is None else refined.poses
-    deviations = _live_deviations(solver) if refined is None else _batch_deviations(refined)
+    if refined is None:
+        path, state, times = replayed.corrected, solver.state, np.array([one.time for one in solver.estimates])
+        covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
+    else:
+        path, state, times = refined.poses, refined.batch.state, refined.batch.node_times
+        covariances = refined.batch.pose_covariances[:, :2, :2]
+    start, before = float(solver.log.node_times[0]), Calibration.expected(solver)
     verdicts = [
         *_against_odometry(replayed, path, solver.odometry),
-        *_going_on(solver, solver.state if refined is None else refined.batch.state, turns.times),
+        *_going_on(solver, state, turns.times),
         recent_agreement(heard.times, heard.agreements),
-        position_uncertainty(deviations.times, deviations.radii),
-        *surfaces_tell(
-            float(solver.log.node_times[0]), turns.times, turns.surfaces, solver.odometry.distance_deviation
-        ),
+        position_uncertainty(times, _radii(covariances)),
+        *surfaces_tell(start, turns.times, turns.surfaces, solver.odometry.distance_deviation),
         *in_submaps(turns.times, turns.apart),
+        as_expected(before.names, before.values, before.deviations, calibration.values),
+        *_halves(solver),
     ]
-    found = Calibration.of_live(solver) if refined is None else Calibration.of_batch(solver, refined.batch)
-    before = Calibration.expected(solver)
-    verdicts.append(as_expected(before.names, before.values, before.deviations, found.values))
-    halves = _halves(solver)
-    verdicts += [] if halves is None else [halves]
-    return Trust([*verdicts, *further], deviations)
+    return Trust([*verdicts, *further], times, covariances)
+
+
+def _radii(covariances: np.ndarray) -> np.ndarray:
+    """Return (k,) m, the roots of the sums of both variances (k, 2, 2)."""
+    return np.sqrt(np.trace(covariances, axis1=1, axis2=2))
 
 
 def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:
@@ -222,16 +214,7 @@ def _going_on(solver: LiveSolver, state: State, ends: np.ndarray) -> Tuple[Verdi
     return (scans_go_on(ends, shares),)
 
 
-def _live_deviations(solver: LiveSolver) -> Deviations:
-    covariances = [estimate.pose_covariance[:2, :2] for estimate in solver.estimates]
-    return Deviations(np.array([estimate.time for estimate in solver.estimates]), np.array(covariances))
-
-
-def _batch_deviations(refined: Refined) -> Deviations:
-    return Deviations(refined.batch.node_times, refined.batch.pose_covariances[:, :2, :2])
-
-
-def _halves(solver: LiveSolver) -> Optional[Verdict]:
+def _halves(solver: LiveSolver) -> Tuple[Verdict, ...]:
     """Compare the calibration of each half of the run, made without the other one.
 
     What was known after the first half came from that half alone; the second is fitted anew.
@@ -239,10 +222,10 @@ def _halves(solver: LiveSolver) -> Optional[Verdict]:
     parts = solver.parameters.parts_per_turn
     middle = solver.log.scan_count // parts // 2
     if middle < _FEWEST_SCANS:
-        return None
+        return ()
     first = Calibration.of_estimate(solver, solver.estimates[middle * parts - 1])
     second = Calibration.of_part(solver, solved_part(solver, middle * parts))
-    return halves_agree(first.names, first.values, first.deviations, second.values, second.deviations)
+    return (halves_agree(first.names, first.values, first.deviations, second.values, second.deviations),)
 
 
 @dataclass(frozen=True)
@@ -259,7 +242,9 @@ class Findings:
         solver = replayed.solver
         live = Calibration.of_live(solver)
         calibration = live if refined is None else Calibration.of_batch(solver, refined.batch)
-        return cls(calibration, trust(replayed, refined, further), None if refined is None else refined.closing)
+        return cls(
+            calibration, trust(replayed, refined, calibration, further), None if refined is None else refined.closing
+        )
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""

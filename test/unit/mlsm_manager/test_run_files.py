@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from made_blocks import blocks_of
 
-from mlsm_manager.offline.findings import Deviations, Trust
+from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.run_files import (
     CORRECTED,
@@ -72,7 +72,7 @@ SHORT = Verdict("length", np.nan, 1.0, "m")
 
 def trust_of(*verdicts, times=(0.0, 10.0, 200.0)):
     covariances = np.tile(np.diag([9.0, 16.0]), (len(times), 1, 1))
-    return Trust(list(verdicts), Deviations(np.array(times), covariances))
+    return Trust(list(verdicts), np.array(times), covariances)
 
 
 def test_a_run_without_doubts_says_so():
