@@ -17,8 +17,8 @@ from mlsm_manager.joint_solver.places import (
     FEWEST_POINTS,
     MOST_POINTS,
     REACH,
+    Freedom,
     PlaceCandidate,
-    Shift,
     best_place,
 )
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -95,7 +95,7 @@ def _loop(points: PlacedPoints, scan: int, parameters: SolverParameters) -> Opti
     sources = points.selected(own[:: max(1, len(own) // MOST_POINTS)])
     middle, radius = sources.places.mean(axis=0), np.ptp(sources.places, axis=0).max() + REACH * _DRIFT
     targets = points.selected(older & (np.abs(points.places - middle).max(axis=1) < radius))
-    found = best_place(Shift(_DRIFT**2 * np.eye(2), np.ones((1, 2))), sources, targets, parameters)
+    found = best_place(Freedom.as_one(_DRIFT**2 * np.eye(2), np.ones(1), 2), sources, targets, parameters)
     if not found.is_certain or found.fit < found.fit_before + _GAIN:
         return None
     distance = np.hypot(*(targets.places[:, np.newaxis] - sources.places - found.shift).transpose(2, 0, 1)).min(axis=1)

@@ -21,8 +21,8 @@ from mlsm_manager.joint_solver.places import (
     MOST_POINTS,
     NATS,
     REACH,
+    Freedom,
     PlaceCandidate,
-    Shift,
     best_place,
     grid,
     moved,
@@ -95,7 +95,7 @@ def place_after_silence(
     motion since is known well enough, or the scan hears too little itself.
     """
     last = log.scan_count
-    motion = MotionSince(log, odometry, state, covariance, silent)
+    motion = _freedom_since(log, odometry, state, covariance, silent)
     own = log.rows(last - 1, last)
     if motion.reach * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
         return None
@@ -121,9 +121,9 @@ def island_place(
     last, first = log.scan_count, islands.start
     rows = log.rows(max(first, last - _ISLAND_SCANS), last)
     sources = place(log, odometry, state, rows[:: max(1, len(rows) // _ISLAND_POINTS)])
-    reach = REACH * float(np.sqrt(np.linalg.eigvalsh(covariance)[-1])) + parameters.cut
-    targets = _map_around(log, odometry, state, islands, sources, reach, known)
-    return best_place(Shift(covariance, _moves_per_m(log, first, odometry.width)), sources, targets, parameters)
+    freedom = Freedom.as_one(covariance, _shares_of_move(log, first), odometry.width)
+    targets = _map_around(log, odometry, state, islands, sources, REACH * freedom.reach + parameters.cut, known)
+    return best_place(freedom, sources, targets, parameters)
 
 
 class _Search(NamedTuple):
@@ -184,49 +184,28 @@ def _post_support(
     return (nearness(distance).reshape(places.shape[:2]) * sources.qualities).sum(axis=1)
 
 
-class MotionSince:
-    """What is known of the nodes since the last scan that told a place, seen from there.
+def _freedom_since(log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int) -> Freedom:
+    """Return what is known of the newest nodes as seen from the one before `silent` scans and the newest one.
 
-    Beginning and end of the newest scan matter most: with both given, what is expected of all other nodes follows.
-    of_place: (2, 2) m^2, covariance of the end's place. reach: m, the largest deviation of that.
+    covariance: (width, width) of that node. Beginning and end of the newest scan matter most: with both given, what is
+    expected of all other nodes follows.
     """
-
-    def __init__(self, log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int) -> None:
-        """`silent`: number of scans between, above 0. covariance: (width, width) of the node before these."""
-        last, self._width = log.scan_count, odometry.width
-        first = last - 1 - silent
-        steps = [
-            Transition.of(odometry, state.nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
-            for node in range(first, last)
-        ]
-        joint = _joint_covariance(steps, covariance)
-        end = self._width * (len(steps) - 1) + np.arange(2)
-        start = end - self._width
-        ends = np.append(start, end)
-        self._of_ends = joint[np.ix_(ends, ends)]
-        self._gain = joint[:, ends] @ np.linalg.inv(self._of_ends)
-        self.of_place = joint[np.ix_(end, end)]
-        self.reach = float(np.sqrt(np.linalg.eigvalsh(self.of_place)[-1]))
-        self._along = joint[np.ix_(start, end)] @ np.linalg.inv(self.of_place)
-        self._beside = joint[np.ix_(start, start)] - self._along @ joint[np.ix_(end, start)]
-
-    def ends(self, shifts: np.ndarray) -> np.ndarray:
-        """Return the moves (k, 4) of beginning and end of the scan that are expected if its end moves by (k, 2)."""
-        return np.column_stack([shifts @ self._along.T, shifts])
-
-    def beside(self) -> np.ndarray:
-        """Return moves (k, 2) of the scan's beginning beside the expected ones, that are to be tried."""
-        factor = np.linalg.cholesky(self._beside + _ROUNDING * np.eye(2))
-        motions = grid(_MOTIONS)
-        return motions[np.hypot(*motions.T) <= _MOTIONS.max()] @ factor.T
-
-    def cost(self, ends: np.ndarray) -> float:
-        """Return how unlikely moves (4,) of the scan's beginning and end are, nats."""
-        return 0.5 * float(ends @ np.linalg.solve(self._of_ends, ends))
-
-    def moves(self, ends: np.ndarray) -> np.ndarray:
-        """Return the moves (n, width) of the nodes that go with moves (4,) of the scan's beginning and end."""
-        return (self._gain @ ends).reshape(-1, self._width)
+    last, width = log.scan_count, odometry.width
+    steps = [
+        Transition.of(odometry, state.nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
+        for node in range(last - 1 - silent, last)
+    ]
+    joint = _joint_covariance(steps, covariance)
+    end = width * (len(steps) - 1) + np.arange(2)
+    start = end - width
+    ends, of_end = np.append(start, end), joint[np.ix_(end, end)]
+    information = np.linalg.inv(joint[np.ix_(ends, ends)])
+    along = joint[np.ix_(start, end)] @ np.linalg.inv(of_end)
+    beside = joint[np.ix_(start, start)] - along @ joint[np.ix_(end, start)]
+    motions = grid(_MOTIONS)
+    motions = motions[np.hypot(*motions.T) <= _MOTIONS.max()]
+    tried = motions @ np.linalg.cholesky(beside + _ROUNDING * np.eye(2)).T
+    return Freedom(of_end, information, along, tried, (joint[:, ends] @ information).reshape(-1, width, 4))
 
 
 def _joint_covariance(steps: List[Transition], covariance: np.ndarray) -> np.ndarray:
@@ -253,15 +232,11 @@ def _silent_before(log: RunLog, scan: int) -> int:
     return count
 
 
-def _moves_per_m(log: RunLog, first: int, width: int) -> np.ndarray:
-    """Return the moves (k, width) of the newest nodes where the scans from `first` on are moved by 1 m in x and y."""
+def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
+    """Return what share (k,) of their move the newest nodes go with the scans from `first` on: in a silence a part."""
     silent = _silent_before(log, first)
-    moves = np.zeros((log.scan_count - first + 1 + silent, width))
-    moves[:, :2] = 1.0
-    if silent:
-        times = log.node_times[first - silent : first + 1]
-        moves[:silent, :2] *= ((times[1:] - times[0]) / (times[-1] - times[0]))[:, np.newaxis]
-    return moves
+    times = log.node_times[first - silent : first + 1]
+    return np.append((times[1:] - times[0]) / (times[-1] - times[0]), np.ones(log.scan_count - first + 1))
 
 
 def _map_around(

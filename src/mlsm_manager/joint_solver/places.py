@@ -5,7 +5,7 @@ within the scan. A place is certain if the points fit there, and at no other pla
 """
 
 from dataclasses import dataclass
-from typing import List, Protocol, Tuple
+from typing import List, Tuple
 
 import numpy as np
 
@@ -31,52 +31,41 @@ _FIT = 0.5  # share of the points that must lie on surfaces
 _LEAD = 0.1  # by which that share must exceed the one at any other place
 
 
-class Freedom(Protocol):
+@dataclass(frozen=True)
+class Freedom:
     """Where the newest nodes may be, as far as motion and earlier scans tell it.
 
-    of_place: (2, 2) m^2, covariance of where the newest scan ends.
+    of_place: (2, 2) m^2, covariance of where the newest scans end. information: (4, 4) 1/m^2 of where they begin and
+    end. along: (2, 2) expected move of their beginning by that of their end. beside: (k, 2) m, moves of the beginning
+    besides, that are to be tried. of_nodes: (n, width, 4) moves of the newest nodes by those of beginning and end.
     """
 
     of_place: np.ndarray
+    information: np.ndarray
+    along: np.ndarray
+    beside: np.ndarray
+    of_nodes: np.ndarray
+
+    @classmethod
+    def as_one(cls, of_place: np.ndarray, shares: np.ndarray, width: int) -> "Freedom":
+        """Return that of scans that move as one, and the newest nodes with them by `shares` (n,) of it."""
+        information, of_nodes = np.zeros((4, 4)), np.zeros((len(shares), width, 4))
+        information[2:, 2:] = np.linalg.inv(of_place)
+        of_nodes[:, 0, 2] = of_nodes[:, 1, 3] = shares
+        return cls(of_place, information, np.eye(2), np.zeros((1, 2)), of_nodes)
+
+    @property
+    def reach(self) -> float:
+        """Largest deviation of the place, m."""
+        return float(np.sqrt(np.linalg.eigvalsh(self.of_place)[-1]))
 
     def ends(self, shifts: np.ndarray) -> np.ndarray:
-        """Return the moves (k, 4) [m] of the scans' beginning and end that are expected if the end moves by (k, 2)."""
-
-    def beside(self) -> np.ndarray:
-        """Return moves (k, 2) [m] of the scans' beginning beside the expected ones, that are to be tried."""
+        """Return the moves (k, 4) [m] of beginning and end that are expected if the end moves by (k, 2)."""
+        return np.column_stack([shifts @ self.along.T, shifts])
 
     def cost(self, ends: np.ndarray) -> float:
         """Return how unlikely moves (4,) of beginning and end are, nats."""
-
-    def moves(self, ends: np.ndarray) -> np.ndarray:
-        """Return the moves (k, width) of the newest nodes that go with moves (4,) of beginning and end."""
-
-
-class Shift:
-    """Freedom of scans that are moved as one, along with as many nodes."""
-
-    def __init__(self, of_place: np.ndarray, moves_per_m: np.ndarray) -> None:
-        """of_place: (2, 2) m^2. moves_per_m: (k, width) of the newest nodes where the scans move by 1 m in x and y."""
-        self.of_place = of_place
-        self._moves_per_m = moves_per_m
-
-    def ends(self, shifts: np.ndarray) -> np.ndarray:
-        """Return the same moves (k, 4) of beginning and end."""
-        return np.tile(shifts, 2)
-
-    def beside(self) -> np.ndarray:
-        """Return none but the expected move (1, 2)."""
-        return np.zeros((1, 2))
-
-    def cost(self, ends: np.ndarray) -> float:
-        """Return how unlikely moves (4,) are, nats."""
-        return 0.5 * float(ends[2:] @ np.linalg.solve(self.of_place, ends[2:]))
-
-    def moves(self, ends: np.ndarray) -> np.ndarray:
-        """Return the moves (k, width) of the newest nodes that go with moves (4,)."""
-        moves = self._moves_per_m.copy()
-        moves[:, :2] *= ends[2:]
-        return moves
+        return 0.5 * float(ends @ self.information @ ends)
 
 
 @dataclass(frozen=True)
@@ -111,9 +100,8 @@ def best_place(
     freedom: Freedom, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters
 ) -> PlaceCandidate:
     """Return where `sources` fit best to `targets`; nowhere, with a fit of 0, where there are none of either."""
-    reach = float(np.sqrt(np.linalg.eigvalsh(freedom.of_place)[-1]))
     if not len(sources) or not len(targets):
-        return PlaceCandidate(freedom.moves(np.zeros(4))[:0], np.zeros(2), 0.0, 0.0, 0.0, reach)
+        return PlaceCandidate(freedom.of_nodes[:0, :, 0], np.zeros(2), 0.0, 0.0, 0.0, freedom.reach)
     shifts = places_within(freedom.of_place, _MOST_CELLS)
     few = sources.selected(np.arange(0, len(sources), max(1, len(sources) // _FEW_POINTS)))
     shares = map_support(few, targets, moved(few, freedom.ends(shifts)), parameters) / few.qualities.sum()
@@ -122,7 +110,9 @@ def best_place(
     best = int(np.argmax([NATS * share * total - freedom.cost(ends) for ends, share in found]))
     ends, fit = found[best]
     others = [share for other, share in found if np.hypot(*(other - ends)[2:]) > _OTHER]
-    return PlaceCandidate(freedom.moves(ends), ends[2:], fit, float(shares[0]), max(others, default=0.0), reach)
+    return PlaceCandidate(
+        freedom.of_nodes @ ends, ends[2:], fit, float(shares[0]), max(others, default=0.0), freedom.reach
+    )
 
 
 def places_within(covariance: np.ndarray, most: int) -> np.ndarray:
@@ -164,9 +154,9 @@ def _refined(
     freedom: Freedom, sources: PlacedPoints, targets: PlacedPoints, shift: np.ndarray, parameters: SolverParameters
 ) -> Tuple[np.ndarray, float]:
     """Return the best moves (4,) of beginning and end of the scans about a shift (2,) of both, and the share there."""
-    shifts, beside = shift + grid(_ASIDE), freedom.beside()
-    ends = np.repeat(freedom.ends(shifts), len(beside), axis=0)
-    ends[:, :2] += np.tile(beside, (len(shifts), 1))
+    shifts = shift + grid(_ASIDE)
+    ends = np.repeat(freedom.ends(shifts), len(freedom.beside), axis=0)
+    ends[:, :2] += np.tile(freedom.beside, (len(shifts), 1))
     shares = map_support(sources, targets, moved(sources, ends), parameters) / sources.qualities.sum()
     best = int(np.argmax(shares))
     return ends[best], float(shares[best])
