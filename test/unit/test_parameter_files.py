@@ -5,11 +5,10 @@ from pathlib import Path
 
 import pytest
 import yaml
-from document import LIVE_NODES, START_UP_NODES, LiveNode, generated
+from document import LIVE_NODES, START_UP_NODES, generated
 
 from node_support.node_table import NODES
 from node_support.parameters import describe
-from sonar_processing.filters.stage_table import STAGES, config_name
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -69,8 +68,3 @@ def test_dynamic_reconfigure_has_the_ranges_of_numbers(live):
 def test_dynamic_reconfigure_accepts_what_it_offers(live):
     parameters, module = live
     assert parameters().changed(module.defaults) == parameters()
-
-
-@pytest.mark.parametrize("name", STAGES)
-def test_every_stage_of_the_table_is_checked_here(name):
-    assert LIVE_NODES[name] == LiveNode(STAGES[name].parameters, config_name(name))
