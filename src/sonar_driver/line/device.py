@@ -124,7 +124,7 @@ class Scanner(Generic[Command, Ping]):
     def connect(self) -> None:
         """Open the port for the first time; `run` waits for a port that does not exist yet.
 
-        Raises PortBusyError, PortPermissionError or PortNameError, which the user must correct.
+        Raises PortRefusedError, whose reason the user must correct.
         """
         with contextlib.suppress(PortUnavailableError):
             self._device.open()

@@ -7,7 +7,7 @@ import socket
 import termios
 import time
 from contextlib import contextmanager
-from typing import Iterator, Protocol, Tuple
+from typing import Iterator, Tuple, Union
 
 import serial
 
@@ -77,24 +77,8 @@ class UdpPort:
         return True
 
 
-class Port(Protocol):
-    """What a driver does with a port; pyserial's ports have it."""
-
-    @property
-    def in_waiting(self) -> int:
-        """Number of bytes that were received and not yet read."""
-
-    def read(self, size: int = 1) -> bytes:
-        """Return up to `size` bytes: once there are so many, or after READ_TIMEOUT those that there are."""
-
-    def write(self, data: bytes) -> int:
-        """Send all of `data`."""
-
-    def send_break(self) -> None:
-        """Hold the line at rest for longer than a byte takes, where there is a line."""
-
-    def close(self) -> None:
-        """Give the port back."""
+Port = Union[serial.SerialBase, UdpPort]
+"""What a driver reads and writes; a read returns after READ_TIMEOUT at the latest."""
 
 
 class PortError(Exception):
@@ -105,22 +89,14 @@ class PortUnavailableError(PortError):
     """The port does not exist or was lost; it may come back."""
 
 
-class PortBusyError(PortError):
-    """Another program holds the port."""
-
-
-class PortPermissionError(PortError):
-    """The user may not open the port."""
-
-
-class PortNameError(PortError):
-    """No port can have that name."""
+class PortRefusedError(PortError):
+    """The user has to correct something first: the name, a permission, or a program that holds the port."""
 
 
 def open_port(name: str, baud_rate: int) -> Port:
     """Open a device or pyserial URL with 8N1, or udp://HOST:PORT; a local device is opened exclusively.
 
-    Raises PortUnavailableError, PortBusyError, PortPermissionError or PortNameError.
+    Raises PortUnavailableError or PortRefusedError.
     """
     if is_datagram_port(name):
         return _open_udp_port(name)
@@ -132,7 +108,7 @@ def open_port(name: str, baud_rate: int) -> Port:
     except (OSError, termios.error) as error:
         raise _explained(name, error) from error
     except ValueError as error:
-        raise PortNameError(f"port {name}: {error}") from error
+        raise PortRefusedError(f"port {name}: {error}") from error
 
 
 def is_datagram_port(name: str) -> bool:
@@ -141,10 +117,10 @@ def is_datagram_port(name: str) -> bool:
 
 
 def datagram_address(name: str) -> Tuple[str, int]:
-    """Return host and number of udp://HOST:PORT; raises PortNameError."""
+    """Return host and number of udp://HOST:PORT; raises PortRefusedError."""
     host, _, number = name[len(_DATAGRAMS) :].rpartition(":")
     if not host or not number.isdecimal() or not 0 < int(number) < _PORT_NUMBERS:
-        raise PortNameError(f"port {name}: must be udp://HOST:PORT with a PORT from 1 to {_PORT_NUMBERS - 1}")
+        raise PortRefusedError(f"port {name}: must be udp://HOST:PORT with a PORT from 1 to {_PORT_NUMBERS - 1}")
     return host, int(number)
 
 
@@ -168,10 +144,10 @@ def port_losses(name: str) -> Iterator[None]:
 def _explained(name: str, error: Exception) -> PortError:
     number = getattr(error, "errno", None)
     if number in (errno.EWOULDBLOCK, errno.EBUSY):
-        return PortBusyError(f"port {name} is in use by another program: is a second driver running?")
+        return PortRefusedError(f"port {name} is in use by another program: is a second driver running?")
     if number in (errno.EACCES, errno.EPERM):
         group = _group_of(name)
-        return PortPermissionError(
+        return PortRefusedError(
             f"no permission to open port {name}: join the group {group} (sudo adduser $USER {group}) and log in again"
         )
     # pyserial's own text names the port and the reason twice.

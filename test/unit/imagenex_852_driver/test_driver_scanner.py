@@ -9,7 +9,7 @@ from imagenex_852_driver.line.device import SonarDevice
 from imagenex_852_driver.line.parameters import ConnectionParameters, Direction, HeadSettings
 from sonar_driver.emulator.faults import Fault, FaultInjector
 from sonar_driver.line.device import Scanner
-from sonar_driver.line.port import PortBusyError
+from sonar_driver.line.port import PortRefusedError
 
 
 def positions(pings):
@@ -101,7 +101,7 @@ def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(tmp_path):
 def test_a_second_scanner_on_the_port_does_not_start(tmp_path):
     with served(tmp_path) as (_, connection), scanning(connection):
         second = Scanner(SonarDevice(connection), HeadSettings().command(), print)
-        with pytest.raises(PortBusyError):
+        with pytest.raises(PortRefusedError, match="in use by another program"):
             second.connect()
 
 

@@ -16,9 +16,7 @@ from imagenex_852_driver.protocol.command import SwitchCommand
 from node_support.parameters import ParameterError
 from sonar_driver.emulator.head_server import UdpLine
 from sonar_driver.line.port import (
-    PortBusyError,
-    PortNameError,
-    PortPermissionError,
+    PortRefusedError,
     PortUnavailableError,
     datagram_address,
     open_port,
@@ -31,7 +29,7 @@ NO_SPEED = 0
 def test_a_second_driver_on_a_port_is_told_so(tmp_path):
     with served(tmp_path) as (_, connection):
         first = open_port(connection.port, 115200)
-        with pytest.raises(PortBusyError, match="second driver"):
+        with pytest.raises(PortRefusedError, match="second driver"):
             open_port(connection.port, 115200)
         first.close()
 
@@ -47,7 +45,7 @@ def test_a_port_without_permission_names_the_group_to_join(tmp_path, monkeypatch
         raise serial.SerialException(errno.EACCES, "could not open port")
 
     monkeypatch.setattr(serial, "serial_for_url", refuse)
-    with pytest.raises(PortPermissionError, match="join the group dialout") as caught:
+    with pytest.raises(PortRefusedError, match="join the group dialout") as caught:
         open_port(str(tmp_path / "none"), 115200)
     assert "\n" not in str(caught.value)
 
@@ -58,7 +56,7 @@ def test_a_port_that_is_not_there_may_come_back(tmp_path):
 
 
 def test_a_kind_of_url_that_does_not_exist_is_refused():
-    with pytest.raises(PortNameError, match="nonsense"):
+    with pytest.raises(PortRefusedError, match="nonsense"):
         open_port("nonsense://port", 115200)
 
 
@@ -150,7 +148,7 @@ def test_where_nobody_listens_the_port_is_lost(line):
     "name", ["udp://", "udp://host", "udp://host:", "udp://host:0", "udp://host:70000", "udp://:1"]
 )
 def test_a_name_that_is_no_address_is_refused(name):
-    with pytest.raises(PortNameError, match="udp://HOST:PORT"):
+    with pytest.raises(PortRefusedError, match="udp://HOST:PORT"):
         open_port(name, NO_SPEED)
 
 
