@@ -97,7 +97,9 @@ def _look_at_place(
         reason = tree.why_not(names.odom_frame, beam.frame_id, np.array([beam.stamp_ns]))
         assumed.append(f"the first beams are left out: {reason}")
     missing += (
-        [] if tree.links_between(names.odom_frame, beam.frame_id) is not None else [f"{beam.frame_id} is not linked"]
+        []
+        if tree.links_between(names.odom_frame, beam.frame_id) is not None
+        else [f"no transforms link {beam.frame_id} and {names.odom_frame}"]
     )
 
 

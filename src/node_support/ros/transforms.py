@@ -173,8 +173,8 @@ class JointAngle:
     def for_beam(self) -> float:
         """Return the angle that a beam carries, rad: 0 without a joint, or, which is counted, before it was heard."""
         if self._joint and self._angle is None:
-            detail = f"joint {self._joint!r} is not in /{topics.JOINT_STATES}; sensorAngle is 0"
-            self._health.problem("beams of unknown tilt", detail)
+            detail = f"joint {self._joint!r} is not in /{topics.JOINT_STATES}, sensorAngle is 0"
+            self._health.problem("beams of unknown tilt", f"{detail}; check sensor_joint and the servo's driver")
         return self._angle or 0.0
 
     def _take(self, joints: JointState) -> None:

@@ -129,7 +129,7 @@ class AutoScan:
             outcome.bad_frames, outcome.error = outcome.bad_frames + 1, str(error)
             return
         if not self._obeyed(found, command) and self._line.elapsed() > self._started + _OBEDIENCE_TIME:
-            outcome.error = "the head does not scan as it was told; it is told again"
+            outcome.error = "the head does not scan as commanded; the command is sent again"
             self._start(command)
         outcome.missing_beams += self._missing_before(found, command)
         outcome.beam, outcome.pinged = found, pinged(found, arrival)

@@ -42,7 +42,7 @@ class Ping360Stats(LineStats):
         "timeouts": "no reply; check the head's power and the cable",
         "bad frames": "a broken message; check the cable, lower baud_rate",
         "unexpected replies": "a reply came late or twice and was dropped",
-        "refusals": "the head did not accept a command",
+        "refusals": "the head did not accept a command; the last error names it",
         "missing beams": "the head scanned on, but not every beam arrived; check the cable, lower baud_rate",
     }
 

@@ -109,7 +109,7 @@ class BagPlayer:
         pace.wait_for(since_start)
         if pace.lost > lost:
             detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with rate {self._options.rate:g}"
-            self._health.problem("delays", detail)
+            self._health.problem("delays", f"{detail}; give a smaller one")
         self._clock.publish(Clock(genpy.Time.from_sec(self._messages[0].time + since_start)))
 
     def _wait_for_subscribers(self) -> None:

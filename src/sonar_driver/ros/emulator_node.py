@@ -37,7 +37,10 @@ def place_in_tf(frame: str, health: Health) -> Place:
     def place() -> Optional[np.ndarray]:
         found = transforms.newest(WORLD_FRAME, frame)
         if found is None:
-            health.problem("pings without a place", f"tf does not know {frame!r} in {WORLD_FRAME!r}; see head_frame")
+            health.problem(
+                "pings without a place",
+                f"tf does not know {frame!r} in {WORLD_FRAME!r}; check head_frame and who publishes it",
+            )
             return None
         return found[1]
 
