@@ -42,7 +42,7 @@ def solved_best(live: LiveSolver) -> BatchResult:
 def strafes(ahead: LiveSolver, strafing: LiveSolver) -> bool:
     """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans."""
     times = strafing.log.node_times
-    echoes = Echoes.of_run(strafing.log, strafing.odometry, strafing.parameters)
+    echoes = Echoes.of_run(strafing.log, strafing.parameters)
     one, other = (log_likelihood(echoes, _path_at(solver, times)) for solver in (ahead, strafing))
     return other > _STRAFES * one
 
@@ -55,7 +55,7 @@ def _found(live: LiveSolver, seed: int) -> State:
 
 def _shift_search(live: LiveSolver) -> ShiftSearch:
     log, parameters = live.log, live.parameters
-    echoes = Echoes.of_run(log, parameters.odometry, parameters)
+    echoes = Echoes.of_run(log, parameters)
 
     def refit(path: np.ndarray) -> np.ndarray:
         return _path(live, settled(live, _on_path(live, path)))

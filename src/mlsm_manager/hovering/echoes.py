@@ -5,11 +5,11 @@ from typing import Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place, place_lone
+from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import Solution
 
 ACROSS = 0.7  # m: standard deviation of an echo across the surface of another
 ALONG = 1.5  # m: and along it, where it says less
@@ -43,21 +43,21 @@ class Echoes:
         return len(self.nodes)
 
     @classmethod
-    def of(cls, log: RunLog, odometry: OdometryModel, parameters: SolverParameters, scan: int) -> "Echoes":
+    def of(cls, log: RunLog, parameters: SolverParameters, scan: int) -> "Echoes":
         """Return those of a scan of the log."""
         motion = log.node_motion(np.array([scan, scan + 1]))
-        nodes = np.zeros((log.scan_count + 1, odometry.width))
+        nodes = np.zeros((log.scan_count + 1, parameters.odometry.width))
         nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
-        state = State(nodes, parameters.run_mean)
-        surfaces = place(log, odometry, state, log.rows(scan, scan + 1))
-        posts = place_lone(log, odometry, state, log.lone.rows(scan, scan + 1))
+        solution = Solution(log, parameters, State(nodes, parameters.run_mean))
+        surfaces = solution.placed(log.rows(scan, scan + 1))
+        posts = solution.placed_posts(log.posts.rows(scan, scan + 1))
         weights = parameters.post_confidence * _POST_WEIGHT * posts.qualities**_POST_POWER
         return cls.joined([cls._made(surfaces, _SURFACE_WEIGHT * surfaces.qualities), cls._made(posts, weights, True)])
 
     @classmethod
-    def of_run(cls, log: RunLog, odometry: OdometryModel, parameters: SolverParameters) -> "Echoes":
+    def of_run(cls, log: RunLog, parameters: SolverParameters) -> "Echoes":
         """Return those of all scans of the log, at least one."""
-        return cls.joined([cls.of(log, odometry, parameters, scan) for scan in range(log.scan_count)])
+        return cls.joined([cls.of(log, parameters, scan) for scan in range(log.scan_count)])
 
     @classmethod
     def _made(cls, points: PlacedPoints, weights: np.ndarray, is_post: bool = False) -> "Echoes":

@@ -73,7 +73,7 @@ class ParticleFilter:
         if shapes != ((count, nodes, 2), (count, 2)) or nodes > log.scan_count + 1:
             raise ValueError(f"particles {shapes[0]}, {shapes[1]} for {log.scan_count} scans")
         scans = range(log.scan_count + 1 - nodes, log.scan_count)
-        echoes = tuple(Echoes.of(log, parameters.odometry, parameters, scan) for scan in scans)
+        echoes = tuple(Echoes.of(log, parameters, scan) for scan in scans)
         return replace(self, scans=log.scan_count, echoes=echoes, particles=particles if count else None)
 
     def placed(self, log: RunLog, nodes: np.ndarray, parameters: SolverParameters, is_told: bool) -> np.ndarray:
@@ -101,7 +101,7 @@ class ParticleFilter:
         motion = log.node_motion(np.array([scan, scan + 1]))
         duration, turn = float(motion.durations[0]), float(np.diff(motion.poses[:, 2])[0])
         before = self.particles or Particles.begun(_COUNT, motion.poses[0, :2], _START_SPEED, rng)
-        sources = Echoes.of(log, parameters.odometry, parameters, scan)
+        sources = Echoes.of(log, parameters, scan)
         longest = self.remembered_turns * parameters.parts_per_turn + 1
         targets = self._targets(scan - (before.paths.shape[1] - 1))
         draw = drawn(before, duration, turn, rng)

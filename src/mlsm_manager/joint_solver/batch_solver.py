@@ -1,6 +1,6 @@
 """Fits a whole run at once, starting from what the live solver found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -10,7 +10,6 @@ from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covarian
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, add_loops, loops_of
 from mlsm_manager.joint_solver.map_support import misfit_variances
-from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import (
     POSE_COLUMNS,
     RUN_COLUMNS,
@@ -20,10 +19,10 @@ from mlsm_manager.joint_solver.normal_equations import (
     solution_of,
 )
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place
-from mlsm_manager.joint_solver.post_comparisons import LoneComparisons
-from mlsm_manager.joint_solver.run_log import RunLog
-from mlsm_manager.joint_solver.submaps import Islands
+from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.post_comparisons import PostComparisons
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.submaps import Submaps
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
@@ -85,17 +84,14 @@ def closed(live: LiveSolver, batch: BatchResult) -> Closed:
 
     What was found only pulls the run near; where it ends, comparisons of echoes and the odometry say alone.
     """
-    loops = loops_of(live.log, live.odometry, batch.state, live.parameters)
+    loops = loops_of(live.solution.with_state(batch.state))
     if not loops:
         return Closed(batch, [], np.nan)
-    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, batch.state.copy(), loops)
+    problem = _Batch(live.solution.with_state(batch.state.copy()), loops)
     for _ in range(_PULLED_STEPS):
         problem.step()
     other = solved(live, start=problem.state)
-    without, with_loops = (
-        _Batch(live.log, live.islands, live.odometry, live.parameters, some.state.copy()).evidence()
-        for some in (batch, other)
-    )
+    without, with_loops = (_Batch(live.solution.with_state(some.state.copy())).evidence() for some in (batch, other))
     gain = with_loops - without
     return Closed(other, loops, gain) if gain > _CONVINCING else Closed(batch, [], gain)
 
@@ -112,7 +108,7 @@ def solved(
     steps are known to _TOLD_STEP; None where none are.
     """
     parameters, start = parameters or live.parameters, start or live.state
-    problem = _Batch(live.log, live.islands, live.odometry, parameters, start.copy(), told=told)
+    problem = _Batch(replace(live.solution, parameters=parameters, state=start.copy()), told=told)
     steps, converged = problem.converge()
     poses, run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(live, problem.state))
@@ -124,7 +120,7 @@ def settled(live: LiveSolver, start: State) -> State:
 
     Where next to nothing tells the way along a wall, a fit that is not told creeps to a standstill there.
     """
-    problem = _Batch(live.log, live.islands, live.odometry, live.parameters, start.copy(), told=start)
+    problem = _Batch(live.solution.with_state(start.copy()), told=start)
     problem.converge()
     return problem.state
 
@@ -136,8 +132,8 @@ def solved_part(live: LiveSolver, first: int) -> PartResult:
     """
     state = State(live.state.nodes[first:].copy(), live.state.run.copy())
     state.nodes[:, :2] -= state.nodes[0, :2]
-    islands = Islands(live.islands.numbers[first:])
-    problem = _Batch(live.log.since(first), islands, live.odometry, live.parameters, state)
+    submaps = Submaps(live.submaps.numbers[first:])
+    problem = _Batch(Solution(live.log.since(first), live.parameters, state, submaps))
     steps, _ = problem.converge()
     return PartResult(state.nodes[-1].copy(), state.run.copy(), problem.newest_covariance(), steps)
 
@@ -145,31 +141,22 @@ def solved_part(live: LiveSolver, first: int) -> PartResult:
 def _misfit(live: LiveSolver, state: State) -> np.ndarray:
     """Return how uncertain scans that fit nowhere make the place of each node (n,) [m^2]."""
     parts = live.parameters.parts_per_turn
-    of_turns = misfit_variances(live.log, live.odometry, state, live.parameters, 0)
+    of_turns = misfit_variances(live.solution.with_state(state), 0)
     return np.cumsum(np.append(0.0, np.repeat(of_turns / parts, parts)))
 
 
 class _Batch:
-    def __init__(
-        self,
-        log: RunLog,
-        islands: Islands,
-        odometry: OdometryModel,
-        parameters: SolverParameters,
-        state: State,
-        loops: Sequence[Loop] = (),
-        told: Optional[State] = None,
-    ) -> None:
-        self._log, self._odometry, self._parameters, self.state = log, odometry, parameters, state
-        self._islands = islands
+    def __init__(self, solution: Solution, loops: Sequence[Loop] = (), told: Optional[State] = None) -> None:
+        log, odometry, self.state = solution.log, solution.odometry, solution.state
+        self._run, self._odometry, self._parameters = solution, odometry, solution.parameters
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
-        self._loops, self._start, self._told = list(loops), state.copy(), told
+        self._loops, self._start, self._told = list(loops), self.state.copy(), told
         self._solution = None
         self._move = np.zeros(self._layout.size)
         self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
-        self._lone = LoneComparisons(log, odometry, parameters, scans, np.ones(len(scans)))
+        self._posts = PostComparisons(solution, scans, np.ones(len(scans)))
 
     def converge(self) -> Tuple[int, bool]:
         """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
@@ -185,7 +172,7 @@ class _Batch:
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self._met()
         add_comparisons(equations, self._layout, pairs, points, points, parameters, parameters.cut)
-        self._lone.add(equations, self._layout, self.state, parameters.cut)
+        self._posts.add(equations, self._layout, self._run, parameters.cut)
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
         self.state.nodes += self._nodes_of(self._move)
@@ -216,13 +203,13 @@ class _Batch:
     def _met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         parameters = self._parameters
-        rows = self._log.rows(0, self._layout.last)
-        points = place(self._log, self._odometry, self.state, rows)
+        rows = self._run.log.rows(0, self._layout.last)
+        points = self._run.placed(rows)
         points = WeakDirections.of([points], parameters).without(points, points.scans)
         if self._lists is None:
             self._lists = Neighbours(points, parameters.group_scans)
         pairs = pairs_of(self._lists, points, points, parameters.cut, parameters)
-        return points, self._islands.within(pairs, points, points)
+        return points, self._run.submaps.within(pairs, points, points)
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)

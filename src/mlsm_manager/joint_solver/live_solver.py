@@ -13,10 +13,11 @@ from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.place_search import island_place, place_after_silence, searched_node, silent_scans
+from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.run_log import RunLog, parts_of
-from mlsm_manager.joint_solver.submaps import Islands
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.submaps import Submaps
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
@@ -79,6 +80,7 @@ class SolvedNodes:
 
 
 _ESTIMATE = "estimate."
+_SUBMAPS = "islands"  # the name in stored maps
 _UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 
@@ -87,7 +89,7 @@ class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
     sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan of the log. state: of all nodes.
-    islands: which scans are compared with each other. search: what came of the search for the newest scans in the map
+    submaps: which scans are compared with each other. search: what came of the search for the newest scans in the map
     after scans that heard nothing; None where none was needed.
     """
 
@@ -108,7 +110,7 @@ class LiveSolver:
         self.estimates: List[LiveEstimate] = []
         self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean)
         self._start, self._known = start, known
-        self.islands = Islands(np.empty(0))
+        self.submaps = Submaps(np.empty(0))
         self.search: Optional[PlaceCandidate] = None
         self._by_parts = parameters.node_search
 
@@ -119,7 +121,7 @@ class LiveSolver:
             **self._nodes.stored(),
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
-            "islands": self.islands.numbers,
+            _SUBMAPS: self.submaps.numbers,
             **({} if self._by_parts is None else self._by_parts.stored()),
             **stacked(self.estimates, _ESTIMATE),
         }
@@ -148,11 +150,11 @@ class LiveSolver:
         for scan in scans:
             solver._append(scan)
         solver._nodes.restore(stored, solver.log.scan_count)
-        solver.islands = Islands(stored["islands"])
+        solver.submaps = Submaps(stored[_SUBMAPS])
         if solver._by_parts is not None:
             solver._by_parts = solver._by_parts.resumed(solver.log, parameters, stored)
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
-        for name, found in (("estimates", solver.estimates), ("islands", stored["islands"])):
+        for name, found in (("estimates", solver.estimates), ("submaps", stored[_SUBMAPS])):
             if len(found) != solver.log.scan_count:
                 raise ValueError(f"{len(found)} {name} for {solver.log.scan_count} scans")
         return solver
@@ -161,6 +163,11 @@ class LiveSolver:
     def state(self) -> State:
         """The unknowns as they are known now; a view that the next scan makes invalid."""
         return self._nodes.state
+
+    @property
+    def solution(self) -> Solution:
+        """The run as it is known now; its state is a view that the next scan makes invalid."""
+        return Solution(self.log, self.parameters, self.state, self.submaps, self._known)
 
     def add(self, scan: Scan) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
@@ -196,7 +203,7 @@ class LiveSolver:
         try:
             for part in parts_of(scan, self._parts, self.log.node_times[-1] if scans else None):
                 self.log.append(part, self.parameters.lookahead)
-                self.islands.append()
+                self.submaps.append()
         except RefusedInput:
             self._shorten(scans)
             raise
@@ -205,7 +212,7 @@ class LiveSolver:
         """Keep the oldest `scans` of the log."""
         while self.log.scan_count > scans:
             self.log.remove_newest()
-        self.islands.shorten(scans)
+        self.submaps.shorten(scans)
 
     def _solved(self) -> List[LiveEstimate]:
         """Return what is known of the scans of the log that have no estimates yet."""
@@ -215,7 +222,7 @@ class LiveSolver:
         self.search = None
         self._search()
         window = self._fitted()
-        if self.islands.is_apart and self._join(window.estimates(1)[0]):
+        if self.submaps.is_apart and self._join(window.estimates(1)[0]):
             window = self._fitted()
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
         self._nodes.covariances.replace_from(window.oldest, covariances)
@@ -225,16 +232,13 @@ class LiveSolver:
     def _misfit_variance(self) -> float:
         """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
         first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
-        newest = misfit_variances(self.log, self.odometry, self.state, self.parameters, first)
+        newest = misfit_variances(self.solution, first)
         self._nodes.misfits.replace_from(first, newest)
         return float(self._nodes.misfits.values.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
 
     def _fitted(self) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution."""
-        window = LiveWindow(
-            self.log, self.odometry, self.parameters, self.state, self.estimates, self._nodes.covariances.values,
-            self._start, self._known, self.islands,
-        )  # fmt: skip
+        window = LiveWindow(self.solution, self.estimates, self._nodes.covariances.values, self._start)
         cut = self.parameters.wide_cut
         for _ in range(self.parameters.live_iterations):
             window.step(cut)
@@ -247,7 +251,7 @@ class LiveSolver:
         return self.search.line() if self.search is not None and self.search.is_certain else ""
 
     def _search(self) -> None:
-        """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin an island."""
+        """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin a submap."""
         if self._parts > 1:
             self._search_by_parts()
             return
@@ -257,13 +261,11 @@ class LiveSolver:
         covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
         parameters = self.parameters
         if silent:
-            self.search = place_after_silence(
-                self.log, self.odometry, self.state, self.islands, covariance, silent, parameters, self._known
-            )
-        if self.search is not None and self.search.is_certain and not self.islands.is_apart:
+            self.search = place_after_silence(self.solution, covariance, silent)
+        if self.search is not None and self.search.is_certain and not self.submaps.is_apart:
             self._move(self.search.moves)
         elif self.search is not None and self.search.reach > parameters.wide_cut:
-            self.islands.begin()
+            self.submaps.begin()
         else:
             self._search_beside_scan_before(covariance)
 
@@ -276,18 +278,16 @@ class LiveSolver:
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
-        first = self.islands.start
-        self.state.nodes[-1] = searched_node(self.log, self.odometry, self.state, covariance, self.parameters, first)
+        first = self.submaps.start
+        self.state.nodes[-1] = searched_node(self.solution, covariance, first)
 
     def _join(self, estimate: LiveEstimate) -> bool:
         """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""
-        covariance, parameters = estimate.covariance[:2, :2], self.parameters
-        self.search = island_place(
-            self.log, self.odometry, self.state, self.islands, covariance, parameters, self._known
-        )
+        covariance = estimate.covariance[:2, :2]
+        self.search = submap_place(self.solution, covariance)
         if self.search.is_certain:
             self._move(self.search.moves)
-            self.islands.join()
+            self.submaps.join()
         return self.search.is_certain
 
     def _move(self, moves: np.ndarray) -> None:

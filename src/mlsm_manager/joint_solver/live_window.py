@@ -7,9 +7,8 @@ import numpy as np
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons, pairs_of
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.map_support import agreement, surfaces_met
-from mlsm_manager.joint_solver.motion_models import OdometryModel, frozen_deviations
+from mlsm_manager.joint_solver.motion_models import frozen_deviations
 from mlsm_manager.joint_solver.normal_equations import (
     DELAY,
     POSE,
@@ -19,33 +18,35 @@ from mlsm_manager.joint_solver.normal_equations import (
     DenseSolution,
     Layout,
     NormalEquations,
-    State,
 )
-from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place
-from mlsm_manager.joint_solver.post_comparisons import LoneComparisons
-from mlsm_manager.joint_solver.run_log import RunLog
-from mlsm_manager.joint_solver.submaps import Islands
+from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.post_comparisons import PostComparisons
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 from node_support.geometry import composed, inverse
 
-_AGE_DISTANCE = 5.0  # m by which the newest block counts as farther than the oldest: the oldest drifted least
-_FADING = 0.1  # share of the reach within which a block fades out, so that no block appears at once
-_NO_DISTANCE = 1e-9  # m: keeps blocks at one place from dividing by zero
+_AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
+_FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
+_NO_DISTANCE = 1e-9  # m: keeps groups at one place from dividing by zero
+_FORGOTTEN_DELAY = 2.0
+"""Factor of the delay's deviation as it was known before the window. Comparisons follow where points go, and what is
+frozen keeps what it was frozen with, so that they tell less than they seem to: taken at their word, windows 41 scans
+apart kept a delay of their own each, in turn 0.68 and 0.86 s, where the whole run says 1.00 s."""
+_MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
 
 
 @dataclass(frozen=True)
 class FrozenMap:
-    """Points of frozen blocks, placed with the run's unknowns at `run` (2,).
+    """Points of frozen groups of scans, placed with the run's unknowns at `run` (2,).
 
     importance: (n,) factor of each point's weight, 0 at the border of what is near.
-    numbers: (b,) the blocks that are near, in the order of time. block_importance: (b,) the factor of each.
+    numbers: (b,) the groups that are near, in the order of time. group_importance: (b,) the factor of each.
     """
 
     points: PlacedPoints
     importance: np.ndarray
     numbers: np.ndarray
-    block_importance: np.ndarray
+    group_importance: np.ndarray
     run: np.ndarray
 
     def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
@@ -53,33 +54,27 @@ class FrozenMap:
         return self.points.moved_by_run(run - self.run)
 
 
-def nearest_blocks(
-    log: RunLog,
-    odometry: OdometryModel,
-    state: State,
-    count: int,
-    place_now: np.ndarray,
-    parameters: SolverParameters,
-) -> FrozenMap:
-    """Return the blocks nearest to `place_now` (2,) among the first `count` blocks of the run."""
-    scans = parameters.group_scans
+def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> FrozenMap:
+    """Return the groups of scans nearest to `place_now` (2,) among the first `count` groups of the run."""
+    log, scans = solution.log, solution.parameters.group_scans
     middles = np.arange(count) * scans + scans // 2
-    places = log.node_poses(middles)[:, :2] + state.nodes[middles, :2]
-    distances = np.hypot(*(places - place_now).T) + _AGE_DISTANCE * np.arange(count) / max(count, 1)
-    importance = fading(distances, parameters.frozen_groups)
+    distances = np.hypot(*(solution.node_places(middles) - place_now).T) + _AGE_DISTANCE * np.arange(count) / max(
+        count, 1
+    )
+    importance = fading(distances, solution.parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
     )
-    points = place(log, odometry, state, rows)
+    points = solution.placed(rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
-    return FrozenMap(points, per_point, numbers, importance[numbers], state.run.copy())
+    return FrozenMap(points, per_point, numbers, importance[numbers], solution.state.run.copy())
 
 
 def fading(distances: np.ndarray, most: int) -> np.ndarray:
-    """Return factors (b,) of blocks at `distances` (b,) [m]: 1 for near ones, falling to 0; at most `most` are above 0.
+    """Return factors (b,) of groups at `distances` (b,) [m]: 1 for near ones, falling to 0; at most `most` are above 0.
 
-    They depend on the distances continuously. Blocks at one distance fade together.
+    They depend on the distances continuously. Groups at one distance fade together.
     """
     if len(distances) <= most:
         return np.ones(len(distances))
@@ -99,67 +94,61 @@ def joint_covariance(covariances: np.ndarray) -> np.ndarray:
     return joint.reshape(POSE_COLUMNS * len(covariances), POSE_COLUMNS * len(covariances))
 
 
-_FORGOTTEN_DELAY = 2.0
-"""Factor of the delay's deviation as it was known before the window. Comparisons follow where points go, and what is
-frozen keeps what it was frozen with, so that they tell less than they seem to: taken at their word, windows 41 scans
-apart kept a delay of their own each, in turn 0.68 and 0.86 s, where the whole run says 1.00 s."""
-_MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
-
-
 class LiveWindow:
-    """Moves the free nodes of `state` and its run's unknowns in place.
+    """Moves the free nodes of a solution and its run's unknowns in place.
 
     estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
-    standard deviations of the first node's pose, None where it defines the map. known: what was in the map before.
-    islands: which scans are compared with each other.
+    standard deviations of the first node's pose, None where it defines the map.
     """
 
     def __init__(
-        self, log: RunLog, odometry: OdometryModel, parameters: SolverParameters, state: State,
-        estimates: Sequence[LiveEstimate], covariances: np.ndarray, start: Optional[np.ndarray],
-        known: Optional[KnownSurfaces], islands: Islands,
-    ) -> None:  # fmt: skip
-        self._islands = islands
-        self._log, self._odometry, self._parameters, self._state = log, odometry, parameters, state
-        last = log.scan_count
-        first = max(0, last - parameters.free_nodes)
-        self._scans_per_block = parameters.group_scans
-        self._recent = first // self._scans_per_block * self._scans_per_block
-        around = log.node_poses(last)[:2] + state.nodes[last, :2]
-        self._frozen = nearest_blocks(log, odometry, state, first // self._scans_per_block, around, parameters)
-        self._layout = Layout(first, last, odometry.width, self._groups(first))
+        self,
+        solution: Solution,
+        estimates: Sequence[LiveEstimate],
+        covariances: np.ndarray,
+        start: Optional[np.ndarray],
+    ) -> None:
+        self._run, self._log, self._state = solution, solution.log, solution.state
+        self._odometry, self._parameters = solution.odometry, solution.parameters
+        last = self._log.scan_count
+        first = max(0, last - self._parameters.free_nodes)
+        self._scans_per_group = self._parameters.group_scans
+        self._recent = first // self._scans_per_group * self._scans_per_group
+        around = solution.node_places(last)
+        self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
+        self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._anchor = estimates[first - 1] if first else None
-        self._motion = log.node_motion(np.arange(first, last + 1))
-        self._start, self._known = start, known
+        self._motion = self._log.node_motion(np.arange(first, last + 1))
+        self._start, self._known = start, solution.known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
         self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
         self._met = ()
-        self._lone = self._lone_comparisons()
+        self._posts = self._post_comparisons()
 
-    def _lone_comparisons(self) -> LoneComparisons:
-        """Return those with the frozen blocks and with the scans since."""
-        blocks = self._frozen.numbers[:, np.newaxis] * self._scans_per_block + np.arange(self._scans_per_block)
+    def _post_comparisons(self) -> PostComparisons:
+        """Return those with the frozen groups and with the scans since."""
+        groups = self._frozen.numbers[:, np.newaxis] * self._scans_per_group + np.arange(self._scans_per_group)
         recent = np.arange(self._recent, self._layout.last)
-        importance = np.repeat(self._frozen.block_importance, self._scans_per_block)
-        scans, importance = np.append(blocks, recent), np.append(importance, np.ones(len(recent)))
-        same = self._islands.numbers[scans] == self._islands.newest
+        importance = np.repeat(self._frozen.group_importance, self._scans_per_group)
+        scans, importance = np.append(groups, recent), np.append(importance, np.ones(len(recent)))
+        same = self._run.submaps.numbers[scans] == self._run.submaps.newest
         scans, importance = scans[same], importance[same]
-        return LoneComparisons(self._log, self._odometry, self._parameters, scans, importance)
+        return PostComparisons(self._run, scans, importance)
 
     def _groups(self, first: int) -> np.ndarray:
-        """Return the group (first,) of each frozen node: its block's, and one more for nodes beside the window."""
-        group_of_block = np.full(first // self._scans_per_block + 1, -1)
-        group_of_block[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
-        group_of_block[-1] = len(self._frozen.numbers)
-        return group_of_block[np.arange(first) // self._scans_per_block]
+        """Return the group (first,) of each frozen node: its group's, and one more for nodes beside the window."""
+        number_of_group = np.full(first // self._scans_per_group + 1, -1)
+        number_of_group[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
+        number_of_group[-1] = len(self._frozen.numbers)
+        return number_of_group[np.arange(first) // self._scans_per_group]
 
     def _covariance_of_frozen(self, covariances: np.ndarray, first: int) -> np.ndarray:
         """Return (3 g, 3 g) of the groups' poses."""
         if not first:
             return np.zeros((0, 0))
-        middles = self._frozen.numbers * self._scans_per_block + self._scans_per_block // 2
+        middles = self._frozen.numbers * self._scans_per_group + self._scans_per_group // 2
         return joint_covariance(covariances[np.append(middles, first)])
 
     def step(self, cut: float) -> None:
@@ -169,7 +158,7 @@ class LiveWindow:
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)
         self._comparisons = self._add_surfaces(equations, cut)
-        self._comparisons += self._lone.add(equations, self._layout, self._state, cut)
+        self._comparisons += self._posts.add(equations, self._layout, self._run, cut)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
 
@@ -206,7 +195,7 @@ class LiveWindow:
         """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
         parameters = self._parameters
         rows = self._log.rows(self._recent, self._layout.last)
-        recent = place(self._log, self._odometry, self._state, rows)
+        recent = self._run.placed(rows)
         frozen = self._frozen.moved_by_run(self._state.run)
         weak = WeakDirections.of((frozen, recent), parameters)
         frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
@@ -217,7 +206,7 @@ class LiveWindow:
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])
-            to_known = self._islands.within(to_known, sources, known)
+            to_known = self._run.submaps.within(to_known, sources, known)
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])
         self._met = tuple(met)
@@ -232,7 +221,7 @@ class LiveWindow:
             self._lists = tuple(Neighbours(targets, parameters.group_scans) for targets in surfaces)
         for lists, targets in zip(self._lists, surfaces):
             pairs = pairs_of(lists, sources, targets, cut, parameters)
-            yield self._islands.within(pairs, sources, targets)
+            yield self._run.submaps.within(pairs, sources, targets)
 
     def _move(self, step: np.ndarray) -> None:
         nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)

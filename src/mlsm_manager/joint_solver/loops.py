@@ -9,10 +9,9 @@ from typing import List, Optional
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.places import (
     FEWEST_POINTS,
     MOST_POINTS,
@@ -21,7 +20,7 @@ from mlsm_manager.joint_solver.places import (
     PlaceCandidate,
     best_place,
 )
-from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import Solution
 
 _APART = 20  # scans: newer ones are compared anyway, and tie a scan to where it is
 _DRIFT = 5.0  # m, deviation: of a scan against one that is so much older
@@ -49,14 +48,15 @@ class Loop:
         )
 
 
-def loops_of(log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters) -> List[Loop]:
+def loops_of(solution: Solution) -> List[Loop]:
     """Return the places visited again that neighbouring scans agree on, in the order of time.
 
     None where turns are cut into parts: a part hears too little to be told from others.
     """
+    log, parameters = solution.log, solution.parameters
     if parameters.parts_per_turn > 1:
         return []
-    points = place(log, odometry, state, log.rows(0, log.scan_count))
+    points = solution.placed(log.rows(0, log.scan_count))
     found = [_loop(points, scan, parameters) for scan in range(_APART, log.scan_count)]
     return agreed([loop for loop in found if loop is not None])
 

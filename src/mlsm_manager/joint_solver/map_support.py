@@ -6,11 +6,10 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.comparisons import Pairs
-from mlsm_manager.joint_solver.motion_models import OdometryModel
-from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN, State
+from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place
-from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.solution import Solution
 
 _CELL = 1.0  # m: about twice the deviation of an echo
 _SURROUNDINGS = 8.0  # m around a point within which surfaces may be the one that it lies on, or lie beside it
@@ -57,32 +56,28 @@ def surface_distances(
     return np.where(cosine > parameters.min_cosine, distance, np.inf).min(axis=2)
 
 
-def shares_heard_before(
-    log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters, first: int
-) -> np.ndarray:
+def shares_heard_before(solution: Solution, first: int) -> np.ndarray:
     """Return which share (n,) of the points of turns `first` and newer lies on surfaces that those before heard.
 
     Only points count around which a surface was heard that faces the same way: others may be new. NaN for turns with
     hardly any such points. A turn is a scan, or all its parts.
     """
-    turns = range(first, log.scan_count // parameters.parts_per_turn)
-    return np.array([_share(log, odometry, state, parameters, turn) for turn in turns])
+    turns = range(first, solution.log.scan_count // solution.parameters.parts_per_turn)
+    return np.array([_share(solution, turn) for turn in turns])
 
 
-def misfit_variances(
-    log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters, first: int
-) -> np.ndarray:
+def misfit_variances(solution: Solution, first: int) -> np.ndarray:
     """Return by how much (n,) [m^2] each of the turns `first` and newer makes the place of all that follows uncertain.
 
     In each direction. It is 0 for a turn that fits to those before it, and grows with the share of its points that
     should lie on what these heard and do not, up to as far as a vehicle goes in a turn. Where the odometry reports
     distances it is 0: a motion that is reported is not lost with a scan.
     """
-    parts = parameters.parts_per_turn
-    times = log.node_times[parts * first :: parts]
-    if not np.isinf(odometry.distance_deviation):
+    parts = solution.parameters.parts_per_turn
+    times = solution.log.node_times[parts * first :: parts]
+    if not np.isinf(solution.odometry.distance_deviation):
         return np.zeros(len(times) - 1)
-    shares = shares_heard_before(log, odometry, state, parameters, first)
+    shares = shares_heard_before(solution, first)
     misfit = np.clip(1.0 - np.where(np.isfinite(shares), shares, _FITS) / _FITS, 0.0, 1.0)
     return misfit * (_SPEED * np.diff(times)) ** 2
 
@@ -113,15 +108,15 @@ def surfaces_met(met: Met, scan: int) -> np.ndarray:
     return total
 
 
-def _share(log: RunLog, odometry: OdometryModel, state: State, parameters: SolverParameters, turn: int) -> float:
-    parts = parameters.parts_per_turn
+def _share(solution: Solution, turn: int) -> float:
+    log, parts = solution.log, solution.parameters.parts_per_turn
     before = log.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
     own = log.rows(parts * turn, parts * (turn + 1))
     if not len(before) or not len(own):
         return np.nan
-    sources, targets = (place(log, odometry, state, rows) for rows in (own, before))
+    sources, targets = (solution.placed(rows) for rows in (own, before))
     here = sources.places[np.newaxis]
-    distances = surface_distances(sources, targets, here, parameters, _SURROUNDINGS, _CANDIDATES)[0]
+    distances = surface_distances(sources, targets, here, solution.parameters, _SURROUNDINGS, _CANDIDATES)[0]
     known = np.isfinite(distances)
     total = sources.qualities[known].sum()
     if total <= _FEWEST_POINTS:

@@ -10,12 +10,10 @@ from typing import List, NamedTuple, Optional, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.map_support import map_support, nearness
-from mlsm_manager.joint_solver.motion_models import OdometryModel, Transition
+from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import POSE, YAW, State
-from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place, place_lone
+from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.places import (
     FEWEST_POINTS,
     MOST_POINTS,
@@ -29,11 +27,12 @@ from mlsm_manager.joint_solver.places import (
     places_within,
 )
 from mlsm_manager.joint_solver.run_log import RunLog
-from mlsm_manager.joint_solver.submaps import MAP, Islands
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.submaps import MAP
 
 _KNOWN = 2.0  # deviations of the motion within the cut, and the solver's own steps do
-_ISLAND_SCANS = 6  # the newest ones of an island that are looked for: older ones may lie in water that the map has not
-_ISLAND_POINTS = 400  # of these
+_SUBMAP_SCANS = 6  # the newest ones of a submap that are looked for: older ones may lie in water that the map has not
+_SUBMAP_POINTS = 400  # of these
 _MOTIONS = np.linspace(-2.0, 2.0, 5)  # standard deviations of the motion within the newest scan, in each direction
 _ROUNDING = 1e-6  # m^2, keeps a motion that is known from having no variance
 _MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
@@ -45,30 +44,23 @@ _TURN_CELL = 0.08  # rad: moves an echo 20 m away by less than twice a cell
 _LEAST_LEFT = 1e-6  # rad^2: of the heading, once a turn is chosen
 
 
-def searched_node(
-    log: RunLog,
-    odometry: OdometryModel,
-    state: State,
-    covariance: np.ndarray,
-    parameters: SolverParameters,
-    first: int = 0,
-) -> np.ndarray:
+def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) -> np.ndarray:
     """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
 
     first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
     is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
     covariance asks (correlative search, Olson 2009).
     """
-    newest = state.nodes[-1]
+    log, state, newest = solution.log, solution.state, solution.state.nodes[-1]
     last = log.scan_count
     nodes = np.array([last - 1, last])
-    step = Transition.of(odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
-    if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < parameters.cut:
+    step = Transition.of(solution.odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
+    if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < solution.parameters.cut:
         return newest
     before, own = log.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
-    search = _Search(log, odometry, parameters, place(log, odometry, state, before), own)
+    search = _Search(solution, solution.placed(before), own)
     if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
         state, step = search.turned(state, step)
     return search.beside(state, step, MOST_POINTS)[1]
@@ -79,59 +71,41 @@ def silent_scans(log: RunLog) -> int:
     return _silent_before(log, log.scan_count - 1)
 
 
-def place_after_silence(
-    log: RunLog,
-    odometry: OdometryModel,
-    state: State,
-    islands: Islands,
-    covariance: np.ndarray,
-    silent: int,
-    parameters: SolverParameters,
-    known: Optional[KnownSurfaces] = None,
-) -> Optional[PlaceCandidate]:
+def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
     """Return where the newest scan was taken, after `silent` scans before it that heard nothing.
 
-    covariance: (width, width) of the node before these. known: what was in the map before the run. None where the
-    motion since is known well enough, or the scan hears too little itself.
+    covariance: (width, width) of the node before these. None where the motion since is known well
+    enough, or the scan hears too little itself.
     """
+    log, parameters = solution.log, solution.parameters
     last = log.scan_count
-    motion = _freedom_since(log, odometry, state, covariance, silent)
+    motion = _freedom_since(solution, covariance, silent)
     own = log.rows(last - 1, last)
     if motion.reach * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
         return None
-    sources = place(log, odometry, state, own[:: max(1, len(own) // MOST_POINTS)])
-    targets = _map_around(log, odometry, state, islands, sources, REACH * motion.reach + parameters.cut, known)
+    sources = solution.placed(own[:: max(1, len(own) // MOST_POINTS)])
+    targets = _map_around(solution, sources, REACH * motion.reach + parameters.cut)
     return best_place(motion, sources, targets, parameters)
 
 
-def island_place(
-    log: RunLog,
-    odometry: OdometryModel,
-    state: State,
-    islands: Islands,
-    covariance: np.ndarray,
-    parameters: SolverParameters,
-    known: Optional[KnownSurfaces] = None,
-) -> PlaceCandidate:
+def submap_place(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
     """Return where the newest scans, which lie apart from the map, are in it; covariance: (2, 2) m^2 of the place.
 
-    They are moved together, with the nodes of the silence before them in part. known: what was in the map before the
-    run.
+    They are moved together, with the nodes of the silence before them in part.
     """
-    last, first = log.scan_count, islands.start
-    rows = log.rows(max(first, last - _ISLAND_SCANS), last)
-    sources = place(log, odometry, state, rows[:: max(1, len(rows) // _ISLAND_POINTS)])
-    freedom = Freedom.as_one(covariance, _shares_of_move(log, first), odometry.width)
-    targets = _map_around(log, odometry, state, islands, sources, REACH * freedom.reach + parameters.cut, known)
+    log, parameters = solution.log, solution.parameters
+    last, first = log.scan_count, solution.submaps.start
+    rows = log.rows(max(first, last - _SUBMAP_SCANS), last)
+    sources = solution.placed(rows[:: max(1, len(rows) // _SUBMAP_POINTS)])
+    freedom = Freedom.as_one(covariance, _shares_of_move(log, first), solution.odometry.width)
+    targets = _map_around(solution, sources, REACH * freedom.reach + parameters.cut)
     return best_place(freedom, sources, targets, parameters)
 
 
 class _Search(NamedTuple):
     """What the newest scan is compared with. targets: of earlier scans. own: (n,) rows of the newest scan's points."""
 
-    log: RunLog
-    odometry: OdometryModel
-    parameters: SolverParameters
+    solution: Solution
     targets: PlacedPoints
     own: np.ndarray
 
@@ -140,15 +114,13 @@ class _Search(NamedTuple):
 
         step: covariance (width, width) of the node. most: points of the scan that are compared.
         """
-        log, odometry, parameters = self.log, self.odometry, self.parameters
-        sources = place(log, odometry, state, self.own[:: max(1, len(self.own) // most)])
+        solution, parameters = self.solution.with_state(state), self.solution.parameters
+        sources = solution.placed(self.own[:: max(1, len(self.own) // most)])
         shifts = places_within(step[:2, :2], _MOST_CELLS)
         ends = np.column_stack([np.zeros_like(shifts), shifts])
         found = NATS * MOST_POINTS / most * map_support(sources, self.targets, moved(sources, ends), parameters)
         if parameters.post_confidence:
-            found = found + parameters.post_confidence * _POST_NATS * _post_support(
-                log, odometry, state, ends, parameters
-            )
+            found = found + parameters.post_confidence * _POST_NATS * _post_support(solution, ends)
         costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
         best = np.argmax(found - costs)
         node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])
@@ -170,29 +142,28 @@ class _Search(NamedTuple):
         return states[int(np.argmax(told))], left
 
 
-def _post_support(
-    log: RunLog, odometry: OdometryModel, state: State, ends: np.ndarray, parameters: SolverParameters
-) -> np.ndarray:
+def _post_support(solution: Solution, ends: np.ndarray) -> np.ndarray:
     """Return how many of the newest scan's lone points (k,) lie on earlier ones at `ends` (k, 4); see moved."""
-    last = log.scan_count
-    sources = place_lone(log, odometry, state, log.lone.rows(last - 1, last))
-    targets = place_lone(log, odometry, state, log.lone.rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
+    last, rows = solution.log.scan_count, solution.log.posts.rows
+    sources = solution.placed_posts(rows(last - 1, last))
+    targets = solution.placed_posts(rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
     if not len(sources) or not len(targets):
         return np.zeros(len(ends))
     places = moved(sources, ends)
-    distance, _ = cKDTree(targets.places).query(places.reshape(-1, 2), distance_upper_bound=parameters.cut)
+    distance, _ = cKDTree(targets.places).query(places.reshape(-1, 2), distance_upper_bound=solution.parameters.cut)
     return (nearness(distance).reshape(places.shape[:2]) * sources.qualities).sum(axis=1)
 
 
-def _freedom_since(log: RunLog, odometry: OdometryModel, state: State, covariance: np.ndarray, silent: int) -> Freedom:
+def _freedom_since(solution: Solution, covariance: np.ndarray, silent: int) -> Freedom:
     """Return what is known of the newest nodes as seen from the one before `silent` scans and the newest one.
 
     covariance: (width, width) of that node. Beginning and end of the newest scan matter most: with both given, what is
     expected of all other nodes follows.
     """
+    log, odometry, nodes = solution.log, solution.odometry, solution.state.nodes
     last, width = log.scan_count, odometry.width
     steps = [
-        Transition.of(odometry, state.nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
+        Transition.of(odometry, nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
         for node in range(last - 1 - silent, last)
     ]
     joint = _joint_covariance(steps, covariance)
@@ -239,16 +210,13 @@ def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
     return np.append((times[1:] - times[0]) / (times[-1] - times[0]), np.ones(log.scan_count - first + 1))
 
 
-def _map_around(
-    log: RunLog, odometry: OdometryModel, state: State, islands: Islands, sources: PlacedPoints, reach: float,
-    known: Optional[KnownSurfaces],
-) -> PlacedPoints:  # fmt: skip
+def _map_around(solution: Solution, sources: PlacedPoints, reach: float) -> PlacedPoints:
     """Return the points of the map that `sources` can meet if they are moved by up to `reach` [m]."""
     if not len(sources):
         return sources
-    scans = np.flatnonzero(islands.numbers == MAP)
-    rows = [log.rows(scan, scan + 1) for scan in scans if scan != sources.scans[-1]]
-    targets = place(log, odometry, state, np.concatenate([np.empty(0, dtype=np.int64), *rows]))
+    scans = np.flatnonzero(solution.submaps.numbers == MAP)
+    rows = [solution.log.rows(scan, scan + 1) for scan in scans if scan != sources.scans[-1]]
+    targets = solution.placed(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
     low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
     targets = targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
-    return targets if known is None else targets.joined_with(known.around(low, high))
+    return targets if solution.known is None else targets.joined_with(solution.known.around(low, high))

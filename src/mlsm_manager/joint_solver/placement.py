@@ -1,4 +1,4 @@
-"""The vehicle's path at any time: as it was known then, or as it is known from the whole run."""
+"""Where the vehicle was at any time, and where the points of scans lie in the map, given the unknowns."""
 
 from dataclasses import dataclass, fields, replace
 from typing import Union
@@ -12,7 +12,8 @@ from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog, as_compl
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.surface_points import SurfacePoints
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import inverse, transformed
+
+_HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
 
 
 class NodePath:
@@ -68,9 +69,6 @@ def solved_path(
     node_times: (n,) s. nodes: (n, width).
     """
     return NodePath(odometry, OdometryLog.of(track), node_times, nodes).at(times)
-
-
-_HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
 
 
 @dataclass(frozen=True)
@@ -131,43 +129,12 @@ def placed(
 
 
 def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
-    """Return poses of the odometry (k, 4) as `compiled_places` takes them: a reference path is even between them."""
+    """Return poses of the odometry (k, 4) as `placed_rows` takes them: a reference path is even between them."""
     reference = odometry.reference(known)
     return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])
-
-
-def place(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the surface points in `rows` (n,) int of the log."""
-    return placed(log, odometry, state, log.points(rows), log.scans(rows))
-
-
-def place_lone(log: RunLog, odometry: OdometryModel, state: State, rows: np.ndarray) -> PlacedPoints:
-    """Return the lone points in `rows` (n,) int of the log's table of these."""
-    return placed(log, odometry, state, log.lone.points(rows), log.lone.scans(rows))
 
 
 _NO_POINTS = PlacedPoints(
     scans=np.empty(0, dtype=np.int64), places=np.empty((0, 2)), arms=np.empty((0, 2)), normals=np.empty((0, 2)),
     slants=np.empty(0), qualities=np.empty(0), shares=np.empty(0), by_run=np.empty((0, 2, 2)),
 )  # fmt: skip
-
-
-def drawn(log: RunLog, odometry: OdometryModel, state: State, points: np.ndarray, times: np.ndarray) -> np.ndarray:
-    """Return points (n, >= 2) in map of points (n, >= 2) that the odometry placed in odom at `times` (n,) [s].
-
-    Ranges and stamps are corrected as the run's unknowns say. Before the first node and after the last one the
-    motion goes on.
-    """
-    seen = transformed(inverse(log.odometry.at(times)), points)
-    sonar = log.sonar_in_base
-    seen[:, :2] = sonar + (1.0 + state.run[RANGE_SCALE]) * (seen[:, :2] - sonar)
-    return transformed(corrected_path(log, odometry, state, times + state.run[DELAY]), seen)
-
-
-def corrected_path(log: RunLog, odometry: OdometryModel, state: State, times: np.ndarray) -> np.ndarray:
-    """Return T_map_base (m, 3) at `times` (m,) [s]."""
-    if not len(times):
-        return np.empty((0, 3))
-    first, last = np.searchsorted(log.node_times, [times.min(), times.max()])
-    near = slice(max(min(first, len(log.node_times) - 1) - 1, 0), last + 1)
-    return NodePath(odometry, log.odometry, log.node_times[near], state.nodes[near]).at(times)

@@ -6,11 +6,9 @@ from typing import Iterator, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons
-from mlsm_manager.joint_solver.motion_models import OdometryModel
-from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, State
-from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, place_lone
-from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations
+from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.surface_points import ramp
 
 _NEAR_IN_TIME = 5  # turns before and after, a minute, in which a vehicle passes a post
@@ -18,42 +16,34 @@ _CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by 
 _FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
 
 
-class LoneComparisons:
-    """Comparisons of lone points of free scans with those of all others in view."""
+class PostComparisons:
+    """Comparisons of echoes of posts in free scans with those of all others in view."""
 
-    def __init__(
-        self,
-        log: RunLog,
-        odometry: OdometryModel,
-        parameters: SolverParameters,
-        scans: np.ndarray,
-        importance: np.ndarray,
-    ) -> None:
+    def __init__(self, solution: Solution, scans: np.ndarray, importance: np.ndarray) -> None:
         """scans: (s,) those in view, ascending. importance: (s,) factors of what is compared with them."""
-        self._log, self._odometry = log, odometry
-        rows = [log.lone.rows(scan, scan + 1) for scan in scans]
+        rows = [solution.log.posts.rows(scan, scan + 1) for scan in scans]
         self._rows = np.concatenate([np.empty(0, dtype=np.int64), *rows])
-        self._importance = parameters.post_confidence * np.repeat(importance, [len(own) for own in rows])
-        self._parameters = replace(parameters, normal_deviation=0.0)
+        self._importance = solution.parameters.post_confidence * np.repeat(importance, [len(own) for own in rows])
+        self._parameters = replace(solution.parameters, normal_deviation=0.0)
         self._lists: Optional[Neighbours] = None
 
-    def add(self, equations: NormalEquations, layout: Layout, state: State, cut: float) -> int:
+    def add(self, equations: NormalEquations, layout: Layout, solution: Solution, cut: float) -> int:
         """Add the comparisons of points of free scans; return how many there are."""
         if not self._importance.any():
             return 0
-        points = place_lone(self._log, self._odometry, state, self._rows)
+        points = solution.placed_posts(self._rows)
         sources = points.selected(points.scans >= layout.first)
         if self._lists is None:
             self._lists = Neighbours(points, self._parameters.group_scans)
         near = _NEAR_IN_TIME * self._parameters.parts_per_turn
-        pairs, count = lone_pairs(self._lists, sources, points, cut, near), 0
+        pairs, count = post_pairs(self._lists, sources, points, cut, near), 0
         pairs = replace(pairs, importance=pairs.importance * self._importance[pairs.neighbours])
         for each, heard, met in along_and_across(pairs, sources, points):
             count += add_comparisons(equations, layout, each, heard, met, self._parameters, cut)
         return count
 
 
-def lone_pairs(
+def post_pairs(
     lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.

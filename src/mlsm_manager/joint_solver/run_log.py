@@ -78,7 +78,7 @@ class RunLog:
         self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryLog()
         self._node_times = GrowingArray()
-        self._surfaces, self.lone = PointTable(), PointTable()
+        self._surfaces, self.posts = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []
 
     @property
@@ -113,12 +113,12 @@ class RunLog:
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
         self._surfaces.append(points)
-        self.lone.append(lone)
+        self.posts.append(lone)
 
     def remove_newest(self) -> None:
         """Take back the last `append`, as if that scan had not been."""
         self._surfaces.remove_newest()
-        self.lone.remove_newest()
+        self.posts.remove_newest()
         self.odometry.shorten(self._odometry_lengths.pop())
         # Without scans no node is known: the next scan begins the run.
         self._node_times.shorten(self.scan_count + 1 if self.scan_count else 0)
@@ -128,7 +128,7 @@ class RunLog:
         later = RunLog(self.sonar_in_base)
         later.odometry = self.odometry
         later._node_times.extend(self.node_times[scan:])
-        later._surfaces, later.lone = self._surfaces.since(scan), self.lone.since(scan)
+        later._surfaces, later.posts = self._surfaces.since(scan), self.posts.since(scan)
         return later
 
     def rows(self, first: int, last: int) -> np.ndarray:

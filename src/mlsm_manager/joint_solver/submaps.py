@@ -8,11 +8,11 @@ from mlsm_manager.joint_solver.comparisons import Pairs
 from mlsm_manager.joint_solver.placement import PlacedPoints
 
 MAP = 0
-"""The island of all scans whose place in the map is known."""
+"""The submap of all scans whose place in the map is known."""
 
 
-class Islands:
-    """Every scan of a run has the number of its island; a new one begins where nobody knows where the vehicle is."""
+class Submaps:
+    """Every scan of a run has the number of its submap; a new one begins where nobody knows where the vehicle is."""
 
     def __init__(self, numbers: np.ndarray) -> None:
         """numbers: (n,) of the scans so far."""
@@ -21,12 +21,12 @@ class Islands:
 
     @property
     def numbers(self) -> np.ndarray:
-        """(n,) int, the island of each scan."""
+        """(n,) int, the submap of each scan."""
         return np.array(self._numbers, dtype=np.int64)
 
     @property
     def newest(self) -> int:
-        """The island of the newest scan; that of the map where there is none."""
+        """The submap of the newest scan; that of the map where there is none."""
         return self._numbers[-1] if self._numbers else MAP
 
     @property
@@ -45,7 +45,7 @@ class Islands:
         return self._numbers.index(self.newest) if self.is_apart else 0
 
     def append(self) -> None:
-        """Add a scan to the newest island."""
+        """Add a scan to the newest submap."""
         self._numbers.append(self.newest)
 
     def shorten(self, count: int) -> None:
@@ -53,17 +53,17 @@ class Islands:
         del self._numbers[count:]
 
     def begin(self) -> None:
-        """Let the newest scan begin an island of its own."""
+        """Let the newest scan begin a submap of its own."""
         self._begun += 1
         self._numbers[-1] = self._begun
 
     def join(self) -> None:
-        """Put the newest island into the map, because its place is known now."""
+        """Put the newest submap into the map, because its place is known now."""
         joined = self.newest
         self._numbers = [MAP if number == joined else number for number in self._numbers]
 
     def within(self, pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> Pairs:
-        """Return the comparisons of points of one island; what was in the map before the run is of the map."""
+        """Return the comparisons of points of one submap; what was in the map before the run is of the map."""
         if not any(self._numbers):
             return pairs
         same = self._of(sources.scans[pairs.rows]) == self._of(targets.scans[pairs.neighbours])

@@ -12,7 +12,6 @@ from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
 from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
@@ -90,7 +89,7 @@ class JointSession:
         """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
         parts = self.solver.parameters.parts_per_turn
         newest = slice(-_CHECKED_SCANS * parts, None)
-        estimates, apart = self.solver.estimates, self.solver.islands.apart
+        estimates, apart = self.solver.estimates, self.solver.submaps.apart
         turns = Turns.of(estimates[newest], apart[newest], parts)
         heard = Turns.with_echoes(estimates, apart, parts, self.solver.log.point_counts, _CHECKED_SCANS)
         begin = self.start if len(turns.times) else np.nan
@@ -114,7 +113,7 @@ class JointSession:
         count = solver.log.scan_count // parameters.parts_per_turn
         newest = range(count - len(times), count)
         first = max(newest.start, max(self._shares, default=-1) + 1)
-        found = shares_heard_before(solver.log, solver.odometry, solver.state, parameters, first)
+        found = shares_heard_before(solver.solution, first)
         known = {**self._shares, **dict(zip(range(first, count), found))}
         self._shares = {turn: known[turn] for turn in newest}
         return (scans_go_on(times, np.array([self._shares[turn] for turn in newest])),)
@@ -135,21 +134,17 @@ class JointSession:
         """Learn the odometry up to `time` [s], which `track` holds."""
         self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
 
-    @property
-    def _placement(self) -> SolvedPlacement:
-        return SolvedPlacement(self.solver.log, self.solver.odometry, self.solver.state)
-
     def points(self, cloud: MapCloud) -> np.ndarray:
         """Return the points (n, 4) of a cloud in map, as they are known now."""
-        return self._placement.points(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
+        return self.solver.solution.points(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
 
     def origins(self, cloud: MapCloud) -> np.ndarray:
         """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
-        return self._placement.origins(cloud)
+        return self.solver.solution.origins(cloud)
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
-        return self._placement.path(times)
+        return self.solver.solution.path(times)
 
     @property
     def start(self) -> float:
@@ -172,13 +167,13 @@ class JointSession:
     @property
     def apart_from(self) -> float:
         """Time [s] from which on nobody knows how the scans lie to the map; infinity where it is known of all."""
-        islands = self.solver.islands
-        return float(self.solver.log.node_times[islands.start]) if islands.is_apart else np.inf
+        submaps = self.solver.submaps
+        return float(self.solver.log.node_times[submaps.start]) if submaps.is_apart else np.inf
 
     @property
     def turns_apart(self) -> int:
         """Number of turns of the head that nobody knows the place of in the map."""
-        return int(self.solver.islands.apart.sum()) // self.solver.parameters.parts_per_turn
+        return int(self.solver.submaps.apart.sum()) // self.solver.parameters.parts_per_turn
 
 
 def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:

@@ -168,7 +168,7 @@ def trust(
     calibration: what was found. further: what other checks say.
     """
     solver = replayed.solver
-    parts, apart = solver.parameters.parts_per_turn, solver.islands.apart
+    parts, apart = solver.parameters.parts_per_turn, solver.submaps.apart
     turns = Turns.of(solver.estimates, apart, parts)
     heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
     if refined is None:
@@ -210,7 +210,7 @@ def _going_on(solver: LiveSolver, state: State, ends: np.ndarray) -> Tuple[Verdi
     """Ask whether scans lie on those before them, where the motion between them is unknown."""
     if not np.isinf(solver.odometry.distance_deviation):
         return ()
-    shares = shares_heard_before(solver.log, solver.odometry, state, solver.parameters, 0)
+    shares = shares_heard_before(solver.solution.with_state(state), 0)
     return (scans_go_on(ends, shares),)
 
 

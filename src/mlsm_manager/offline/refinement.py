@@ -14,7 +14,6 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.odometry_profiles import fitted
-from mlsm_manager.localisation.placement import SolvedPlacement
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
@@ -45,7 +44,7 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: Ma
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(MapCloud.of_scan(scan))
-    surfaces.settle(SolvedPlacement(solver.log, solver.odometry, closing.batch.state))
+    surfaces.settle(solver.solution.with_state(closing.batch.state))
     poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
     return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)
 

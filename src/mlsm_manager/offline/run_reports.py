@@ -5,7 +5,6 @@ from typing import Any, Dict, List
 
 import numpy as np
 
-from mlsm_manager.joint_solver.placement import drawn
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording
@@ -126,7 +125,7 @@ def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:
     solver, run = mapped.replayed.solver, mapped.run
     if solver is not None:
         state = solver.state if mapped.refined is None else mapped.refined.batch.state
-        return drawn(solver.log, solver.odometry, state, scan.points, scan.times)[:, :2]
+        return solver.solution.with_state(state).points(scan)[:, :2]
     best = list(run.poses.values())[-1]
     poses = np.column_stack([np.interp(scan.times, run.times, best[:, 0]), np.interp(scan.times, run.times, best[:, 1]),
                              np.interp(scan.times, run.times, np.unwrap(best[:, 2]))])  # fmt: skip

@@ -156,5 +156,5 @@ def may_strafe(ahead: Optional[LiveSolver]) -> bool:
     """Return whether scans do not go on in the run of a solver that expects the vehicle to go ahead."""
     if ahead is None:
         return False
-    shares = shares_heard_before(ahead.log, ahead.odometry, ahead.state, ahead.parameters, 0)
+    shares = shares_heard_before(ahead.solution, 0)
     return scans_go_on(ahead.log.node_times[1:], shares, _WORTH_TRYING).fires

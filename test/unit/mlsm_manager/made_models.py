@@ -8,6 +8,7 @@ from mlsm_manager.joint_solver.motion_models import (
     ThrusterOdometry,
 )
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.velocity_models import (
     HeadingFactors,
     HeadingOdometry,
@@ -37,3 +38,8 @@ UNAIDED = UnaidedFactors(UnaidedOdometry(SPEEDS, 0.05, 10.0, 0.00035))
 def solver_parameters(**values):
     """Return parameters of the joint solver with `values` of some, and the model of a DVL unless another is given."""
     return SolverParameters(**{"odometry": DVL, **values})
+
+
+def solution_of(log, odometry, state):
+    """Return a run whose unknowns are `state`."""
+    return Solution(log, solver_parameters(odometry=odometry), state)

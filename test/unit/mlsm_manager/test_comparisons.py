@@ -7,14 +7,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
-from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solver_parameters
+from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solution_of, solver_parameters
 
 from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, Neighbours, Pairs, summed
 from mlsm_manager.joint_solver.compiled_comparisons import scattered_blocks, weighed_pairs
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
 from mlsm_manager.joint_solver.odometry_log import as_complex
-from mlsm_manager.joint_solver.placement import PlacedPoints, place
+from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.surface_points import ramp
 from node_support.geometry import rotated
 
@@ -94,11 +94,11 @@ def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
 def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
     state, rows = some_state(log), log.rows(0, 3)
     pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
-    before = place(log, MODELS[0], state, rows)
+    before = solution_of(log, MODELS[0], state).placed(rows)
     _, jacobian = linearised(pairs, before, before)
     moved = state.copy()
     moved.nodes[0, column] += STEP
-    after = place(log, MODELS[0], moved, rows)
+    after = solution_of(log, MODELS[0], moved).placed(rows)
     moves = after.places[pairs.rows] - before.places[pairs.rows]
     change = np.einsum("na,na->n", moves, before.normals[pairs.neighbours])
     np.testing.assert_allclose(change / STEP, jacobian[:, column], atol=1e-4)
@@ -127,14 +127,14 @@ def placed_by_numpy(log, odometry, state, rows):
 @pytest.mark.parametrize("delay", [0.0, -1.7, 900.0])
 def test_points_lie_on_the_path_whatever_the_odometry_tells(log, odometry, delay):
     state, rows = some_state(log, odometry, delay), log.rows(1, 3)
-    found = place(log, odometry, state, rows)
+    found = solution_of(log, odometry, state).placed(rows)
     for name, expected in zip(("places", "arms", "normals", "shares"), placed_by_numpy(log, odometry, state, rows)):
         close = SAME * np.abs(expected).max()
         np.testing.assert_allclose(getattr(found, name), expected, rtol=SAME, atol=close, err_msg=name)
 
 
 def test_no_points_lie_nowhere(log):
-    nothing = place(log, MODELS[0], some_state(log), log.rows(0, 0))
+    nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.rows(0, 0))
     assert [len(getattr(nothing, field.name)) for field in fields(nothing)] == [0] * len(fields(nothing))
 
 

@@ -57,13 +57,13 @@ def canal():
 
 def test_a_vehicle_is_found_in_its_own_map(harbour):
     session, truth = harbour
-    assert not session.solver.islands.is_apart
+    assert not session.solver.submaps.is_apart
     assert errors(session, truth)[-3:].max() < 1.5
 
 
 def test_scans_that_heard_nothing_do_not_count_as_beside_the_map(harbour):
     solver = harbour[0].solver
-    turns = Turns.with_echoes(solver.estimates, solver.islands.apart, 1, solver.log.point_counts, 10)
+    turns = Turns.with_echoes(solver.estimates, solver.submaps.apart, 1, solver.log.point_counts, 10)
     assert len(turns.times) == 10
     assert turns.times[0] < BEGIN * TURN < END * TURN - TURN < turns.times[-1]
     assert turns.agreements.min() > 0.9
@@ -72,7 +72,7 @@ def test_scans_that_heard_nothing_do_not_count_as_beside_the_map(harbour):
 def test_a_turn_counts_as_heard_where_one_of_its_parts_was(canal):
     """Of eight turns of three parts, in two no part heard anything."""
     solver = canal[0].solver
-    turns = Turns.with_echoes(solver.estimates, solver.islands.apart, 3, solver.log.point_counts, END)
+    turns = Turns.with_echoes(solver.estimates, solver.submaps.apart, 3, solver.log.point_counts, END)
     assert len(turns.times) == END // 3 - 2
 
 
@@ -96,7 +96,7 @@ def test_a_place_that_could_be_several_is_told_as_unknown(canal):
     """Both walls of a canal look the same everywhere."""
     session, truth = canal
     estimate = session.solver.estimates[-1]
-    assert session.solver.islands.is_apart
+    assert session.solver.submaps.is_apart
     error = errors(session, truth)[-1]
     assert error < 3.0 * np.sqrt(np.trace(estimate.pose_covariance[:2, :2]))
 
@@ -106,19 +106,19 @@ def test_scans_whose_place_is_unknown_are_compared_with_each_other(canal):
     agreements = [estimate.agreement for estimate in session.solver.estimates]
     assert agreements[BEGIN + SILENT] == 0.0
     assert agreements[-1] > 0.5
-    assert session.solver.islands.numbers[BEGIN + SILENT - 1] == MAP
+    assert session.solver.submaps.numbers[BEGIN + SILENT - 1] == MAP
 
 
 def test_a_run_is_stored_with_what_lies_apart(canal):
     session, _ = canal
     again = session.copied().solver
-    np.testing.assert_array_equal(again.islands.numbers, session.solver.islands.numbers)
+    np.testing.assert_array_equal(again.submaps.numbers, session.solver.submaps.numbers)
 
 
-def test_islands_of_another_number_of_scans_are_refused(canal):
+def test_submaps_of_another_number_of_scans_are_refused(canal):
     solver = canal[0].solver
-    stored = {**solver.stored(), "islands": solver.islands.numbers[1:]}
-    with pytest.raises(ValueError, match="islands"):
+    stored = {**solver.stored(), "islands": solver.submaps.numbers[1:]}
+    with pytest.raises(ValueError, match="submaps"):
         LiveSolver.resumed(PARAMETERS, SONAR_IN_BASE, canal[0].scans, stored)
 
 
@@ -157,7 +157,7 @@ def loaded():
 
 def test_the_vehicle_is_found_where_only_the_loaded_map_was_heard(loaded):
     session, _ = loaded
-    assert not session.solver.islands.is_apart
+    assert not session.solver.submaps.is_apart
 
 
 def test_it_is_found_at_the_right_place(loaded):
@@ -168,7 +168,7 @@ def test_it_is_found_at_the_right_place(loaded):
 
 def test_without_the_loaded_map_its_place_is_unknown():
     session, _ = run_in(np.empty((0, 2)))
-    assert session.solver.islands.is_apart
+    assert session.solver.submaps.is_apart
 
 
 BEFORE, SILENCE, SINCE = 10, 5, 3

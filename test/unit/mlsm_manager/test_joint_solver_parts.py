@@ -7,15 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import logged, tour
-from made_models import DVL, DVL_ODOMETRY, solver_parameters
+from made_models import DVL, DVL_ODOMETRY, solution_of, solver_parameters
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
 from mlsm_manager.joint_solver.growing import GrowingArray
-from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_blocks
+from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.motion_models import DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, Layout, NormalEquations, SparseSolution, State
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
-from mlsm_manager.joint_solver.placement import place
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 from mlsm_manager.scan_matching.scan import Track
 
@@ -36,7 +35,7 @@ def some_state(log):
 
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
-    placed = place(log, DVL, some_state(log), log.rows(0, 3))
+    placed = solution_of(log, DVL, some_state(log)).placed(log.rows(0, 3))
     pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, solver_parameters())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
@@ -45,11 +44,11 @@ def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
 @pytest.mark.parametrize("unknown", range(2))
 def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown):
     rows, state = log.rows(0, 3), some_state(log)
-    placed = place(log, DVL, state, rows)
+    placed = solution_of(log, DVL, state).placed(rows)
     moved = state.copy()
     step = 0.01  # delays within one step of the odometry: its path is a polygon
     moved.run[unknown] += step
-    change = (place(log, DVL, moved, rows).places - placed.places) / step
+    change = (solution_of(log, DVL, moved).placed(rows).places - placed.places) / step
     np.testing.assert_allclose(change, placed.by_run[..., unknown], atol=0.5)
     np.testing.assert_allclose(np.median(np.abs(change - placed.by_run[..., unknown])), 0.0, atol=0.03)
 
@@ -90,9 +89,9 @@ def test_at_most_so_many_blocks_count(distances, most):
     assert ((factors >= 0.0) & (factors <= 1.0)).all()
 
 
-def test_a_scan_is_compared_with_the_nearest_blocks_only(log):
+def test_a_scan_is_compared_with_the_nearest_groups_only(log):
     few = replace(solver_parameters(), scans_per_group=1, frozen_scans=2)
-    near = nearest_blocks(log, DVL, some_state(log), 3, np.array([12.0, 0.0]), few)
+    near = nearest_groups(replace(solution_of(log, DVL, some_state(log)), parameters=few), 3, np.array([12.0, 0.0]))
     assert 1 <= len(near.numbers) <= 2
     assert set(near.points.scans) == set(near.numbers)
     assert len(near.importance) == len(near.points)

@@ -10,7 +10,6 @@ from made_models import solver_parameters
 from mlsm_manager.joint_solver.comparisons import Pairs
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.placement import place
 from node_support.geometry import transformed
 
 HARBOUR = tour(4)
@@ -25,7 +24,7 @@ def known_places():
 def pairs_with(known):
     solver = LiveSolver(PARAMETERS, SONAR)
     solver.add(HARBOUR.scans[0])
-    sources = place(solver.log, solver.odometry, solver.state, solver.log.rows(0, 1))
+    sources = solver.solution.placed(solver.log.rows(0, 1))
     return known.compared(sources, 2.2, solver_parameters()), sources
 
 

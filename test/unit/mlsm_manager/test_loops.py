@@ -80,7 +80,7 @@ def test_noise_makes_no_loops():
         return replace(scan, points=points)
 
     solver = followed([noisy(scan) for scan in tour(40).scans])
-    assert loops_of(solver.log, solver.odometry, solver.state, solver.parameters) == []
+    assert loops_of(solver.solution) == []
 
 
 @dear
@@ -98,7 +98,7 @@ def test_a_canal_makes_no_loops():
 
     solver = followed([between_walls(scan) for scan in made.scans])
     batch = solved(solver)
-    assert loops_of(solver.log, solver.odometry, batch.state, solver.parameters) == []
+    assert loops_of(solver.solution.with_state(batch.state)) == []
 
 
 def test_a_loop_that_other_scans_do_not_confirm_is_none():

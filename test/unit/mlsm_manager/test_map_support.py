@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_models import DVL, HEADING, solver_parameters
+from made_models import DVL, HEADING, solution_of
 from made_posts import heard, true_path
 
 from mlsm_manager.joint_solver.map_support import misfit_variances, shares_heard_before
@@ -31,7 +31,7 @@ def measured(measure, log, aside, model=HEADING):
     nodes = np.zeros((log.scan_count + 1, model.width))
     nodes[:, :2] = true_path(log.node_times)
     nodes[:, 1] = aside
-    return measure(log, model, State(nodes, np.zeros(2)), solver_parameters(), 0)
+    return measure(solution_of(log, model, State(nodes, np.zeros(2))), 0)
 
 
 def shares_at(log, step):

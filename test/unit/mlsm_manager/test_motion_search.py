@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from made_harbour import ahead, logged, tour
-from made_models import DVL, HEADING, UNAIDED, solver_parameters
+from made_models import DVL, HEADING, UNAIDED, solution_of
 
 from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import YAW, State
@@ -27,14 +27,14 @@ def state_with(log, model, shift):
 
 def test_a_scan_is_found_metres_from_where_it_was_expected(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
-    found = searched_node(log, HEADING, state_with(log, HEADING, FAR), covariance, solver_parameters())
+    found = searched_node(solution_of(log, HEADING, state_with(log, HEADING, FAR)), covariance)
     assert np.hypot(*found[:2]) < 1.5
     assert np.hypot(*found[3:5]) > 0.05  # a node that is moved has another velocity
 
 
 def test_a_scan_that_is_where_it_was_expected_stays(log):
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3]) ** 2
-    found = searched_node(log, HEADING, state_with(log, HEADING, np.zeros(2)), covariance, solver_parameters())
+    found = searched_node(solution_of(log, HEADING, state_with(log, HEADING, np.zeros(2))), covariance)
     assert np.hypot(*found[:2]) < 1.5
 
 
@@ -45,7 +45,7 @@ def test_a_turn_that_nobody_measured_is_found(log, turn):
     state = state_with(log, unaided, np.array([1.0, 1.0]))
     state.nodes[-1, YAW] = turn
     covariance = np.diag([0.0, 0.0, 0.0, 0.3, 0.3, 0.3, 0.05]) ** 2
-    found = searched_node(log, unaided, state, covariance, solver_parameters())
+    found = searched_node(solution_of(log, unaided, state), covariance)
     assert abs(found[YAW]) < 0.1
     assert np.hypot(*found[:2]) < 1.5
 
@@ -54,8 +54,8 @@ def test_a_motion_that_is_known_is_not_searched(log):
     dvl = DVL
     state = state_with(log, dvl, FAR)
     covariance = np.diag([0.01, 0.01, 0.01, 0.01, 0.01]) ** 2
-    assert searched_node(log, dvl, state, covariance, solver_parameters()) is not None
-    np.testing.assert_array_equal(searched_node(log, dvl, state, covariance, solver_parameters())[:2], FAR)
+    assert searched_node(solution_of(log, dvl, state), covariance) is not None
+    np.testing.assert_array_equal(searched_node(solution_of(log, dvl, state), covariance)[:2], FAR)
 
 
 def test_a_speed_that_is_unknown_makes_a_step_unknown(log):
