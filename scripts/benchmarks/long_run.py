@@ -9,7 +9,6 @@ import numpy as np
 from benchmarks.harness import benchmark_parser
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
 
@@ -71,9 +70,7 @@ def main() -> None:
     parser = benchmark_parser("long_run", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
     scans = parser.parse_args().scans
-    known = ReplayParameters()
-    parameters = known.solver_parameters(known.part(OdometryErrors), known.range_scale_deviation)
-    solver, seconds = LiveSolver(parameters, np.zeros(2)), []
+    solver, seconds = LiveSolver(ReplayParameters().solver_parameters(), np.zeros(2)), []
     for number, scan in enumerate(tour_scans(scans), start=1):
         start = time.process_time()
         estimate = solver.add(scan)

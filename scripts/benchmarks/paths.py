@@ -53,10 +53,7 @@ def replay_input(recording: Recording, kind: OdometryKind, shape: EchoShape) -> 
 def solved_live(recording: Recording, kind: OdometryKind, shape: EchoShape) -> LiveSolver:
     """Return the joint solver after all scans of a recording."""
     scans, parameters = replay_input(recording, kind, shape)
-    solver = LiveSolver(
-        parameters.solver_parameters(),
-        recording.sonar_in_base,
-    )
+    solver = LiveSolver(parameters.solver_parameters(), recording.sonar_in_base)
     for scan in scans:
         solver.add(scan)
     return solver
