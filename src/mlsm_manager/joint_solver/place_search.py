@@ -17,7 +17,7 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.places import (
     FEWEST_POINTS,
     MOST_POINTS,
-    NATS,
+    POINT_WEIGHT,
     REACH,
     Freedom,
     PlaceCandidate,
@@ -37,7 +37,7 @@ _MOTIONS = np.linspace(-2.0, 2.0, 5)  # standard deviations of the motion within
 _ROUNDING = 1e-6  # m^2, keeps a motion that is known from having no variance
 _MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
 _COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
-_POST_NATS = 1.0  # that a point which stands alone is worth where another one stood: there are few
+_POST_WEIGHT = 1.0  # log-likelihood of a point that stands alone where another one stood: there are few
 _FEW_POINTS = 50  # of it, while many turns are compared
 _KNOWN_TURN = 0.1  # rad, deviation: the solver's own steps find turns of less than twice as much
 _TURN_CELL = 0.08  # rad: moves an echo 20 m away by less than twice a cell
@@ -110,7 +110,7 @@ class _Search(NamedTuple):
     own: np.ndarray
 
     def beside(self, state: State, step: np.ndarray, most: int) -> Tuple[float, np.ndarray]:
-        """Return the newest node (width,) at the best place near its own, and what speaks for it [nats].
+        """Return the newest node (width,) at the best place near its own, and its log-likelihood.
 
         step: covariance (width, width) of the node. most: points of the scan that are compared.
         """
@@ -118,9 +118,10 @@ class _Search(NamedTuple):
         sources = solution.placed(self.own[:: max(1, len(self.own) // most)])
         shifts = places_within(step[:2, :2], _MOST_CELLS)
         ends = np.column_stack([np.zeros_like(shifts), shifts])
-        found = NATS * MOST_POINTS / most * map_support(sources, self.targets, moved(sources, ends), parameters)
+        support = map_support(sources, self.targets, moved(sources, ends), parameters)
+        found = POINT_WEIGHT * MOST_POINTS / most * support
         if parameters.post_confidence:
-            found = found + parameters.post_confidence * _POST_NATS * _post_support(solution, ends)
+            found = found + parameters.post_confidence * _POST_WEIGHT * _post_support(solution, ends)
         costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
         best = np.argmax(found - costs)
         node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])

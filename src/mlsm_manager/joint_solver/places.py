@@ -17,8 +17,8 @@ FEWEST_POINTS = 25
 """On surfaces, that a scan must hear to tell a place: fewer fit anywhere."""
 REACH = 3.0
 """Standard deviations of the place within which is searched."""
-NATS = 0.1
-"""That a point on a surface is worth: neighbours share errors."""
+POINT_WEIGHT = 0.1
+"""Log-likelihood of a point on a surface: neighbours share errors."""
 MOST_POINTS = 150
 """Of one scan, that are laid on each place; neighbours on a wall say the same."""
 _FEW_POINTS = 60  # of the scans, where all places are tried
@@ -107,7 +107,7 @@ def best_place(
     shares = map_support(few, targets, moved(few, freedom.ends(shifts)), parameters) / few.qualities.sum()
     found = [_refined(freedom, sources, targets, shift, parameters) for shift in _best_of(shifts, shares)]
     total = sources.qualities.sum()
-    best = int(np.argmax([NATS * share * total - freedom.cost(ends) for ends, share in found]))
+    best = int(np.argmax([POINT_WEIGHT * share * total - freedom.cost(ends) for ends, share in found]))
     ends, fit = found[best]
     others = [share for other, share in found if np.hypot(*(other - ends)[2:]) > _OTHER]
     return PlaceCandidate(

@@ -181,14 +181,17 @@ class DistributionMatcher:
         for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
-                return MatchStatus.AMBIGUOUS, f"the second-best pose is only {lead:.1f} nats worse"
+                return (
+                    MatchStatus.AMBIGUOUS,
+                    f"another pose fits nearly as well: its log-likelihood is only {lead:.1f} less",
+                )
         values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
             return (
                 MatchStatus.AMBIGUOUS,
-                f"a pose beside it, in the least certain direction, is only {lead:.1f} nats worse",
+                f"a pose beside it fits nearly as well: its log-likelihood is only {lead:.1f} less",
             )
         return MatchStatus.CONVERGED, ""
 
