@@ -175,7 +175,8 @@ def run(arguments: argparse.Namespace) -> None:
         graph.wait_for_master()
         rospy.init_node("demo", anonymous=True, disable_signals=True)
         watch = Watch()
-        print(f"demo: {'rviz shows' if show else 'no screen; watch'} the map, {arguments.factor:g} times real time")
+        shown = "rviz shows the map while it grows" if show else "no screen, so without rviz"
+        print(f"demo: {shown}; {arguments.factor:g} times real time", flush=True)
         seconds = follow(graph, watch)
         leave_results(watch, seconds, output)
     finally:
