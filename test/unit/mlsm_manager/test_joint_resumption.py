@@ -35,10 +35,15 @@ def taken(localiser, scans):
 
 @pytest.fixture(scope="module")
 def killed():
-    """Return the localiser that was killed, and what it had saved."""
+    """Return the localiser that was killed."""
     localiser = new_localiser()
     taken(localiser, HARBOUR.scans[:KILLED_AFTER])
-    return localiser, map_of_bytes(map_bytes(localiser.stored("map", {}, 0.0, "run")))
+    return localiser
+
+
+@pytest.fixture(scope="module")
+def stored(killed):
+    return map_of_bytes(map_bytes(killed.stored("map", {}, 0.0, "run")))
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +76,7 @@ def without_a_run(stored):
     return replace(stored, arrays=place)
 
 
-def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed, whole):
-    _, stored = killed
+def test_a_resumed_run_goes_on_as_if_it_had_never_ended(stored, whole):
     halves, (whole, wanted) = resumed(stored), whole
     for one, other in zip(taken(halves, HARBOUR.scans[KILLED_AFTER:]), wanted[KILLED_AFTER:]):
         np.testing.assert_allclose(one.belief.theta, other.belief.theta, atol=1e-9)
@@ -81,34 +85,29 @@ def test_a_resumed_run_goes_on_as_if_it_had_never_ended(killed, whole):
     np.testing.assert_allclose(np.sort(halves.blocks.mean, axis=0), np.sort(whole.blocks.mean, axis=0), atol=1e-4)
 
 
-def test_what_was_stored_stays_as_it_is_while_scans_are_taken(killed):
+def test_what_was_stored_stays_as_it_is_while_scans_are_taken(stored):
     """A file is written from it while the node goes on."""
-    _, saved = killed
-    localiser = resumed(saved)
+    localiser = resumed(stored)
     for scan in HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]:
-        stored = localiser.stored("map", {}, 0.0, "run")
-        before = map_bytes(stored)
+        saved = localiser.stored("map", {}, 0.0, "run")
+        before = map_bytes(saved)
         localiser.take_scan(scan)
-        assert map_bytes(stored) == before
+        assert map_bytes(saved) == before
 
 
-def test_the_newest_scans_of_a_resumed_run_may_still_move(killed):
-    _, stored = killed
+def test_the_newest_scans_of_a_resumed_run_may_still_move(stored):
     localiser = resumed(stored)
     before = localiser.estimator.solver.state.nodes[KILLED_AFTER].copy()
     taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 2])
     assert np.abs(localiser.estimator.solver.state.nodes[KILLED_AFTER] - before).max() > 1e-6
 
 
-def test_a_resumed_map_is_the_one_that_was_saved(killed):
-    localiser, stored = killed
+def test_a_resumed_map_is_the_one_that_was_saved(killed, stored):
     again = resumed(stored)
-    assert again.block_count == localiser.block_count
-    assert again.believed_until == localiser.believed_until
+    assert (again.block_count, again.believed_until) == (killed.block_count, killed.believed_until)
 
 
-def test_a_second_kill_loses_no_more_than_the_first(killed):
-    _, stored = killed
+def test_a_second_kill_loses_no_more_than_the_first(stored):
     once = resumed(stored)
     twice = resumed(map_of_bytes(map_bytes(once.stored("map", {}, 0.0, "run"))))
     one, other = (taken(localiser, HARBOUR.scans[KILLED_AFTER:])[-1] for localiser in (once, twice))
@@ -116,8 +115,7 @@ def test_a_second_kill_loses_no_more_than_the_first(killed):
 
 
 @pytest.mark.parametrize("has_run", [True, False])
-def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(killed, has_run):
-    _, stored = killed
+def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(stored, has_run):
     localiser = resumed(stored if has_run else without_a_run(stored))
     before = localiser.blocks.rows.copy()
     updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]))
@@ -127,8 +125,7 @@ def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(k
 
 
 @pytest.mark.parametrize(("has_run", "goes_on"), [(True, True), (False, False)])
-def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(killed, has_run, goes_on):
-    _, stored = killed
+def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(stored, has_run, goes_on):
     localiser = resumed(stored if has_run else without_a_run(stored))
     (update,) = taken(localiser, [sector_of(HARBOUR.scans[KILLED_AFTER])])
     assert update.accepted == goes_on
@@ -136,8 +133,8 @@ def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(
     assert not goes_on or np.hypot(*(update.belief.theta[:2] - true_place[:2])) < 0.5
 
 
-def test_a_run_goes_on_with_a_scan_whose_first_half_lacks_odometry(killed, whole):
-    (_, stored), (_, wanted) = killed, whole
+def test_a_run_goes_on_with_a_scan_whose_first_half_lacks_odometry(stored, whole):
+    _, wanted = whole
     localiser, scan = resumed(stored), HARBOUR.scans[KILLED_AFTER]
     known = scan.track.times > scan.reference_time - TURN / 2.0
     track = localiser.bridged(Track(scan.track.times[known], scan.track.poses[known]))
@@ -146,8 +143,7 @@ def test_a_run_goes_on_with_a_scan_whose_first_half_lacks_odometry(killed, whole
     np.testing.assert_allclose(update.belief.theta[:2], wanted[KILLED_AFTER].belief.theta[:2], atol=0.1)
 
 
-def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(killed):
-    _, stored = killed
+def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(stored):
     localiser = resumed(stored)
     silent, heard = HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 2]
     updates = taken(localiser, [sector_of(silent, beams=0), heard])
@@ -156,8 +152,8 @@ def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(k
 
 @pytest.mark.newest_only("dear; test_localiser relocalises with every version")
 @pytest.mark.parametrize("has_run", [True, False])
-def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, whole, has_run):
-    (before, stored), (whole, wanted) = killed, whole
+def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, stored, whole, has_run):
+    whole, wanted = whole
     localiser = resumed(stored if has_run else without_a_run(stored))
     updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER:]))
     assert updates[3].accepted
@@ -165,12 +161,11 @@ def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, whole,
     np.testing.assert_allclose(updates[-1].belief.theta[:2], wanted[-1].belief.theta[:2], atol=0.5)
     walls = {tuple(cell) for cell in whole.blocks.cells.tolist()}
     beside = sum(tuple(cell) not in walls for cell in localiser.blocks.cells.tolist())
-    assert beside < 0.2 * before.block_count
+    assert beside < 0.2 * killed.block_count
 
 
 @pytest.mark.newest_only("dear; test_localiser relocalises with every version")
-def test_a_loaded_map_is_not_written_into_before_the_vehicle_is_found(killed):
-    _, stored = killed
+def test_a_loaded_map_is_not_written_into_before_the_vehicle_is_found(stored):
     localiser = resumed(stored, same_odometry=False)
     rng, last = np.random.RandomState(0), HARBOUR.scans[-1]
     places = np.column_stack([rng.uniform(-25.0, 25.0, (len(last), 2)), last.points[:, 2:]])
@@ -180,8 +175,7 @@ def test_a_loaded_map_is_not_written_into_before_the_vehicle_is_found(killed):
     np.testing.assert_array_equal(localiser.blocks.rows, before)
 
 
-def test_a_jump_in_time_after_the_start_makes_the_place_unknown(killed):
-    _, stored = killed
+def test_a_jump_in_time_after_the_start_makes_the_place_unknown(stored):
     localiser = resumed(stored)
     localiser.notice_time(0.0)
     assert localiser.is_lost
@@ -196,16 +190,14 @@ def test_a_jump_in_time_after_the_start_makes_the_place_unknown(killed):
         ("run.solver.estimate.time", np.zeros(2)),
     ],
 )
-def test_a_run_that_does_not_fit_leaves_the_map_alone(killed, name, array):
-    _, stored = killed
+def test_a_run_that_does_not_fit_leaves_the_map_alone(stored, name, array):
     localiser = resumed(replace(stored, arrays={**stored.arrays, name: array}))
     assert localiser.estimator.solver is None
     assert localiser.block_count == len(stored.shown)
     assert taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 1])[0].accepted
 
 
-def test_a_run_with_another_odometry_profile_is_refused(killed):
-    _, stored = killed
+def test_a_run_with_another_odometry_profile_is_refused(stored):
     other = PARAMETERS.changed({"odometry": "THRUSTERS"}).build_localiser(SONAR_IN_BASE)
     told = "it was stored with another odometry profile: DvlFactors, not ThrusterFactors"
     assert other.restore(stored, same_odometry=True) == told
@@ -224,5 +216,4 @@ def test_two_profiles_with_as_many_unknowns_are_told_apart():
 
 
 def test_a_run_is_only_stored_for_the_run_of_the_graph_that_can_go_on_with_it(killed):
-    localiser, _ = killed
-    assert not any(name.startswith("run.") for name in localiser.stored("map", {}, 0.0, "").arrays)
+    assert not any(name.startswith("run.") for name in killed.stored("map", {}, 0.0, "").arrays)

@@ -37,11 +37,6 @@ def history_of(*stretches):
     return history
 
 
-def test_before_any_belief_the_correction_is_none():
-    correction = LiveCorrection(1.0)
-    np.testing.assert_array_equal(correction.sample(0.0, np.array([3.0, 2.0, 1.0])), np.zeros(3))
-
-
 @given(st.floats(-5.0, 5.0), st.floats(-5.0, 5.0), st.floats(-3.0, 3.0))
 def test_after_the_blend_the_pose_is_the_believed_one(x, y, yaw):
     correction = LiveCorrection(1.0)
@@ -135,8 +130,9 @@ def test_a_time_that_does_not_increase_changes_nothing():
     np.testing.assert_array_equal(correction.sample(TIMES[5], np.ones(3)), expected)
 
 
-def test_clear_forgets_what_was_before_a_jump_of_time():
+def test_before_any_belief_and_after_clear_the_correction_is_none():
     correction = LiveCorrection(1.0)
+    np.testing.assert_array_equal(correction.sample(0.0, np.array([3.0, 2.0, 1.0])), np.zeros(3))
     correction.believe(belief_of(100.0, [5.0, 0.0, 0.0]))
     correction.sample(100.5, np.zeros(3))
     correction.clear()

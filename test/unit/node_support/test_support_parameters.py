@@ -1,14 +1,17 @@
-"""Which values a parameter set takes, and what it says of the others."""
+"""Which values a parameter set takes, from where, and what it says of itself and of other values."""
 
 import dataclasses
 import math
 
 import pytest
+import yaml
 from example_parameters import Color, ExampleParameters
 from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support import parameters as parameters_module
+from node_support.parameter_files import assigned_values, read_values
+from node_support.parameter_text import default_yaml, markdown_table
 from node_support.parameters import ParameterError, describe, with_defaults
 
 RADIUS = "must be a number from 0 to 10 m"
@@ -164,3 +167,80 @@ def test_a_derived_set_has_other_defaults_and_the_same_parameters():
 def test_a_default_that_is_not_allowed_is_refused(defaults):
     with pytest.raises(ParameterError, match=next(iter(defaults))):
         with_defaults(**defaults)(type("Derived", (ExampleParameters,), {}))
+
+
+@pytest.fixture
+def text():
+    return default_yaml("example", ExampleParameters)
+
+
+def test_the_default_yaml_is_yaml_that_makes_the_defaults(text):
+    assert yaml.safe_load(text) == ExampleParameters.nested(ExampleParameters().to_mapping())
+    assert ExampleParameters.from_mapping(yaml.safe_load(text)) == ExampleParameters()
+
+
+def test_every_key_comes_after_its_meaning_what_is_allowed_and_its_thesis_name(text):
+    assert "# how far *\n#   a number from 0 to 10 m; thesis: minRadius\nradius: 1.5\n" in text
+
+
+def test_keys_that_only_the_start_can_set_have_no_star(text):
+    assert '# which frame\n#   a non-empty string\nframe: "odom"\n' in text
+
+
+def test_what_is_for_experts_stands_under_a_key_of_its_own_with_the_reason_for_its_default(text):
+    assert text.endswith(
+        "expert:\n\n  # how fine *\n  #   a number from 0\n  #   default: a tenth is fine enough\n  step: 0.1\n"
+    )
+
+
+def test_the_table_names_what_is_for_experts_last():
+    row = markdown_table(ExampleParameters).splitlines()[-1]
+    assert row == (
+        "| `expert/step` * | float | `0.1` | a number from 0 |  |  | how fine. Default: a tenth is fine enough |"
+    )
+
+
+def test_choices_are_named(text):
+    assert '#   one of red, deep+blue\ncolor: "red"\n' in text
+
+
+def test_the_table_has_a_row_of_seven_cells_for_every_parameter():
+    rows = markdown_table(ExampleParameters).splitlines()
+    assert len(rows) == 2 + len(ExampleParameters().to_mapping())
+    assert {row.count("|") for row in rows} == {8}
+
+
+def test_a_row_holds_name_type_default_range_unit_thesis_name_and_meaning():
+    assert "| `radius` * | float | `1.5` | a number from 0 to 10 | m | minRadius | how far |" in markdown_table(
+        ExampleParameters
+    )
+
+
+def test_a_file_gives_its_values_by_their_keys(tmp_path):
+    (tmp_path / "own.yaml").write_text("resolution: 0.1\nsonar: {rays: 15}\n")
+    assert read_values(tmp_path / "own.yaml") == {"resolution": 0.1, "sonar": {"rays": 15}}
+
+
+@pytest.mark.parametrize(
+    ("content", "fault"),
+    [(b"a: [", "not yaml"), (b"\xff", "not yaml"), (b"- 1", "must hold lines of KEY: VALUE"), (b"", "must hold lines")],
+)
+def test_a_file_without_values_is_refused_by_its_name(tmp_path, content, fault):
+    (tmp_path / "own.yaml").write_bytes(content)
+    with pytest.raises(ParameterError, match=rf"own\.yaml: {fault}"):
+        read_values(tmp_path / "own.yaml")
+
+
+def test_a_missing_file_is_refused_by_its_name(tmp_path):
+    with pytest.raises(ParameterError, match=r"own\.yaml: No such file"):
+        read_values(tmp_path / "own.yaml")
+
+
+def test_of_several_values_for_one_key_the_last_one_counts():
+    assert assigned_values(["seed=1", "name=a=b", "seed=2"]) == {"seed": 2, "name": "a=b"}
+
+
+@pytest.mark.parametrize("text", ["seed", "=1", "", "seed=["])
+def test_a_text_without_key_or_value_is_refused(text):
+    with pytest.raises(ParameterError, match="--set"):
+        assigned_values([text])
