@@ -9,7 +9,7 @@ from mlsm_manager.hovering.echoes import Echoes
 from mlsm_manager.hovering.particle_filter import ParticleFilter, on_path
 from mlsm_manager.hovering.path_agreement import log_likelihood
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
-from mlsm_manager.joint_solver.batch_solver import BatchResult, settled, solved
+from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_path, solved
 from mlsm_manager.joint_solver.estimate import misfit_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
@@ -58,7 +58,7 @@ def _shift_search(live: LiveSolver) -> ShiftSearch:
     echoes = Echoes.of_run(log, parameters)
 
     def refit(path: np.ndarray) -> np.ndarray:
-        return _path(live, settled(live, _on_path(live, path)))
+        return _path(live, fit_path(live, _on_path(live, path)))
 
     return ShiftSearch(echoes, log.node_times.copy(), parameters.parts_per_turn, refit)
 
@@ -72,7 +72,7 @@ def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], lea
         return []
     best = [stretched_mean(search, climbed[0].path), *climbed[1:]]
     starts = [_on_path(live, one.path) for one in best]
-    return [solved(live, start=start, told=start) for start in starts]
+    return [solved(live, start=start, fixed_steps=start) for start in starts]
 
 
 def _on_path(live: LiveSolver, path: np.ndarray) -> State:

@@ -21,14 +21,13 @@ from mlsm_manager.joint_solver.normal_equations import (
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
-from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.submaps import Submaps
+from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
-_CONVINCING = 10.0  # nats by which a run with loops must fit better
-_TOLD_STEP = 0.3  # m: deviation of a step of a path that is told, within which scans then find their places
+_CONVINCING = 10.0  # of log likelihood, by which a run with loops must fit better
+_FIXED_STEP = 0.3  # m: deviation of a step of a path that is fixed, within which scans then find their places
 _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
 
@@ -61,10 +60,10 @@ class PartResult:
 
 
 @dataclass(frozen=True)
-class Closed:
+class LoopClosure:
     """batch: the fit that the run speaks for. loops: places visited again that it goes back to; none where it does not.
 
-    gain: nats by which the run speaks for the fit with loops, less if below 0; NaN where none was found.
+    gain: of log likelihood, of the fit with loops over the one without; NaN where none was found.
     """
 
     batch: BatchResult
@@ -79,48 +78,50 @@ class Closed:
         }
 
 
-def closed(live: LiveSolver, batch: BatchResult) -> Closed:
+def with_loops_closed(live: LiveSolver, batch: BatchResult) -> LoopClosure:
     """Return the fit with places visited again that their shape tells, if the run fits better so than in `batch`.
 
     What was found only pulls the run near; where it ends, comparisons of echoes and the odometry say alone.
     """
     loops = loops_of(live.solution.with_state(batch.state))
     if not loops:
-        return Closed(batch, [], np.nan)
+        return LoopClosure(batch, [], np.nan)
     problem = _Batch(live.solution.with_state(batch.state.copy()), loops)
     for _ in range(_PULLED_STEPS):
         problem.step()
     other = solved(live, start=problem.state)
-    without, with_loops = (_Batch(live.solution.with_state(some.state.copy())).evidence() for some in (batch, other))
+    without, with_loops = (
+        _Batch(live.solution.with_state(some.state.copy())).log_likelihood() for some in (batch, other)
+    )
     gain = with_loops - without
-    return Closed(other, loops, gain) if gain > _CONVINCING else Closed(batch, [], gain)
+    return LoopClosure(other, loops, gain) if gain > _CONVINCING else LoopClosure(batch, [], gain)
 
 
 def solved(
     live: LiveSolver,
     parameters: Optional[SolverParameters] = None,
     start: Optional[State] = None,
-    told: Optional[State] = None,
+    fixed_steps: Optional[State] = None,
 ) -> BatchResult:
     """Return the fit of all scans that `live` has taken; its own state stays as it is.
 
-    parameters, start: others than those of `live`, with the same odometry. told: unknowns whose
-    steps are known to _TOLD_STEP; None where none are.
+    parameters, start: others than those of `live`, with the same odometry. fixed_steps: unknowns whose
+    steps are known to _FIXED_STEP; None where none are.
     """
     parameters, start = parameters or live.parameters, start or live.state
-    problem = _Batch(replace(live.solution, parameters=parameters, state=start.copy()), told=told)
+    problem = _Batch(replace(live.solution, parameters=parameters, state=start.copy()), fixed_steps=fixed_steps)
     steps, converged = problem.converge()
     poses, run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(live, problem.state))
     return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
 
 
-def settled(live: LiveSolver, start: State) -> State:
-    """Return the unknowns of the fit that begins at `start` and takes its steps for told, without covariances.
+def fit_path(live: LiveSolver, start: State) -> State:
+    """Return the unknowns of the fit that begins at `start` and keeps its steps, without covariances.
 
-    Where next to nothing tells the way along a wall, a fit that is not told creeps to a standstill there.
+    Where next to nothing tells the way along a wall, a fit without fixed steps creeps to a standstill there.
     """
-    problem = _Batch(live.solution.with_state(start.copy()), told=start)
+    problem = _Batch(live.solution.with_state(start.copy()), fixed_steps=start)
     problem.converge()
     return problem.state
 
@@ -146,12 +147,12 @@ def _misfit(live: LiveSolver, state: State) -> np.ndarray:
 
 
 class _Batch:
-    def __init__(self, solution: Solution, loops: Sequence[Loop] = (), told: Optional[State] = None) -> None:
+    def __init__(self, solution: Solution, loops: Sequence[Loop] = (), fixed_steps: Optional[State] = None) -> None:
         log, odometry, self.state = solution.log, solution.odometry, solution.state
         self._run, self._odometry, self._parameters = solution, odometry, solution.parameters
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
-        self._loops, self._start, self._told = list(loops), self.state.copy(), told
+        self._loops, self._start, self._fixed_steps = list(loops), self.state.copy(), fixed_steps
         self._solution = None
         self._move = np.zeros(self._layout.size)
         self._lists: Optional[Neighbours] = None
@@ -180,8 +181,8 @@ class _Batch:
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
-    def evidence(self) -> float:
-        """Return how much [nats] comparisons and odometry speak for the state: echoes on surfaces less odd motions."""
+    def log_likelihood(self) -> float:
+        """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""
         points, pairs = self._met()
         on_surfaces = support(pairs, points, points, self._parameters)
         return on_surfaces - 0.5 * self._expected().cost
@@ -195,9 +196,9 @@ class _Batch:
             self._layout.run_start, self.state.run, self._parameters.run_mean, self._parameters.run_deviations
         )
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
-        if self._told is not None:
-            now, told = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._told))
-            _add_fixed_steps(equations, self._layout, now, told)
+        if self._fixed_steps is not None:
+            now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
+            _add_fixed_steps(equations, self._layout, now, fixed)
         return equations
 
     def _met(self) -> Tuple[PlacedPoints, Pairs]:
@@ -244,11 +245,11 @@ class _Batch:
         return self._solution.solve(unit)
 
 
-def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndarray, told: np.ndarray) -> None:
-    """Add that steps between all nodes, now at `places` (n, 2) [m] in map, are those of the path `told` (n, 2)."""
+def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndarray, fixed: np.ndarray) -> None:
+    """Add that steps between all nodes, now at `places` (n, 2) [m] in map, are those of the path `fixed` (n, 2)."""
     count = len(places) - 1
     columns = layout.pose_columns(np.column_stack([np.arange(count), np.arange(count) + 1]))
-    errors = np.diff(places - told, axis=0)
+    errors = np.diff(places - fixed, axis=0)
     for axis in (0, 1):
         jacobian = np.tile([-1.0, 1.0], (count, 1))
-        equations.add(columns[:, :, axis], jacobian, errors[:, axis], np.full(count, _TOLD_STEP**-2.0))
+        equations.add(columns[:, :, axis], jacobian, errors[:, axis], np.full(count, _FIXED_STEP**-2.0))

@@ -1,4 +1,7 @@
-"""Which points are compared with which: each with the nearest ones of other scans in every block of scans."""
+"""Comparisons of points with surfaces that other scans heard: which count, how much, what they say of the unknowns.
+
+A point is compared with its nearest neighbours in every group of scans.
+"""
 
 from dataclasses import dataclass, replace
 from typing import Tuple
@@ -19,18 +22,18 @@ be decided by the last bit where two are equally near. More would compare each p
 
 
 class Neighbours:
-    """Finds for each point and each block of scans the nearest points of other scans."""
+    """Finds for each point and each group of scans the nearest points of other scans."""
 
     def __init__(self, targets: PlacedPoints, group_scans: int) -> None:
         """targets: ascending by scan; every `group_scans` scans of them are searched together."""
-        _, blocks = np.unique(targets.scans // group_scans, return_inverse=True)
-        self._blocks = blocks.astype(np.int64)
-        self._count = int(blocks[-1]) + 1 if len(blocks) else 0
+        _, groups = np.unique(targets.scans // group_scans, return_inverse=True)
+        self._groups = groups.astype(np.int64)
+        self._count = int(groups[-1]) + 1 if len(groups) else 0
 
     def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
         """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
 
-        For each source and each block of scans these are the nearest targets of other scans, and their shares add up
+        For each source and each group of scans these are the nearest targets of other scans, and their shares add up
         to 1. targets: those of the beginning, perhaps moved. Raises ValueError for places that are not finite.
         """
         if not len(sources) or not len(targets):
@@ -44,7 +47,7 @@ class Neighbours:
         cells = Cells(*sorted_into_cells(places, other_places, cut + TIE))
         return shared_neighbours(
             places, np.ascontiguousarray(sources.scans), other_places, np.ascontiguousarray(targets.scans),
-            self._blocks, self._count, cut, TIE, *cells,
+            self._groups, self._count, cut, TIE, *cells,
         )  # fmt: skip
 
 
@@ -80,9 +83,9 @@ class Pairs:
 def pairs_of(
     lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, parameters: SolverParameters
 ) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets` that count.
+    """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets` that count.
 
-    Points of one scan are never compared with each other, nor surfaces that face different ways. In its own block, a
+    Points of one scan are never compared with each other, nor surfaces that face different ways. In its own group, a
     point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
     """
     normals, other_normals = (np.ascontiguousarray(points.normals) for points in (sources, targets))
@@ -121,7 +124,7 @@ def add_comparisons(
         # The parts of a turn together hear walls on all sides, each part alone perhaps one.
         turns = scans // parameters.parts_per_turn
         information, gradient = discounted(information, gradient, turns, _PLACES, parameters.normal_deviation)
-    equations.add_blocks(_columns(scans, other_scans, layout), information, gradient)
+    equations.add_terms(_columns(scans, other_scans, layout), information, gradient)
     return len(pairs.rows)
 
 
@@ -156,7 +159,7 @@ def _packed(points: PlacedPoints) -> np.ndarray:
 
 
 def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters) -> float:
-    """Return how much [nats] comparisons speak for the places of points: what the kernel leaves of each at most."""
+    """Return the log likelihood of the places of points by their comparisons: what the robust kernel leaves of each."""
     i, j = pairs.rows, pairs.neighbours
     residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
     ratio = residual**2 / parameters.variances(sources.slants[i], targets.slants[j])

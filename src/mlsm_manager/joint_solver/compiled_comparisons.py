@@ -1,7 +1,7 @@
-"""How much comparisons count, in a compiled loop: as in `association` but for rounding.
+"""The compiled loops that weigh comparisons, sum them for each pair of scans, and add the sums for all unknowns.
 
-It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Raises
-ImportError without numba.
+They are compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Points are
+rows as `comparisons` packs them.
 """
 
 import numpy as np
@@ -170,7 +170,7 @@ def summed_comparisons(
 
 
 @compiled("void(f8[:,::1], i8[:,::1], f8[:,:,::1])")
-def scattered_blocks(matrix, columns, blocks):
+def scattered_terms(matrix, columns, blocks):
     """Add blocks (m, c, c) to a matrix (n, n) in their columns (m, c)."""
     for number in range(len(columns)):
         for row in range(columns.shape[1]):

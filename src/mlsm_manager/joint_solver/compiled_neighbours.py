@@ -1,7 +1,8 @@
-"""Points in the order of square cells, in compiled loops.
+"""The compiled search for the nearest points of each group of scans.
 
-They are compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Python calls
-them, no compiled loop of another file does: numba's cache would not notice a change. Raises ImportError without numba.
+Points are sorted into square cells. Sources of one small cell have nearly the same neighbours: what may be one of
+theirs is gathered once for all of them. The loops are compiled, or read from the cache on disk, when this module is
+imported: never while a scan waits.
 """
 
 from collections import namedtuple

@@ -1,7 +1,6 @@
-"""Where points lie in the map, in a compiled loop: as in `placement` but for rounding.
+"""Where points lie in the map, in a compiled loop.
 
-It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits. Raises
-ImportError without numba.
+It is compiled, or read from the cache on disk, when this module is imported: never while a scan waits.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""What the live solver knows when a scan has ended."""
+"""What the live solver knows when a scan has ended: of one scan, of whole turns of the head, and as arrays to store."""
 
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Dict, List, Mapping, NamedTuple, Sequence

@@ -1,4 +1,4 @@
-"""What the live solver has found of all nodes, and of the unknowns of the whole run."""
+"""Follows the vehicle scan by scan: the newest nodes are free, what is older stays where it was found."""
 
 from dataclasses import replace
 from typing import Dict, List, Mapping, Optional, Sequence
@@ -6,18 +6,17 @@ from typing import Dict, List, Mapping, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, stacked, unstacked
-from mlsm_manager.joint_solver.growing import GrowingArray
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_window import LiveWindow
 from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, State
+from mlsm_manager.joint_solver.odometry_log import GrowingArray
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.run_log import RunLog, parts_of
-from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.submaps import Submaps
+from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 

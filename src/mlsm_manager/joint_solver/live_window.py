@@ -1,4 +1,4 @@
-"""Older scans that no longer move: the nearest blocks of them, what they say and how certain they are."""
+"""The problem of one scan: the newest nodes against each other and against the nearest groups of frozen scans."""
 
 from dataclasses import dataclass
 from typing import Iterator, List, Optional, Sequence, Tuple
@@ -172,7 +172,7 @@ class LiveWindow:
             weight = deviations[POSE] ** -2.0
             cross = np.zeros((POSE_COLUMNS, 2, 2))
             cross[:, 0, 1] = cross[:, 1, 0] = -weight
-            equations.add_blocks(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
+            equations.add_terms(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
 
     def _beliefs(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         """Return mean and deviations of the first free node and of the run's unknowns.

@@ -12,7 +12,7 @@ import scipy.linalg
 import scipy.sparse
 import scipy.sparse.linalg
 
-from mlsm_manager.joint_solver.compiled_comparisons import scattered_blocks
+from mlsm_manager.joint_solver.compiled_comparisons import scattered_terms
 
 X, Y, YAW = range(3)
 POSE = slice(0, 3)
@@ -91,7 +91,7 @@ class NormalEquations:
         self.gradient = np.zeros(size)
         self.cost = 0.0
         self._columns = []
-        self._blocks = []
+        self._terms = []
 
     def add(self, columns: np.ndarray, jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> None:
         """Add m residuals of c columns each.
@@ -100,7 +100,7 @@ class NormalEquations:
         residual, weight: (m,); the weight is the inverse of the variance.
         """
         weighted = weight[:, np.newaxis] * jacobian
-        self.add_blocks(
+        self.add_terms(
             columns, weighted[:, :, np.newaxis] * jacobian[:, np.newaxis], weighted * residual[:, np.newaxis]
         )
         self.cost += float(np.sum(weight * residual**2))
@@ -111,13 +111,13 @@ class NormalEquations:
         weight = np.maximum(deviation, _HELD_DEVIATION) ** -2.0
         self.add(columns, np.ones((len(value), 1)), value - mean, weight)
 
-    def add_blocks(self, columns: np.ndarray, information: np.ndarray, gradient: np.ndarray) -> None:
+    def add_terms(self, columns: np.ndarray, information: np.ndarray, gradient: np.ndarray) -> None:
         """Add m sums: columns (m, c) as in `add`, information (m, c, c), gradient (m, c)."""
         columns = np.where(columns < 0, self._columns_end, columns)
         summed = np.bincount(columns.ravel(), gradient.ravel(), self._columns_end + 1)[: self.size]
         self.gradient = self.gradient + summed
         self._columns.append(columns)
-        self._blocks.append(information)
+        self._terms.append(information)
 
     def dense(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return the information of the free unknowns (size, size), and that between them and the held ones.
@@ -126,8 +126,8 @@ class NormalEquations:
         """
         side = self._columns_end + 1
         result = np.zeros((side, side))
-        for columns, blocks in zip(self._columns, self._blocks):
-            scattered_blocks(result, np.ascontiguousarray(columns), np.ascontiguousarray(blocks))
+        for columns, terms in zip(self._columns, self._terms):
+            scattered_terms(result, np.ascontiguousarray(columns), np.ascontiguousarray(terms))
         result = result[: self.size, : self._columns_end]
         result[np.diag_indices(self.size)] += _REGULARISATION
         return result[:, : self.size], result[:, self.size :].copy()
@@ -137,7 +137,7 @@ class NormalEquations:
         side = self._columns_end + 1
         rows = [np.repeat(columns, columns.shape[1], axis=1).ravel() for columns in self._columns]
         across = [np.tile(columns, (1, columns.shape[1])).ravel() for columns in self._columns]
-        values = np.concatenate([block.ravel() for block in self._blocks])
+        values = np.concatenate([term.ravel() for term in self._terms])
         places = (np.concatenate(rows), np.concatenate(across))
         whole = scipy.sparse.coo_matrix((values, places), (side, side)).tocsc()
         return (whole[: self.size, : self.size] + _REGULARISATION * scipy.sparse.eye(self.size)).tocsc()

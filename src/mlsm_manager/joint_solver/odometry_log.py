@@ -5,11 +5,45 @@ from typing import Union
 
 import numpy as np
 
-from mlsm_manager.joint_solver.growing import GrowingArray
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse
 
+_FIRST_CAPACITY = 256
 _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
+
+
+class GrowingArray:
+    """Rows of one shape, appended at constant cost per row.
+
+    values: (n, ...) view of those that were appended, valid until the next change.
+    """
+
+    def __init__(self, *shape: int) -> None:
+        self._rows = np.empty((_FIRST_CAPACITY, *shape))
+        self.values = self._rows[:0]
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def replace_from(self, start: int, rows: np.ndarray) -> None:
+        """Put rows (m, ...) in place of those from `start` on."""
+        self.shorten(start)
+        self.extend(rows)
+
+    def shorten(self, count: int) -> None:
+        """Keep the first `count` rows."""
+        self.values = self.values[:count]
+
+    def extend(self, rows: np.ndarray) -> None:
+        """Append rows (m, ...)."""
+        before = len(self.values)
+        count = before + len(rows)
+        if count > len(self._rows):
+            larger = np.empty((max(count, 2 * len(self._rows)), *self._rows.shape[1:]))
+            larger[:before] = self.values
+            self._rows = larger
+        self._rows[before:count] = rows
+        self.values = self._rows[:count]
 
 
 @dataclass(frozen=True)

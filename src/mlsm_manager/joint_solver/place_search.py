@@ -27,8 +27,7 @@ from mlsm_manager.joint_solver.places import (
     places_within,
 )
 from mlsm_manager.joint_solver.run_log import RunLog
-from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.submaps import MAP
+from mlsm_manager.joint_solver.solution import MAP, Solution
 
 _KNOWN = 2.0  # deviations of the motion within the cut, and the solver's own steps do
 _SUBMAP_SCANS = 6  # the newest ones of a submap that are looked for: older ones may lie in water that the map has not
@@ -144,7 +143,7 @@ class _Search(NamedTuple):
 
 
 def _post_support(solution: Solution, ends: np.ndarray) -> np.ndarray:
-    """Return how many of the newest scan's lone points (k,) lie on earlier ones at `ends` (k, 4); see moved."""
+    """Return how many of the newest scan's echoes of posts (k,) lie on earlier ones at `ends` (k, 4); see moved."""
     last, rows = solution.log.scan_count, solution.log.posts.rows
     sources = solution.placed_posts(rows(last - 1, last))
     targets = solution.placed_posts(rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))

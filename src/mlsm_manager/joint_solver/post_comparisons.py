@@ -21,10 +21,12 @@ class PostComparisons:
 
     def __init__(self, solution: Solution, scans: np.ndarray, importance: np.ndarray) -> None:
         """scans: (s,) those in view, ascending. importance: (s,) factors of what is compared with them."""
+        confidence = solution.parameters.post_confidence
+        scans, importance = (scans, importance) if confidence else (scans[:0], importance[:0])
         rows = [solution.log.posts.rows(scan, scan + 1) for scan in scans]
         self._rows = np.concatenate([np.empty(0, dtype=np.int64), *rows])
-        self._importance = solution.parameters.post_confidence * np.repeat(importance, [len(own) for own in rows])
-        self._parameters = replace(solution.parameters, normal_deviation=0.0)
+        self._importance = confidence * np.repeat(importance, [len(own) for own in rows])
+        self._parameters = replace(solution.parameters, normal_deviation=0.0) if confidence else solution.parameters
         self._lists: Optional[Neighbours] = None
 
     def add(self, equations: NormalEquations, layout: Layout, solution: Solution, cut: float) -> int:
@@ -46,7 +48,7 @@ class PostComparisons:
 def post_pairs(
     lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
 ) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each block of `targets`.
+    """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets`.
 
     A point counts if several of the `near_in_time` scans before and after its own heard one there too. Clutter meets
     clutter by chance, and would say that nothing moves.

@@ -1,13 +1,12 @@
-"""Points of scans, appended scan by scan."""
+"""What was measured during a run: surface points of every scan, the nodes' times and the odometry."""
 
 from dataclasses import fields
 from typing import List, Optional
 
 import numpy as np
 
-from mlsm_manager.joint_solver.growing import GrowingArray
-from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, lone_points
+from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
@@ -102,7 +101,7 @@ class RunLog:
         Raises RefusedInput for a scan that does not end later than the one before.
         """
         points = SurfacePoints.of(scan, self.sonar_in_base)
-        lone = lone_points(scan, self.sonar_in_base, points)
+        posts = post_points(scan, self.sonar_in_base, points)
         if not len(self._node_times):
             self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
         newest = self.node_times[-1]
@@ -113,7 +112,7 @@ class RunLog:
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
         self._surfaces.append(points)
-        self.posts.append(lone)
+        self.posts.append(posts)
 
     def remove_newest(self) -> None:
         """Take back the last `append`, as if that scan had not been."""

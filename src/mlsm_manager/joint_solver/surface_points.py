@@ -1,4 +1,4 @@
-"""Points of a scan that lie on a surface, as the sonar heard them: range, bearing and the surface's normal."""
+"""Points of a scan on surfaces, or alone as of posts: range, bearing and normal as the sonar heard them."""
 
 from dataclasses import dataclass, fields
 from typing import Sequence, Tuple
@@ -136,11 +136,11 @@ _ASKEW = 0.1  # rad by which the line of a wall may be turned
 _STRONG = 1.5  # times Otsu's threshold of a scan: from there on an echo that stands alone is no speckle
 _MISTAKEN = (3.0, 12.0)  # m: from what is heard together in all scans to how far a vehicle goes in a turn of the head
 _OTHERS = (1.0, 0.3)
-"""Lone points within these distances of each, on average: from too many to few enough. With (1.5, 0.5) clutter in a
+"""Echoes of posts within these distances of each, on average: from too many to few enough. With (1.5, 0.5) clutter in a
 simulated canal was taken for posts in one of three runs; with these in none of six."""
 
 
-def lone_points(scan: Scan, sonar_in_base: np.ndarray, surfaces: SurfacePoints) -> SurfacePoints:
+def post_points(scan: Scan, sonar_in_base: np.ndarray, surfaces: SurfacePoints) -> SurfacePoints:
     """Return the strong points of a scan that too few others surround for a line; their normals are the lines of sight.
 
     sonar_in_base: (2,) m, where the sonar is in base_link. surfaces: the points of the scan that lie on surfaces. The
@@ -163,16 +163,16 @@ def lone_points(scan: Scan, sonar_in_base: np.ndarray, surfaces: SurfacePoints) 
 
 
 def _distinctness(places: np.ndarray, qualities: np.ndarray) -> float:
-    """Return how much a scan's lone points count, 0 to 1: where many stand together, each may be taken for another.
+    """Return how much a scan's echoes of posts count, 0 to 1: where many stand together, each may be taken for another.
 
     places: (n, 2) m. Clutter is dense, and in the fit some of it always meets other clutter.
     """
-    lone = np.flatnonzero(qualities > 0.0)
-    if not len(lone):
+    posts = np.flatnonzero(qualities > 0.0)
+    if not len(posts):
         return 1.0
-    distance = np.hypot(*(places[lone, np.newaxis] - places[lone]).transpose(2, 0, 1))
-    others = ((distance > _MISTAKEN[0]) & (distance < _MISTAKEN[1])) @ qualities[lone]
-    return float(ramp(np.array([others @ qualities[lone] / qualities[lone].sum()]), *_OTHERS)[0])
+    distance = np.hypot(*(places[posts, np.newaxis] - places[posts]).transpose(2, 0, 1))
+    others = ((distance > _MISTAKEN[0]) & (distance < _MISTAKEN[1])) @ qualities[posts]
+    return float(ramp(np.array([others @ qualities[posts] / qualities[posts].sum()]), *_OTHERS)[0])
 
 
 def crowds(points: np.ndarray, reach: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, Closed, PartResult, solved_part
+from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, PartResult, solved_part
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
@@ -234,7 +234,7 @@ class Findings:
 
     calibration: Calibration
     trust: Trust
-    closing: Optional[Closed] = None
+    closing: Optional[LoopClosure] = None
 
     @classmethod
     def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> "Findings":

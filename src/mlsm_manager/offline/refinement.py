@@ -5,7 +5,7 @@ from typing import List, Mapping, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, Closed, closed, solved
+from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, solved, with_loops_closed
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import POSE, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -30,7 +30,7 @@ class Refined:
 
     poses: np.ndarray
     layers: Mapping[Layer, Blocks]
-    closing: Closed
+    closing: LoopClosure
 
     @property
     def batch(self) -> BatchResult:
@@ -40,7 +40,7 @@ class Refined:
 
 def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
     """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
-    closing = closed(solver, fitted(solver))
+    closing = with_loops_closed(solver, fitted(solver))
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(MapCloud.of_scan(scan))

@@ -10,7 +10,7 @@ from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solution_of, solver_parameters
 
 from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, Neighbours, Pairs, summed
-from mlsm_manager.joint_solver.compiled_comparisons import scattered_blocks, weighed_pairs
+from mlsm_manager.joint_solver.compiled_comparisons import scattered_terms, weighed_pairs
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
 from mlsm_manager.joint_solver.odometry_log import as_complex
@@ -177,7 +177,7 @@ def test_terms_are_added_in_their_columns_of_a_matrix(seed, count):
     columns, terms = rng.randint(0, 7, (count, 3)), rng.normal(0.0, 1.0, (count, 3, 3))
     expected, found = np.ones((7, 7)), np.ones((7, 7))
     np.add.at(expected, (columns[:, :, np.newaxis], columns[:, np.newaxis]), terms)
-    scattered_blocks(found, columns, terms)
+    scattered_terms(found, columns, terms)
     np.testing.assert_allclose(found, expected, atol=SAME)
 
 

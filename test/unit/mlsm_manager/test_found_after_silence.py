@@ -7,7 +7,7 @@ from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal
 
 from mlsm_manager.joint_solver.estimate import Turns
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.submaps import MAP
+from mlsm_manager.joint_solver.solution import MAP
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values

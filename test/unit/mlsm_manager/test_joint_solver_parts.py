@@ -10,11 +10,10 @@ from made_harbour import logged, tour
 from made_models import DVL, DVL_ODOMETRY, solution_of, solver_parameters
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
-from mlsm_manager.joint_solver.growing import GrowingArray
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.motion_models import DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, Layout, NormalEquations, SparseSolution, State
-from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 from mlsm_manager.scan_matching.scan import Track
 

@@ -7,7 +7,7 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour
 from made_models import solver_parameters
 
-from mlsm_manager.joint_solver.batch_solver import Closed, closed, solved
+from mlsm_manager.joint_solver.batch_solver import LoopClosure, solved, with_loops_closed
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.places import PlaceCandidate
@@ -54,7 +54,7 @@ def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift
     scans, track = astray(made, np.array(drift))
     solver = followed(scans)
     without = solved(solver)
-    found = closed(solver, without)
+    found = with_loops_closed(solver, without)
     assert errors(solver, without, track, made).mean() > 5.0
     assert errors(solver, found.batch, track, made).mean() < 1.0
     assert found.gain > 100.0
@@ -65,7 +65,7 @@ def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift
 def test_a_run_that_is_not_astray_has_no_loops():
     solver = followed(tour(40).scans)
     batch = solved(solver)
-    found = closed(solver, batch)
+    found = with_loops_closed(solver, batch)
     assert found.batch is batch
     assert found.to_mapping() == {"gain": None, "found": []}
 
@@ -112,4 +112,4 @@ def test_a_loop_that_other_scans_do_not_confirm_is_none():
 
 
 def test_a_fit_without_loops_says_so():
-    assert Closed(None, [], np.nan).to_mapping()["gain"] is None
+    assert LoopClosure(None, [], np.nan).to_mapping()["gain"] is None

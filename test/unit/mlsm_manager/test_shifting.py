@@ -13,7 +13,7 @@ from mlsm_manager.hovering.particle_filter import likelihoods_of, nearby_of, on_
 from mlsm_manager.hovering.particles import Particles
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
-from mlsm_manager.joint_solver.batch_solver import settled
+from mlsm_manager.joint_solver.batch_solver import fit_path
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
@@ -139,5 +139,5 @@ def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():
     motion = live.log.node_motion(np.arange(len(live.log.node_times)))
     true = made.truth.at(live.log.node_times)[:, :2]
     start = replace(live.state, nodes=on_path(live.state.nodes, true, motion))
-    found = motion.poses[:, :2] + settled(live, start).nodes[:, :2]
+    found = motion.poses[:, :2] + fit_path(live, start).nodes[:, :2]
     np.testing.assert_allclose(found - found[0], true - true[0], atol=0.3)

@@ -7,7 +7,7 @@ from made_posts import SPEED, cluttered, heard, true_path
 
 from mlsm_manager.joint_solver.batch_solver import solved
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, crowds, lone_points
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, crowds, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = pytest.mark.long
@@ -27,7 +27,7 @@ def scan_of(places, strengths):
 
 
 def found_in(scan, sonar_in_base=AT_BASE):
-    return lone_points(scan, sonar_in_base, SurfacePoints.of(scan, sonar_in_base))
+    return post_points(scan, sonar_in_base, SurfacePoints.of(scan, sonar_in_base))
 
 
 def wall_and(place, strength):
