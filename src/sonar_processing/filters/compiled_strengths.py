@@ -10,6 +10,7 @@ from sonar_processing.cloud import HIGHEST_STRENGTH
 _POINTS = types.Array(float32, 2, "C", readonly=True)
 _STAMPS = types.Array(float64, 1, "C", readonly=True)
 _SILENT = HIGHEST_STRENGTH + 1
+_EQUAL = 1e-12  # Share by which between-class variances differ because of rounding
 _COUNTERS = 4
 """Neighbouring bins often have the same level, and a single counter would wait for its own last result."""
 _ZERO, _HIGHEST, _INFINITE = np.float32(0.0), np.float32(HIGHEST_STRENGTH), np.float32(np.inf)
@@ -72,3 +73,26 @@ def strong_points(points, stamps, threshold):
         above[finite] = above[place]
         finite += _is_finite(points, stamps, above[place])
     return above[:finite].copy()
+
+
+@compiled(float64(int64[::1]))
+def threshold_of_levels(levels):
+    """Return Otsu's threshold for the number of points in each level (256,), not all 0; see `otsu_threshold`."""
+    number, total = 0, 0
+    for level in range(len(levels)):
+        number += levels[level]
+        total += level * levels[level]
+    between = np.full(len(levels), -1.0)
+    below, sum_below = 0, 0
+    for level in range(len(levels)):
+        below += levels[level]
+        sum_below += level * levels[level]
+        above = number - below
+        if below > 0 and above > 0:
+            difference = sum_below / below - (total - sum_below) / above
+            between[level] = np.float64(below * above) * (difference * difference)
+    limit = between.max() * (1.0 - _EQUAL)
+    if limit < 0.0:
+        return np.float64(np.flatnonzero(levels)[0])
+    best = np.flatnonzero(between >= limit)
+    return (best[0] + best[-1]) / 2.0

@@ -10,9 +10,6 @@ from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
 
-_EQUAL = 1e-12  # Share by which between-class variances differ because of rounding
-_LEVELS = np.arange(HIGHEST_STRENGTH + 1)
-
 
 class ThresholdMode(Enum):
     """How the threshold is chosen."""
@@ -52,7 +49,7 @@ class Thresholder:
 
     def __init__(self, parameters: ThresholderParameters) -> None:
         self.parameters = parameters
-        # Here, because it loads numba (0.3 s, 90 MB), which the nodes of other stages do without.
+        # Here, because it loads numba (0.3 s, 90 MB), which nodes without a threshold do without.
         from sonar_processing.filters import compiled_strengths
 
         self._loops = compiled_strengths
@@ -95,7 +92,7 @@ class Thresholder:
         levels, silent = counts[:-1].copy(), counts[-1]
         if not self.parameters.otsu_nonzero:
             levels[0] += silent
-        return _threshold_of_levels(levels)
+        return self._loops.threshold_of_levels(levels)
 
 
 def otsu_threshold(strengths: np.ndarray) -> float:
@@ -108,20 +105,7 @@ def otsu_threshold(strengths: np.ndarray) -> float:
     """
     if strengths.size == 0:
         raise RefusedInput("clouds without points", "no strength to take a threshold of")
-    levels = np.clip(strengths, 0, HIGHEST_STRENGTH).astype(np.intp)
-    return _threshold_of_levels(np.bincount(levels, minlength=HIGHEST_STRENGTH + 1))
+    from sonar_processing.filters.compiled_strengths import threshold_of_levels
 
-
-def _threshold_of_levels(histogram: np.ndarray) -> float:
-    """Return Otsu's threshold as otsu_threshold does, for the number of points in each level (256,), not all 0."""
-    count_below = histogram.cumsum()
-    lowest, highest = count_below.searchsorted([1, count_below[-1]])
-    if lowest == highest:
-        return float(lowest)
-    separating = slice(lowest, highest)
-    sum_below = (histogram * _LEVELS).cumsum()
-    w1, sum1 = count_below[separating], sum_below[separating]
-    w2, sum2 = count_below[-1] - w1, sum_below[-1] - sum1
-    between = w1 * w2 * (sum1 / w1 - sum2 / w2) ** 2
-    best = np.flatnonzero(between >= between.max() * (1.0 - _EQUAL)) + lowest
-    return float(best[0] + best[-1]) / 2.0
+    levels = np.clip(strengths, 0, HIGHEST_STRENGTH).astype(np.int64)
+    return threshold_of_levels(np.bincount(levels, minlength=HIGHEST_STRENGTH + 1))
