@@ -1,6 +1,6 @@
-"""Parts of the joint solver: derivatives, weights that fade out, the bounded frozen map."""
+"""Parts of the joint solver: parts of a turn, points, weights that fade out, the bounded frozen map, what is stored."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -8,14 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import logged, tour
 from made_models import DVL, DVL_ODOMETRY, solution_of, solver_parameters
+from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
+from mlsm_manager.joint_solver.estimate import stacked, unstacked
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.motion_models import DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, Layout, NormalEquations, SparseSolution, State
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
+from mlsm_manager.joint_solver.run_log import parts_of
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 STEP = 1e-6
 TIMES = np.array([0.0, 14.0, 28.0])
@@ -205,3 +208,72 @@ def test_tracks_that_overlap_make_one_path_without_a_turn_in_its_yaw():
     whole.extend(Track(np.arange(2.0, 8.0), np.column_stack([np.arange(2.0, 8.0), np.zeros(6), np.full(6, -3.1)])), 9.0)
     np.testing.assert_allclose(whole.at(np.array([1.0, 3.5, 6.5]))[:, 0], [1.0, 3.5, 6.5])
     assert np.ptp(whole.at(np.arange(0.0, 7.0, 0.5))[:, 2]) < 0.2
+
+
+FIRST, SECOND = heard(2)
+
+
+def test_every_point_is_in_the_part_of_its_time():
+    parts = parts_of(SECOND, 3, FIRST.reference_time)
+    assert sum(len(part) for part in parts) == len(SECOND)
+    assert all(part.times.max() <= part.reference_time for part in parts)
+    assert all(later.times.min() > earlier.reference_time for earlier, later in zip(parts, parts[1:]))
+
+
+def test_parts_last_equally_long_and_end_with_the_turn():
+    ends = [part.reference_time for part in parts_of(SECOND, 4, FIRST.reference_time)]
+    np.testing.assert_allclose(np.diff(ends), np.diff(ends)[0])
+    assert ends[-1] == SECOND.reference_time
+
+
+def test_a_turn_after_a_silence_is_cut_where_it_was_heard():
+    parts = parts_of(SECOND, 3, SECOND.start - 100.0)
+    assert min(len(part) for part in parts) > 0.2 * len(SECOND)
+
+
+def test_one_part_is_the_scan_itself():
+    assert parts_of(SECOND, 1, None)[0] is SECOND
+
+
+def test_a_turn_without_echoes_has_as_many_parts():
+    empty = Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), SECOND.track, SECOND.reference_time)
+    for newest in (None, FIRST.reference_time):
+        parts = parts_of(empty, 3, newest)
+        assert len(parts) == 3
+        assert np.all(np.diff([part.reference_time for part in parts]) > 0.0)
+
+
+@dataclass(frozen=True)
+class Drift:
+    values: np.ndarray
+
+
+@dataclass(frozen=True)
+class Estimate:
+    time: float
+    count: int
+    place: np.ndarray
+    drift: Drift
+
+
+ESTIMATES = [Estimate(0.5 * number, number, np.arange(3.0) + number, Drift(np.eye(2) * number)) for number in range(4)]
+
+
+def test_what_was_stacked_comes_back():
+    again = unstacked(Estimate, stacked(ESTIMATES, "a."), "a.")
+    assert [(one.time, one.count) for one in again] == [(one.time, one.count) for one in ESTIMATES]
+    for one, other in zip(again, ESTIMATES):
+        np.testing.assert_array_equal(one.place, other.place)
+        np.testing.assert_array_equal(one.drift.values, other.drift.values)
+
+
+def test_nothing_comes_back_as_nothing():
+    assert unstacked(Estimate, stacked([], "a."), "a.") == []
+
+
+def test_a_field_that_is_missing_or_of_another_length_is_refused():
+    arrays = stacked(ESTIMATES)
+    with pytest.raises(ValueError, match="elements"):
+        unstacked(Estimate, {**arrays, "time": arrays["time"][:2]})
+    with pytest.raises(KeyError, match="place"):
+        unstacked(Estimate, {name: array for name, array in arrays.items() if name != "place"})
