@@ -7,9 +7,12 @@ should be, the marina's against the path by its own DVL without the silence.
 import argparse
 from dataclasses import replace
 from enum import Enum
+from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
+from heading_only import reduce_bag
 
 from benchmarks.harness import benchmark_parser, recorded
 from benchmarks.paths import replay_input
@@ -20,7 +23,6 @@ from mlsm_manager.offline.recording import Recording, read_recording
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.suited_parameters import EchoShape, echo_shape_of
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse, matrices
 from recordings.reader import Request
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour")
@@ -121,23 +123,15 @@ def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[st
 
 def marina(kind: OdometryKind) -> Tuple[str, Recording, Track]:
     """Return the marina's first part, and the vehicle's path in it by its DVL."""
-    recording = read_recording(recorded("marina_first.bag"), Request())
+    bag = recorded("marina_first.bag")
+    recording = read_recording(bag, Request())
     whole = replayed(recording, OdometryKind.DVL, echo_shape_of([placed.beam for placed in recording.beams]))
-    truth = Track(whole.times, whole.corrected)
     if kind is OdometryKind.HEADING:
-        recording = heading_only(recording)
-    return "marina", recording, truth
-
-
-def heading_only(recording: Recording) -> Recording:
-    """Return the recording with positions that stay at 0."""
-    track = Track(recording.track.times, recording.track.poses * [0.0, 0.0, 1.0])
-    times = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
-    moves = matrices(composed(track.at(times), inverse(recording.track.at(times))))
-    beams = [
-        replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in zip(recording.beams, moves)
-    ]
-    return replace(recording, track=track, beams=beams)
+        with TemporaryDirectory() as folder:
+            reduced = Path(folder) / "heading_only.bag"
+            reduce_bag(bag, reduced, "odom", "base_link")
+            recording = read_recording(reduced, Request())
+    return "marina", recording, Track(whole.times, whole.corrected)
 
 
 def main() -> None:

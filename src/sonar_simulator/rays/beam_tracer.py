@@ -36,13 +36,9 @@ class Contacts:
 
     @classmethod
     def of_ranges(
-        cls,
-        ranges: np.ndarray,
-        directions: Optional[np.ndarray] = None,
-        cosines: Optional[np.ndarray] = None,
-        material: Optional[np.ndarray] = None,
-        materials: Tuple[Material, ...] = (DEFAULT_MATERIAL,),
-    ) -> "Contacts":
+        cls, ranges: np.ndarray, directions: Optional[np.ndarray] = None, cosines: Optional[np.ndarray] = None,
+        material: Optional[np.ndarray] = None, materials: Tuple[Material, ...] = (DEFAULT_MATERIAL,),
+    ) -> "Contacts":  # fmt: skip
         """Build from ranges (beams, rays) of rays that represent equal shares of their beam.
 
         By default, rays are along the beam's axis and hit the default material at right angles.

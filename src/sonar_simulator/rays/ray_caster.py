@@ -104,13 +104,9 @@ def legs(
 
 
 def _leg(
-    on_way: np.ndarray,
-    gone: np.ndarray,
-    distances: np.ndarray,
-    faces: np.ndarray,
-    directions: np.ndarray,
+    on_way: np.ndarray, gone: np.ndarray, distances: np.ndarray, faces: np.ndarray, directions: np.ndarray,
     left: np.ndarray,
-) -> Leg:
+) -> Leg:  # fmt: skip
     ranges, all_faces = np.full(len(gone), np.inf), np.full(len(gone), -1, dtype=np.int64)
     ranges[on_way] = gone[on_way] + distances
     all_faces[on_way] = np.where(np.isfinite(distances), faces, -1)

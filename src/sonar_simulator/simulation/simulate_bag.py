@@ -97,13 +97,9 @@ def _name(topic: str) -> str:
 
 
 def write_bag(
-    path: Path,
-    setup: Setup,
-    settings: Settings,
-    robot: RobotDescription,
-    compression: str = "none",
+    path: Path, setup: Setup, settings: Settings, robot: RobotDescription, compression: str = "none",
     tell: Callable[[float], object] = lambda time: None,
-) -> int:
+) -> int:  # fmt: skip
     """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
 
     `tell` receives the simulated time [s] from time to time. Raises OSError.

@@ -127,15 +127,9 @@ class Simulation:
     """Runs once, forwards. Ticks come at a steady rate, pings when the head sends them."""
 
     def __init__(
-        self,
-        movement: Movement,
-        odometry: Union[Odometry, NoOdometry],
-        sonar: Sonar,
-        head: Optional[SonarHead],
-        T_base_sonar: np.ndarray,
-        servo: Optional[Servo] = None,
-        tilt_commands: Sequence[TiltCommand] = (),
-    ) -> None:
+        self, movement: Movement, odometry: Union[Odometry, NoOdometry], sonar: Sonar, head: Optional[SonarHead],
+        T_base_sonar: np.ndarray, servo: Optional[Servo] = None, tilt_commands: Sequence[TiltCommand] = (),
+    ) -> None:  # fmt: skip
         """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` the mount is fixed.
 
         Without `head` there are no pings.
