@@ -76,18 +76,18 @@ class ParticleFilter:
         echoes = tuple(Echoes.of(log, parameters, scan) for scan in scans)
         return replace(self, scans=log.scan_count, echoes=echoes, particles=particles if count else None)
 
-    def placed(self, log: RunLog, nodes: np.ndarray, parameters: SolverParameters, is_told: bool) -> np.ndarray:
+    def placed(self, log: RunLog, nodes: np.ndarray, parameters: SolverParameters, starts_known: bool) -> np.ndarray:
         """Return the newest of `nodes` (n, width), those of the last turn or all free ones, moved onto the particles.
 
-        All are moved where those before the last turn are far from the particles. is_told: whether the place of the
-        first node was told; the particles then do not know where they lie in the map, and begin where free nodes do.
+        All are moved where those before the last turn are far from the particles. starts_known: whether the place of
+        the first node was known; particles then do not know where they lie in the map, and begin where free nodes do.
         """
         path = self.particles.most_likely()
         free = min(len(path), parameters.free_nodes, len(nodes))
         parts = min(parameters.parts_per_turn, free - 1)
         path, motion = path[-free:], log.node_motion(np.arange(len(nodes) - free, len(nodes)))
         places = motion.poses[:, :2] + nodes[-free:, :2]
-        if is_told:
+        if starts_known:
             path = path + places[0] - path[0]
         apart = np.hypot(*(places - path)[:-parts].T)
         if apart.mean() > _ASTRAY:

@@ -272,8 +272,8 @@ class LiveSolver:
         """Put the newest nodes where the search for nodes finds them likeliest."""
         if self._by_parts is not None:
             self._by_parts = self._by_parts.followed(self.log, self.parameters)
-            is_told = self._known is not None or self._start is not None
-            self._nodes.replace_newest(self._by_parts.placed(self.log, self.state.nodes, self.parameters, is_told))
+            starts_known = self._known is not None or self._start is not None
+            self._nodes.replace_newest(self._by_parts.placed(self.log, self.state.nodes, self.parameters, starts_known))
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""

@@ -61,8 +61,8 @@ class NodeSearch(Protocol):
     def followed(self, log: RunLog, parameters: "SolverParameters") -> "NodeSearch":
         """Return the search after all scans of `log`, the first of which are those followed before."""
 
-    def placed(self, log: RunLog, nodes: np.ndarray, parameters: "SolverParameters", is_told: bool) -> np.ndarray:
-        """Return the newest of `nodes` (n, width) at their likeliest places. is_told: the first one's place was."""
+    def placed(self, log: RunLog, nodes: np.ndarray, parameters: "SolverParameters", starts_known: bool) -> np.ndarray:
+        """Return the newest of `nodes` (n, width) at their likeliest places. starts_known: the first one's was known."""
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return what `resumed` needs besides the log, as arrays by name."""

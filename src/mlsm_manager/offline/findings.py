@@ -113,7 +113,7 @@ class Calibration:
 
 
 def _allowed(values: Dict[str, float]) -> Dict[str, float]:
-    """Return `values` within their ranges, so that a run that went astray can still be told."""
+    """Return `values` within their ranges, so that a run that went astray has a live.yaml too."""
     ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in values}
     return {name: float(np.clip(value, ranges[name].low, ranges[name].high)) for name, value in values.items()}
 
@@ -156,8 +156,8 @@ class Trust:
             for verdict in self.verdicts
         }
         minutes = per_minute(self.times, _radii(self.covariances))
-        told = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
-        return {"checks": checks, "deviation_per_minute": told}
+        stated = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
+        return {"checks": checks, "deviation_per_minute": stated}
 
 
 def trust(

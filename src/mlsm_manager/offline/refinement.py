@@ -62,9 +62,9 @@ def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
     start = displaced(batch.state, deviations, solver.parameters.cut)
     others = [solved(solver, parameters, batch.state) for parameters in other_settings(solver.parameters)]
     second = solved(solver, start=start)
-    told = _path(solver, batch.state)
-    paths = np.stack([told, *(_path(solver, other.state) for other in others)])
-    again = np.stack([told, _path(solver, start), _path(solver, second.state)])
+    fitted_path = _path(solver, batch.state)
+    paths = np.stack([fitted_path, *(_path(solver, other.state) for other in others)])
+    again = np.stack([fitted_path, _path(solver, start), _path(solver, second.state)])
     return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
 
 
@@ -81,7 +81,7 @@ def other_settings(parameters: SolverParameters) -> List[SolverParameters]:
 
 
 def displaced(state: State, deviations: np.ndarray, most: float) -> State:
-    """Return a state whose nodes lie one told deviation (n,) [m] beside those of `state`, but at most `most` [m].
+    """Return a state whose nodes lie one stated deviation (n,) [m] beside those of `state`, but at most `most` [m].
 
     The direction turns slowly along the run, so that scans of one time still agree with each other.
     """
