@@ -62,7 +62,7 @@ class NodeSearch(Protocol):
         """Return the search after all scans of `log`, the first of which are those followed before."""
 
     def placed(self, log: RunLog, nodes: np.ndarray, parameters: "SolverParameters", starts_known: bool) -> np.ndarray:
-        """Return the newest of `nodes` (n, width) at their likeliest places. starts_known: the first one's was known."""
+        """Return the newest of `nodes` (n, width) at their likeliest places. starts_known: where the first is."""
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return what `resumed` needs besides the log, as arrays by name."""
