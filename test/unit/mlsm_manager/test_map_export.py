@@ -1,12 +1,13 @@
 """Maps in other programs' formats, read back by those programs' own readers."""
 
+import re
 import shutil
+import subprocess
 
 import numpy as np
 import pytest
 import yaml
 from made_maps import random_map
-from octomap_reading import RESOLUTION, cells_of_tree, cells_of_vrml, voxels
 from PIL import Image
 
 from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd
@@ -26,6 +27,8 @@ from mlsm_manager.surface_map.map_file import ExportError, Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.ply_file import write_ply
 
+RESOLUTION = 0.5
+
 
 def _blocks(*places):
     surface_map = MultiLevelSurfaceMap(RESOLUTION)
@@ -41,6 +44,33 @@ def occupied():
 @pytest.fixture(scope="module")
 def free():
     return random_map(1).blocks
+
+
+def voxels(blocks):
+    """Return the set of voxels that blocks fill."""
+    return {tuple(voxel) for voxel in block_voxels(blocks)[0].tolist()}
+
+
+def cells_of_tree(tree):
+    """Return the voxels of a pyoctomap tree: {True: those occupied, False: those free}."""
+    leaves = {True: set(), False: set()}
+    for leaf in tree.begin_leafs():
+        leaves[tree.isNodeOccupied(leaf)] |= _cells_of_leaf(leaf.getCoordinate(), leaf.getSize())
+    return leaves
+
+
+def cells_of_vrml(folder):
+    """Return the occupied voxels of map.bt in a folder as apt's octomap-tools see them."""
+    subprocess.run(["bt2vrml", "map.bt"], cwd=str(folder), check=True, stdout=subprocess.DEVNULL)
+    boxes = re.findall(r"translation (\S+) (\S+) (\S+).*?size (\S+)", (folder / "map.bt.wrl").read_text(), re.S)
+    return set().union(*(_cells_of_leaf(list(map(float, box[:3])), float(box[3])) for box in boxes))
+
+
+def _cells_of_leaf(center, size):
+    """Return all cells that a leaf covers; pruned leaves cover 8, 64 and so on."""
+    side = round(size / RESOLUTION)
+    first = np.rint((np.array(center) - size / 2.0) / RESOLUTION).astype(int)
+    return {tuple(first + step) for step in np.ndindex(side, side, side)}
 
 
 def test_octomap_reads_the_same_cells_free_and_occupied(tmp_path, occupied, free):

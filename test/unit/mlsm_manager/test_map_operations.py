@@ -7,7 +7,7 @@ from made_maps import in_order, partition, random_points
 
 from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged, merged_blocks, moved
+from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged, merged_blocks
 
 RESOLUTION = 0.5
 seeds = st.integers(0, 2**31)
@@ -74,13 +74,6 @@ def test_merged_maps_have_the_layers_of_both():
     assert (both.frame, both.calibration) == ("map", {"range_scale": 0.9})
     assert len(both.shown) == len(shown) + len(other)
     assert both.layers[Layer.FREE].mean[:, 0].min() > 80.0
-
-
-def test_moving_there_and_back_changes_nothing():
-    blocks = _blocks(random_points(0, 500))
-    there = moved(blocks, LevelTransform(1.0, 2.0, 3.0, np.pi / 2.0))
-    back = moved(there, LevelTransform(-2.0, 1.0, -3.0, -np.pi / 2.0))
-    np.testing.assert_allclose(back.rows, blocks.rows, atol=1e-12)
 
 
 def test_a_cropped_map_holds_what_lies_in_the_box():

@@ -1,6 +1,7 @@
 """The batch-wise map against the point-by-point rule of thesis 6.2 and 6.5.6.
 
-One departure from the thesis: a block keeps its bottom instead of its depth, because height - depth rounds.
+Two departures from the thesis: a block keeps its bottom instead of its depth, because height - depth rounds, and the
+variance of its points, of which equation 6.6 gives a part only.
 """
 
 import math
@@ -23,9 +24,6 @@ class LiteralBlock:
 
     def __init__(self, point):
         self.points = [point]
-        self.n = 1
-        self.mean = point.copy()
-        self.variance = np.zeros(4)
         self.height = self.bottom = point[2]
 
     def holds(self, z, resolution):
@@ -33,27 +31,13 @@ class LiteralBlock:
         return abs(z - self.height) < resolution or abs(self.bottom - z) < resolution or (self.bottom < z < self.height)
 
     def add_observation(self, point):
-        """addObservationToBlock: equations 6.5 and 6.6."""
-        n = self.n
-        self.mean = n * self.mean / (n + 1) + point / (n + 1)
-        self.variance = n * self.variance / (n + 1) + (point - self.mean) ** 2 / (n + 1)
-        self.n = n + 1
-        self._stretch(point[2], point[2])
-        self.points.append(point)
+        """addObservationToBlock."""
+        self.fuse(LiteralBlock(point))
 
     def fuse(self, other):
-        """fuseBlocks: combine the means and variances of two blocks."""
-        n = self.n + other.n
-        between = self.n * other.n * (self.mean - other.mean) ** 2 / n**2
-        self.variance = (self.n * self.variance + other.n * other.variance) / n + between
-        self.mean = (self.n * self.mean + other.n * other.mean) / n
-        self.n = n
-        self._stretch(other.bottom, other.height)
+        """fuseBlocks."""
+        self.bottom, self.height = min(self.bottom, other.bottom), max(self.height, other.height)
         self.points += other.points
-
-    def _stretch(self, bottom, height):
-        self.bottom = min(self.bottom, bottom)
-        self.height = max(self.height, height)
 
 
 class LiteralMap:
@@ -105,14 +89,14 @@ def assert_follows_the_literal_rule(points, resolution, batches=1):
     expected = literal.sorted_blocks()
     blocks = batch_map(points, resolution, batches)
     assert partition(blocks) == [
-        (cell, block.bottom, block.height, block.n, int(block.height - block.bottom >= resolution))
+        (cell, block.bottom, block.height, len(block.points), int(block.height - block.bottom >= resolution))
         for cell, block in expected
     ]
     order = in_order(blocks)
     scale = max(np.abs(points).max(initial=1.0), 1.0)
     for row, (_, block) in zip(order, expected):
         inside = np.array(block.points)
-        np.testing.assert_allclose(blocks.mean[row], block.mean, rtol=1e-12, atol=1e-12 * scale)
+        np.testing.assert_allclose(blocks.mean[row], inside.mean(axis=0), rtol=1e-12, atol=1e-12 * scale)
         np.testing.assert_allclose(blocks.variance[row], inside.var(axis=0), rtol=1e-9, atol=1e-13 * scale**2)
 
 
@@ -124,14 +108,10 @@ def _on_lattice(points, spacing):
     return [(x * spacing, y * spacing, z * spacing, strength) for x, y, z, strength in points]
 
 
-@given(_coordinates(st.floats(-1.5, 1.5)), RESOLUTIONS, BATCHES)
-def test_random_points(points, resolution, batches):
-    assert_follows_the_literal_rule(points, resolution, batches)
-
-
-@given(_coordinates(st.floats(-1.5, 1.5, width=32)), RESOLUTIONS, BATCHES)
-def test_points_of_single_precision(points, resolution, batches):
-    assert_follows_the_literal_rule(np.array(points, dtype=np.float32).reshape(-1, 4), resolution, batches)
+@given(_coordinates(st.floats(-1.5, 1.5)), st.sampled_from([-9000.0, 0.0, 9000.0]), RESOLUTIONS, BATCHES)
+def test_random_points_at_the_origin_and_far_from_it(points, shift, resolution, batches):
+    moved = [(x + shift, y - shift, z, strength) for x, y, z, strength in points]
+    assert_follows_the_literal_rule(moved, resolution, batches)
 
 
 @pytest.mark.parametrize("fraction", [1.0, 0.5, 1.0 / 3.0])
@@ -144,18 +124,6 @@ def test_lattices_whose_gaps_are_the_resolution_or_a_part_of_it(fraction, points
 def test_one_crowded_column(levels, resolution, batches):
     points = [(0.0, 0.0, level * resolution * 0.5, index) for index, level in enumerate(levels)]
     assert_follows_the_literal_rule(points, resolution, batches)
-
-
-@given(st.lists(st.integers(-12, 12), max_size=30), st.integers(2, 5), RESOLUTIONS, BATCHES)
-def test_duplicates(levels, copies, resolution, batches):
-    points = [(0.0, 0.0, level * resolution * 0.5, 1.0) for level in levels] * copies
-    assert_follows_the_literal_rule(points, resolution, batches)
-
-
-@given(_coordinates(st.floats(-1.5, 1.5)), st.sampled_from([-9000.0, 9000.0]), BATCHES)
-def test_cells_far_from_the_origin(points, shift, batches):
-    moved = [(x + shift, y - shift, z, strength) for x, y, z, strength in points]
-    assert_follows_the_literal_rule(moved, 0.5, batches)
 
 
 @pytest.mark.parametrize("batches", [1, 7, 1000])
@@ -173,31 +141,6 @@ def test_the_order_of_the_points_changes_nothing(data, points, resolution):
     assert partition(maps[0]) == partition(maps[1])
 
 
-def test_a_gap_of_exactly_the_resolution_separates():
-    assert batch_map(np.array([[0, 0, 0.0, 1], [0, 0, 0.5, 1]]), 0.5).count.tolist() == [1, 1]
-
-
-def test_a_gap_of_a_little_less_than_the_resolution_joins():
-    below = np.nextafter(0.5, 0.0)
-    assert batch_map(np.array([[0, 0, 0.0, 1], [0, 0, below, 1]]), 0.5).count.tolist() == [2]
-
-
-def test_a_point_within_reach_of_two_stored_blocks_fuses_them():
-    blocks = batch_map(np.array([[0, 0, 0.0, 1], [0, 0, 0.8, 1], [0, 0, 0.4, 4]]), 0.5, 3)
-    assert partition(blocks) == [((0, 0), 0.0, 0.8, 3, 1)]
-    np.testing.assert_allclose(blocks.mean, [[0.0, 0.0, 0.4, 2.0]])
-
-
-def test_a_point_between_bottom_and_top_belongs_though_both_are_far():
-    column = [[0, 0, 0.4 * step, 1] for step in range(6)]
-    blocks = batch_map(np.array([*column, [0, 0, 1.0, 1]]), 0.5, 7)
-    assert partition(blocks) == [((0, 0), 0.0, 2.0, 7, 1)]
-
-
-def test_the_variance_is_the_populations_and_not_that_of_equation_6_6():
-    points = np.array([[0.0, 0.1, 0.2, 10.0], [0.2, 0.3, 0.4, 30.0]])
-    literal = LiteralMap(0.5)
-    literal.insert(points)
-    ((_, block),) = literal.sorted_blocks()
-    np.testing.assert_allclose(batch_map(points, 0.5, 2).variance, [points.var(axis=0)])
-    np.testing.assert_allclose(block.variance, points.var(axis=0) / 2.0)
+@pytest.mark.parametrize(("gap", "counts"), [(0.5, [1, 1]), (np.nextafter(0.5, 0.0), [2])])
+def test_a_gap_of_the_resolution_separates_and_a_little_less_does_not(gap, counts):
+    assert batch_map(np.array([[0, 0, 0.0, 1], [0, 0, gap, 1]]), 0.5).count.tolist() == counts

@@ -28,14 +28,6 @@ def test_a_cell_holds_its_lower_border_and_not_its_upper():
     assert sorted(blocks.cells.tolist()) == [[0, 1], [1, 2]]
 
 
-def test_negative_coordinates_round_down():
-    assert _map_of([[-0.1, -0.6, 0, 1]]).blocks.cells.tolist() == [[-1, -2]]
-
-
-def test_the_four_cells_around_the_origin_are_four():
-    assert len(_map_of([[x, y, 0, 1] for x in (-0.1, 0.1) for y in (-0.1, 0.1)])) == 4
-
-
 @pytest.mark.parametrize("resolution", [0.1, 0.3, 0.7])
 @pytest.mark.parametrize("batches", [1, 7])
 def test_points_on_a_border_stay_in_their_cell_when_their_mean_is_taken(resolution, batches):
@@ -50,12 +42,6 @@ def test_points_on_a_border_stay_in_their_cell_when_their_mean_is_taken(resoluti
 
 def test_a_cells_centre_lies_half_a_cell_from_its_borders():
     assert _map_of([[-0.1, 0.7, 0, 1]]).blocks.centers.tolist() == [[-0.25, 0.75]]
-
-
-def test_an_empty_array_changes_nothing():
-    mlsm = _map_of([[0, 0, 0, 1]])
-    assert mlsm.insert(np.empty((0, 4), dtype=np.float32)) == InsertReport(0, 0, 0)
-    assert len(mlsm) == 1
 
 
 def test_an_empty_map_has_no_blocks():
@@ -81,16 +67,6 @@ def test_a_point_beyond_the_limit_is_counted_and_left_out(column, value):
     mlsm = MultiLevelSurfaceMap(0.5, limit=100.0)
     assert mlsm.insert(points) == InsertReport(inserted=1, not_finite=0, outside=1)
     assert len(mlsm) == 1
-
-
-def test_a_point_on_the_limit_is_inserted():
-    assert MultiLevelSurfaceMap(0.5, limit=100.0).insert(np.array([[100.0, -100, 100, 1]])).inserted == 1
-
-
-def test_a_cloud_of_refused_points_only_leaves_the_map_empty():
-    mlsm = MultiLevelSurfaceMap(0.5)
-    assert mlsm.insert(np.full((5, 4), np.nan)) == InsertReport(0, 5, 0)
-    assert len(mlsm) == 0
 
 
 def test_the_smallest_cells_reach_the_widest_limit():
@@ -215,10 +191,6 @@ def test_a_box_may_be_bounded_in_height():
     found = surface_map.in_box(low, high)
     assert 0 < len(found) < len(surface_map.in_box(low[:2], high[:2]))
     assert ((found.mean[:, 2] >= -1.0) & (found.mean[:, 2] <= 1.0)).all()
-
-
-def test_a_box_without_cells_holds_no_blocks():
-    assert len(random_map().in_box(np.array([50.0, 50.0]), np.array([60.0, 60.0]))) == 0
 
 
 def test_only_tiles_that_changed_are_told_and_only_once():

@@ -42,12 +42,6 @@ def test_every_block_is_a_vertex_with_all_it_holds(tmp_path, blocks):
     np.testing.assert_array_equal(vertices["type"], blocks.type)
 
 
-def test_another_library_reads_the_points(tmp_path, blocks):
-    trimesh = pytest.importorskip("trimesh")
-    write_ply(tmp_path / "basin.ply", blocks)
-    np.testing.assert_allclose(trimesh.load(str(tmp_path / "basin.ply")).vertices, blocks.mean[:, :3], rtol=1e-6)
-
-
 def test_an_empty_map_is_a_file_without_vertices(tmp_path):
     write_ply(tmp_path / "empty.ply", MultiLevelSurfaceMap(0.5).blocks)
     assert len(_read_ply(tmp_path / "empty.ply")[1]) == 0
