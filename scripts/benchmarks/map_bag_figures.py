@@ -5,7 +5,7 @@ from typing import List
 import numpy as np
 
 from benchmarks.harness import Row, cpu_seconds, mapped, missing_row, recorded
-from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
@@ -31,10 +31,10 @@ def rows() -> List[Row]:
 
 def carving_rows() -> List[Row]:
     """Return the share of a scan's time that carving takes, with each estimator."""
-    return [_carving_row(estimator) for estimator in Estimator] if recorded(PART).is_file() else [missing_row(PART)]
+    return [_carving_row(estimator) for estimator in EstimatorName] if recorded(PART).is_file() else [missing_row(PART)]
 
 
-def _carving_row(estimator: Estimator) -> Row:
+def _carving_row(estimator: EstimatorName) -> Row:
     options = map_bag_arguments([str(recorded(PART)), "--out", "nowhere", "--set", f"estimator={estimator.value}"])
     recording = read_recording(recorded(PART), options.request)
     parameters = with_odometry(options.parameters, odometry_of(recording.track).kind, options.fixed)
