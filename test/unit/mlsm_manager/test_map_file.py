@@ -1,5 +1,8 @@
-"""Maps as files: what is kept exactly, what is rounded, and that no other bytes are taken for a map."""
+"""Maps as files: what is kept exactly, what is rounded, what no file may hold, and the folder of a user's maps."""
 
+import os
+import re
+import stat
 from dataclasses import replace
 
 import numpy as np
@@ -9,6 +12,8 @@ from hypothesis import strategies as st
 from made_maps import content, in_order, partition, random_map, random_points, stored_map
 
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
+from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.map_file import (
     Layer,
     MapFileError,
@@ -19,6 +24,7 @@ from mlsm_manager.surface_map.map_file import (
     write_map,
 )
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.ply_file import read_ply, write_ply
 
 MUTATIONS = 1000
 
@@ -163,3 +169,189 @@ def test_other_files_are_refused_in_one_line_with_their_path(tmp_path, data, rea
 def test_a_file_of_a_later_version_is_refused(file_bytes):
     with pytest.raises(ArrayFileError, match="version 2, must be 1"):
         map_of_bytes(file_bytes[:8] + b"\x02\x00" + file_bytes[10:])
+
+
+_NUMPY_TYPES = {"double": "<f8", "uint": "<u4", "uchar": "u1"}
+
+
+@pytest.fixture
+def blocks():
+    return random_map(count=500, extent=3.0).blocks
+
+
+def _read_ply(path):
+    """Return a PLY's header lines and its vertices, read by the header alone."""
+    header, data = path.read_bytes().split(b"end_header\n", 1)
+    lines = header.decode("ascii").splitlines()
+    properties = [line.split()[1:] for line in lines if line.startswith("property")]
+    vertices = np.frombuffer(data, dtype=[(name, _NUMPY_TYPES[kind]) for kind, name in properties])
+    return lines, vertices
+
+
+def test_every_block_is_a_vertex_with_all_it_holds(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    lines, vertices = _read_ply(tmp_path / "basin.ply")
+    assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
+    assert f"element vertex {len(blocks)}" in lines
+    assert "comment multi level surface map, resolution 0.5 m" in lines
+    np.testing.assert_array_equal(np.column_stack([vertices[n] for n in ("x", "y", "z", "intensity")]), blocks.mean)
+    variances = [vertices[f"variance_{name}"] for name in ("x", "y", "z", "intensity")]
+    np.testing.assert_array_equal(np.column_stack(variances), blocks.variance)
+    np.testing.assert_array_equal(vertices["bottom"], blocks.bottom)
+    np.testing.assert_array_equal(vertices["height"], blocks.height)
+    np.testing.assert_array_equal(vertices["count"], blocks.count)
+    np.testing.assert_array_equal(vertices["type"], blocks.type)
+
+
+def test_an_empty_map_is_a_file_without_vertices(tmp_path):
+    write_ply(tmp_path / "empty.ply", MultiLevelSurfaceMap(0.5).blocks)
+    assert len(_read_ply(tmp_path / "empty.ply")[1]) == 0
+
+
+def test_others_may_read_the_map(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    assert stat.S_IMODE((tmp_path / "basin.ply").stat().st_mode) == 0o644
+
+
+def test_a_map_comes_back_as_it_was_saved(tmp_path, blocks):
+    write_ply(tmp_path / "basin.ply", blocks)
+    read = read_ply(tmp_path / "basin.ply")
+    np.testing.assert_allclose(read.rows, blocks.rows, rtol=1e-12, atol=1e-12)
+    assert read.resolution == blocks.resolution
+
+
+@pytest.mark.parametrize("resolution", ["nan", "inf", "0", "-1", "half"])
+def test_a_resolution_that_no_map_has_is_refused(tmp_path, blocks, resolution):
+    path = tmp_path / "basin.ply"
+    write_ply(path, blocks)
+    path.write_bytes(path.read_bytes().replace(b"resolution 0.5 m", f"resolution {resolution} m".encode()))
+    with pytest.raises(ValueError, match=re.escape(f"{path}: resolution {resolution} m")):
+        read_ply(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "fault"),
+    [
+        ("x", np.nan, "not finite"),
+        ("intensity", np.inf, "not finite"),
+        ("variance_y", -0.1, "negative variance"),
+        ("count", 0, "no points"),
+        ("z", 100.0, "not between bottom and top"),
+        ("type", 7, "unknown type"),
+    ],
+)
+def test_a_block_that_no_map_holds_is_refused(tmp_path, blocks, name, value, fault):
+    path = tmp_path / "basin.ply"
+    write_ply(path, blocks)
+    vertices = _read_ply(path)[1].copy()
+    vertices[name][3] = value
+    header = path.read_bytes().split(b"end_header\n", 1)[0]
+    path.write_bytes(header + b"end_header\n" + vertices.tobytes())
+    with pytest.raises(ValueError, match=f"1 of {len(blocks)} blocks have .*{fault}"):
+        read_ply(path)
+
+
+@pytest.mark.parametrize("change", [lambda data: data[:-1], lambda data: data + b"x", lambda data: data[5:]])
+def test_a_file_of_another_size_is_refused(tmp_path, blocks, change):
+    path = tmp_path / "basin.ply"
+    write_ply(path, blocks)
+    path.write_bytes(change(path.read_bytes()))
+    with pytest.raises(ValueError, match=r"basin\.ply"):
+        read_ply(path)
+
+
+@pytest.fixture
+def folder(tmp_path):
+    return MapFolder(str(tmp_path / "maps"))
+
+
+def _files(folder):
+    return sorted(path.name for path in folder.folder.iterdir())
+
+
+def test_a_map_is_loaded_by_the_name_it_was_saved_under(folder):
+    folder.save("basin", stored_map())
+    assert len(folder.load("basin")) == len(folder.load("basin.mlsm")) == len(stored_map())
+
+
+def test_a_map_of_the_same_name_is_kept_under_a_numbered_one(folder):
+    for seed in range(3):
+        folder.save("basin", stored_map(seed))
+    assert _files(folder) == ["basin.1.mlsm", "basin.2.mlsm", "basin.mlsm"]
+    first, newest = stored_map(0).layers[Layer.SHOWN], stored_map(2).layers[Layer.SHOWN]
+    assert len(folder.load("basin.1").shown) == len(first)
+    assert len(folder.load("basin").shown) == len(newest)
+
+
+def test_overwriting_keeps_nothing(folder):
+    for seed in range(2):
+        folder.save("basin", stored_map(seed), overwrite=True)
+    assert _files(folder) == ["basin.mlsm"]
+
+
+@pytest.mark.parametrize("overwrite", [False, True])
+def test_an_empty_map_replaces_none(folder, overwrite):
+    folder.save("basin", stored_map())
+    before = (folder.folder / "basin.mlsm").read_bytes()
+    empty = StoredMap("map", {Layer.SHOWN: Blocks(np.empty((0, ROW_WIDTH)), 0.5), Layer.FREE: stored_map().shown})
+    with pytest.raises(MapFileError, match="not replaced, the map has no blocks"):
+        folder.save("basin", empty, overwrite)
+    assert _files(folder) == ["basin.mlsm"]
+    assert (folder.folder / "basin.mlsm").read_bytes() == before
+
+
+@pytest.mark.parametrize("call", ["fsync", "replace"])
+def test_a_disk_that_fails_leaves_the_old_map(folder, monkeypatch, call):
+    folder.save("basin", stored_map(), overwrite=True)
+
+    def full_disk(*_):
+        raise OSError("no space left on device")
+
+    monkeypatch.setattr(os, call, full_disk)
+    with pytest.raises(OSError, match="no space left"):
+        folder.save("basin", stored_map(1), overwrite=True)
+    monkeypatch.undo()
+    assert content(folder.load("basin"))[0].keys() == content(stored_map())[0].keys()
+    assert (folder.folder / "basin.mlsm").read_bytes() == map_bytes(stored_map())
+    assert _files(folder) == ["basin.mlsm"]
+
+
+@pytest.mark.parametrize(
+    "name", ["", ".", "..", "../basin", "a/b", "/etc/passwd", "a/..", "basin/", ".hidden", "a\0b", "~/../x"]
+)
+def test_a_name_that_would_leave_the_folder_is_refused(folder, name):
+    with pytest.raises(MapFileError, match="must be a plain file name"):
+        folder.path(name)
+
+
+def test_a_link_that_leads_out_of_the_folder_is_refused(folder, tmp_path):
+    folder.folder.mkdir()
+    (tmp_path / "outside.mlsm").write_bytes(b"")
+    (folder.folder / "basin.mlsm").symlink_to(tmp_path / "outside.mlsm")
+    with pytest.raises(MapFileError, match="which is not in"):
+        folder.load("basin")
+
+
+def test_a_map_that_is_not_there_is_told_in_one_line_with_its_path(folder):
+    with pytest.raises(MapFileError, match=r"basin\.mlsm: No such file"):
+        folder.load("basin")
+
+
+def test_a_map_put_aside_has_another_name_and_only_one_is_kept(folder):
+    for seed in range(2):
+        folder.save("core.autosave", stored_map(seed), overwrite=True)
+        folder.put_aside("core.autosave")
+    assert _files(folder) == ["core.autosave.previous.mlsm"]
+    assert len(folder.load("core.autosave.previous")) == len(stored_map(1))
+
+
+def test_a_map_that_another_node_has_put_aside_need_not_be_put_aside(folder):
+    folder.put_aside("core.autosave")
+    assert not folder.folder.exists()
+
+
+def test_an_ending_tells_the_format_and_is_numbered_too(folder):
+    for _ in range(2):
+        folder.save("basin.ply", stored_map())
+    assert _files(folder) == ["basin.1.ply", "basin.ply"]
+    assert (folder.folder / "basin.ply").read_bytes().startswith(b"ply")

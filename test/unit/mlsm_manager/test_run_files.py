@@ -6,7 +6,7 @@ import matplotlib.colors
 import matplotlib.image
 import numpy as np
 import pytest
-from made_blocks import blocks_of
+from made_maps import blocks_of
 
 from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth

@@ -4,8 +4,13 @@ import re
 
 import numpy as np
 import pytest
+from map_bag_runs import BASIN
 
+from mlsm_manager.offline.recording import read_recording, scans_of
+from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
@@ -16,6 +21,9 @@ from mlsm_manager.self_check.path_checks import (
     starts_agree,
 )
 from mlsm_manager.self_check.verdict import Verdict, merged
+from node_support.geometry import inverse, transformed
+from recordings.motion.vehicle_motion import MotionNames
+from recordings.reader import Request
 
 TIMES = np.arange(0.0, 2000.0, 1.0)
 TURN_SECONDS = 14.0
@@ -168,24 +176,16 @@ def test_a_dvl_tells_the_way_along_a_canal():
     assert surfaces_tell(0.0, *heard(canal_after(0)), distance_deviation=0.01) == ()
 
 
-def test_few_scans_say_too_little_of_the_surfaces():
-    assert "too little" in surfaces_tell(0.0, *heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
-
-
 def test_a_run_of_one_map_has_no_such_check():
     assert in_submaps(TURNS, np.zeros(10, dtype=bool)) == ()
 
 
 def test_scans_apart_make_it_fire_and_are_the_doubtful_ones():
+    assert in_submaps(TURNS[:1], np.ones(1, dtype=bool))[0].fires
     (verdict,) = in_submaps(TURNS, TURNS > 90.0)
     assert verdict.line().startswith("DOUBTFUL: the place of some scans in the map is unknown since a silence")
     assert verdict.value == 0.7
     np.testing.assert_allclose(verdict.doubtful, [[84.0, 126.0]])
-
-
-def test_a_single_scan_apart_is_told():
-    (verdict,) = in_submaps(TURNS[:1], np.ones(1, dtype=bool))
-    assert verdict.fires
 
 
 def run_of(lying, share=0.2):
@@ -215,9 +215,84 @@ def test_the_figure_falls_with_the_shares_of_the_scans_that_fit_worst():
 
 
 def test_few_scans_say_too_little():
+    assert "too little" in surfaces_tell(0.0, *heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
     assert "too little" in scans_go_on(TURN_SECONDS * np.arange(10), np.full(10, 0.1)).line()
 
 
 def test_scans_without_points_are_left_out():
     shares = np.where(np.arange(50) % 2, np.nan, 0.9)
     assert not scans_go_on(TURN_SECONDS * np.arange(50), shares).fires
+
+
+TURN = 0.4
+LEVEL = np.zeros(10)
+TURNED_OVER = -1.0
+
+
+def _scans(count, sign=1.0, turn=TURN, step=(0.0, 0.0)):
+    """Return scans of a room of 20 x 12 m by a vehicle that turns and moves from scan to scan.
+
+    sign: 1.0, or TURNED_OVER for an odometry that counts z down.
+    """
+    rng = np.random.default_rng(0)
+    corners = np.array([[10.0, 6.0], [-10.0, 6.0], [-10.0, -6.0], [10.0, -6.0], [10.0, 6.0]])
+    share = np.linspace(0.0, 1.0, 80, endpoint=False)[:, np.newaxis]
+    walls = np.concatenate([a + share * (b - a) for a, b in zip(corners, corners[1:])]) + np.array([4.0, 1.0])
+    scans = []
+    for number in range(count):
+        pose = number * np.array([*step, turn])
+        told = pose * np.array([1.0, sign, sign])
+        seen = transformed(inverse(pose), walls) + rng.normal(0.0, 0.05, walls.shape)
+        track = Track(np.array([number, number + 1.0]), np.array([told, told]))
+        points = np.column_stack([transformed(told, seen), np.zeros(len(seen)), np.full(len(seen), 100.0)])
+        scans.append(Scan(points, np.full(len(points), number + 0.5), np.ones(len(points), bool), track, number + 1.0))
+    return scans
+
+
+@pytest.mark.parametrize("step", [(0.0, 0.0), (0.5, 0.3)])
+def test_a_yaw_that_turns_against_the_echoes_is_a_suspicion_and_one_that_they_follow_is_none(step):
+    assert z_down_signs(LEVEL, _scans(8, step=step)).lines() == []
+    (sign,) = z_down_signs(LEVEL, _scans(8, TURNED_OVER, step=step)).lines()
+    assert sign == "in 100 % of the scans the echoes fit better with y and yaw reversed"
+
+
+def test_a_vehicle_that_stands_tells_nothing():
+    signs = ZDownSigns()
+    for scan in _scans(8, TURNED_OVER, turn=0.0):
+        signs.take_scan(scan)
+    assert signs.lines() == []
+
+
+@pytest.mark.parametrize(("heights", "count"), [([0.0, 3.0, 5.0], 1), ([0.0, -3.0, -5.0], 0), ([-5.0, 0.0, -5.0], 1)])
+def test_a_vehicle_that_climbs_far_above_its_start_is_a_suspicion(heights, count):
+    assert len(z_down_signs(np.array(heights), []).lines()) == count
+
+
+@pytest.mark.parametrize(("heights", "count"), [([-5.0, 0.0], 0), ([-5.0, 1.5], 0), ([0.0, 2.5], 1), ([3.0, 4.0], 1)])
+def test_a_live_vehicle_is_compared_with_the_surface(heights, count):
+    signs = ZDownSigns()
+    for height in heights:
+        signs.take_heights(np.array([height]))
+    assert len(signs.lines()) == count
+
+
+def test_a_live_vehicle_is_suspected_once_enough_turns_speak_against_it():
+    signs = ZDownSigns()
+    known = []
+    for scan in _scans(8, TURNED_OVER):
+        signs.take_scan(scan)
+        known.append(len(signs.lines()))
+    assert known == [0, 0, 0, 0, 0, 1, 1, 1]
+
+
+@pytest.mark.parametrize(("z_is_down", "count"), [(False, 0), (True, 1)])
+def test_a_tour_of_the_basin_turned_over_is_suspected(z_is_down, count):
+    recording = read_recording(BASIN, Request(motion=MotionNames(z_is_down=z_is_down)))
+    scans = [scan for scan, _ in scans_of(recording, ReplayParameters().echoes())]
+    assert len(z_down_signs(LEVEL, scans).lines()) == count
+
+
+def test_a_run_whose_turns_are_reversed_is_doubted():
+    assert not z_down_signs(LEVEL, _scans(8)).turns().fires
+    assert z_down_signs(LEVEL, _scans(8, TURNED_OVER)).turns().fires
+    assert "too little" in z_down_signs(LEVEL, _scans(4, TURNED_OVER)).turns().line()

@@ -1,0 +1,244 @@
+"""The map as messages: boxes that show blocks where they are, packed as genpy would write them, and OctoMap's tree."""
+
+import sys
+from importlib.machinery import ModuleSpec
+from io import BytesIO
+from types import ModuleType
+from typing import NamedTuple, Tuple
+
+import genpy
+import genpy.dynamic
+import numpy as np
+import pytest
+from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
+from hypothesis import given
+from hypothesis import strategies as st
+from made_maps import blocks_of, random_map
+from std_msgs.msg import Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from mlsm_manager.ros.map_publisher import has_octomap_messages, octomap_message
+from mlsm_manager.ros.markers import COLORS, BlockMarkers
+from mlsm_manager.surface_map.export.octomap import octree, write_octree
+from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
+from mlsm_manager.surface_map.tiles import THINNEST, TILE_BITS, box_lists, box_size, box_type
+
+HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
+MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.9), (5.0, 5.01)]
+
+
+class BoxList(NamedTuple):
+    """Boxes of one size in one tile: centers (n, 3) m, owners (n,) indices of the blocks that they show."""
+
+    resolution: float
+    tile: Tuple[int, int]
+    power: int
+    centers: np.ndarray
+    owners: np.ndarray
+
+    @property
+    def type(self):
+        return box_type(self.power)
+
+    @property
+    def size(self):
+        return np.array(box_size(self.resolution, self.power))
+
+
+def boxes_by_list(blocks):
+    """Return the lists of boxes that show `blocks`."""
+    lists = box_lists(blocks)
+    parts = [slice(start, end) for start, end in zip(lists.starts, lists.starts[1:])]
+    kinds = zip(map(tuple, lists.tiles.tolist()), lists.powers.tolist(), parts)
+    return [
+        BoxList(blocks.resolution, tile, power, lists.centers[part], lists.owners[part]) for tile, power, part in kinds
+    ]
+
+
+def _bytes(message):
+    buff = BytesIO()
+    message.serialize(buff)
+    return buff.getvalue()
+
+
+def _read(message):
+    return MarkerArray().deserialize(_bytes(message)).markers
+
+
+def _object_by_object(boxes, number):
+    return Marker(
+        header=HEADER,
+        ns=boxes.type.name.lower(),
+        id=number,
+        type=Marker.CUBE_LIST,
+        action=Marker.ADD,
+        pose=Pose(orientation=Quaternion(w=1.0)),
+        scale=Vector3(*boxes.size),
+        color=COLORS[boxes.type],
+        points=[Point(*center) for center in boxes.centers],
+    )
+
+
+@pytest.mark.parametrize("intervals", [MIXED, MIXED[:1], MIXED * 200, []])
+def test_the_bytes_are_those_of_markers_built_point_by_point(intervals):
+    blocks = blocks_of(intervals)
+    packed = BlockMarkers().whole(blocks, HEADER)
+    numbers = [marker.id for marker in _read(packed)]
+    assert len(set(numbers)) == len(numbers)
+    expected = [_object_by_object(boxes, number) for boxes, number in zip(boxes_by_list(blocks), numbers)]
+    assert _bytes(packed) == _bytes(MarkerArray(markers=expected))
+
+
+def test_a_class_of_boxes_that_vanished_is_deleted_once():
+    markers = BlockMarkers()
+    (shown,) = _read(markers.whole(blocks_of([(0.0, 0.1)]), HEADER))
+    actions = {(m.ns, m.id): m.action for m in _read(markers.whole(blocks_of([(0.0, 4.0)]), HEADER))}
+    assert actions.pop((shown.ns, shown.id)) == Marker.DELETE
+    assert list(actions.values()) == [Marker.ADD]
+    assert [m.action for m in _read(markers.whole(blocks_of([(0.0, 4.0)]), HEADER))] == [Marker.ADD]
+
+
+def test_an_emptied_map_deletes_all_that_was_shown():
+    markers = BlockMarkers()
+    shown = {(m.ns, m.id) for m in _read(markers.whole(blocks_of(MIXED), HEADER))}
+    left = _read(markers.whole(blocks_of([]), HEADER))
+    assert {(m.ns, m.id) for m in left} == shown
+    assert {m.action for m in left} == {Marker.DELETE}
+
+
+def test_blocks_are_coloured_one_by_one_when_asked():
+    blocks = blocks_of(MIXED)
+    read = _read(BlockMarkers(ColorBy.HEIGHT).whole(blocks, HEADER))
+    expected = block_colors(blocks, ColorBy.HEIGHT)
+    for marker, boxes in zip(read, boxes_by_list(blocks)):
+        colors = [[color.r, color.g, color.b] for color in marker.colors]
+        np.testing.assert_allclose(colors, expected[boxes.owners], atol=1e-6)
+        assert {color.a for color in marker.colors} == {1.0}
+
+
+def test_a_changed_tile_is_sent_alone_and_keeps_its_ids():
+    markers, blocks = BlockMarkers(), blocks_of([(0.0, 0.1)] * 40)
+    before = {(m.points[0].x, m.ns): m.id for m in _read(markers.whole(blocks, HEADER))}
+    assert len(before) == 3
+    second = blocks.take((blocks.cells[:, 0] >> TILE_BITS) == 1)
+    (sent,) = _read(markers.changed(second, [(1, 0)], HEADER))
+    assert before[sent.points[0].x, sent.ns] == sent.id
+
+
+def test_a_tile_that_lost_its_blocks_is_deleted():
+    markers, blocks = BlockMarkers(), blocks_of([(0.0, 0.1)] * 40)
+    ids = {m.id for m in _read(markers.whole(blocks, HEADER))}
+    (deleted,) = _read(markers.changed(blocks_of([]), [(1, 0)], HEADER))
+    assert (deleted.action, deleted.id in ids) == (Marker.DELETE, True)
+    assert _read(markers.changed(blocks_of([]), [(1, 0)], HEADER)) == []
+
+
+def test_a_late_subscriber_gets_all_and_changes_nothing_for_the_others():
+    markers, blocks = BlockMarkers(), blocks_of([(0.0, 0.1)] * 40)
+    shown = {m.id for m in _read(markers.whole(blocks, HEADER))}
+    assert {m.id for m in _read(markers.again(blocks, HEADER))} == shown
+    assert {m.id for m in _read(markers.whole(blocks_of([]), HEADER))} == shown
+
+
+BOTTOMS = st.floats(-50.0, 50.0)
+DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))
+
+
+def _drawn(lists):
+    """Return {x y of the cell's centre: [(bottom, top) of its boxes, from below]}."""
+    drawn = {}
+    for boxes in lists:
+        for x, y, z in boxes.centers:
+            drawn.setdefault((x, y), []).append((z - boxes.size[2] / 2.0, z + boxes.size[2] / 2.0))
+    return {cell: sorted(spans) for cell, spans in drawn.items()}
+
+
+@given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20), st.sampled_from([0.1, 0.5, 1.0]))
+def test_boxes_reach_from_bottom_to_top_without_a_gap(intervals, resolution):
+    blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], resolution)
+    drawn = _drawn(boxes_by_list(blocks))
+    assert len(drawn) == len(blocks)
+    for center, bottom, top in zip(blocks.centers, blocks.bottom, blocks.height):
+        spans = drawn[tuple(center)]
+        thickness = max(top - bottom, resolution * 2.0**THINNEST)
+        middle = (bottom + top) / 2.0
+        assert spans[0][0] == pytest.approx(middle - thickness / 2.0, abs=1e-9)
+        assert spans[-1][1] == pytest.approx(middle + thickness / 2.0, abs=1e-9)
+        assert all(upper[0] <= lower[1] + 1e-9 for lower, upper in zip(spans, spans[1:]))
+
+
+@given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20))
+def test_every_list_holds_blocks_of_one_kind(intervals):
+    blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], 0.5)
+    kinds = dict(zip(map(tuple, blocks.centers), blocks.type))
+    for boxes in boxes_by_list(blocks):
+        assert {kinds[x, y] for x, y, _ in boxes.centers} == {boxes.type}
+
+
+@pytest.mark.parametrize(("interval", "heights"), [((1.0, 3.0), [2.0]), ((0.0, 3.0), [1.0, 2.0])])
+def test_a_depth_that_is_a_power_of_two_takes_one_box_and_any_other_two_that_overlap(interval, heights):
+    (boxes,) = boxes_by_list(blocks_of([interval]))
+    assert sorted(boxes.centers[:, 2].tolist()) == heights
+    assert boxes.size.tolist() == [0.5, 0.5, 2.0]
+
+
+def test_a_tile_of_metres_needs_few_lists_and_none_twice():
+    lists = boxes_by_list(blocks_of([(0.0, depth) for depth in np.linspace(0.0, 60.0, 2000)]))
+    powers = {}
+    for boxes in lists:
+        powers.setdefault(boxes.tile, []).append(boxes.power)
+    assert all(len(told) == len(set(told)) <= 11 for told in powers.values())
+
+
+def test_a_box_lies_in_its_tile_and_knows_its_block():
+    blocks = blocks_of([(0.0, 3.0)] * 50)
+    for boxes in boxes_by_list(blocks):
+        np.testing.assert_array_equal(boxes.centers[:, :2], blocks.centers[boxes.owners])
+        assert {tuple(tile) for tile in (blocks.cells[boxes.owners] >> TILE_BITS).tolist()} == {boxes.tile}
+
+
+DEFINITION = f"""Header header
+bool binary
+string id
+float64 resolution
+int8[] data
+{"=" * 80}
+MSG: std_msgs/Header
+{Header._full_text}
+"""
+MD5 = "9a45536b45c5e409cd49f04bb2d9999f"
+"""Of octomap_msgs/Octomap, as its package has it."""
+
+
+@pytest.fixture
+def message_type(monkeypatch):
+    """Return the type octomap_msgs.msg.Octomap, which can be imported meanwhile."""
+    kind = genpy.dynamic.generate_dynamic("octomap_msgs/Octomap", DEFINITION)["octomap_msgs/Octomap"]
+    for name in ("octomap_msgs", "octomap_msgs.msg"):
+        module = ModuleType(name)
+        module.__spec__ = ModuleSpec(name, None)
+        monkeypatch.setitem(sys.modules, name, module)
+    sys.modules["octomap_msgs.msg"].Octomap = kind
+    return kind
+
+
+@pytest.fixture
+def received(message_type):
+    """Return the message as it arrives."""
+    pytest.importorskip("pyoctomap")
+    tree = octree(random_map(0).blocks, random_map(1).blocks)
+    return message_type().deserialize(_bytes(octomap_message(tree, Header(frame_id="map"))))
+
+
+def test_the_type_is_that_of_octomap_msgs(message_type):
+    assert message_type._md5sum == MD5
+    assert has_octomap_messages()
+
+
+def test_the_message_holds_the_tree_of_a_file(tmp_path, received):
+    """octomap_msgs leaves out the header."""
+    write_octree(tmp_path / "map.bt", random_map(0).blocks, random_map(1).blocks)
+    header, tree = (tmp_path / "map.bt").read_bytes().split(b"\ndata\n", 1)
+    assert np.array(received.data, dtype=np.int8).tobytes() == tree
+    assert f"id {received.id}\n".encode() in header
+    assert (received.binary, received.header.frame_id, received.resolution) == (True, "map", 0.5)
