@@ -19,6 +19,9 @@ from mlsm_manager.joint_solver.weak_directions import discounted
 TIE = 0.05
 """m by which a neighbour may be farther than the nearest one and still count in part. Were it 0, the nearest one would
 be decided by the last bit where two are equally near. More would compare each point with more neighbours."""
+FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
+COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one
+_PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
 
 
 class Neighbours:
@@ -60,10 +63,6 @@ def shares_of(distance: np.ndarray, nearest: np.ndarray) -> np.ndarray:
     return share / share.sum(axis=0)
 
 
-FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
-COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one
-
-
 @dataclass(frozen=True)
 class Pairs:
     """m comparisons: rows of the compared points and of their neighbours in two sets of placed points.
@@ -102,9 +101,6 @@ def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, parameters: Solv
     return ramp(distance, cut, FADING * cut) * ramp(
         cosine, parameters.min_cosine, parameters.min_cosine + COSINE_FADING
     )
-
-
-_PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
 
 
 def add_comparisons(

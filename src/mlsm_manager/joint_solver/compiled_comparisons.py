@@ -24,7 +24,7 @@ def weighed_pairs(
     rows, neighbours, distances, shares, source_normals, source_qualities, target_normals, target_qualities,
     cut, near, least_cosine, full_cosine,
 ):  # fmt: skip
-    """Return the comparisons that count: rows, neighbours and importance, each (m,); see association.weighed.
+    """Return the comparisons that count: rows, neighbours and importance, each (m,); see comparisons.pairs_of.
 
     near: m up to which a pair counts fully. full_cosine: that from which on it does.
     """

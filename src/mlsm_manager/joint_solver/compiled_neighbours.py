@@ -86,7 +86,7 @@ _NEVER = 1e300  # m^2: no point is so far away
 _FIRST_CAPACITY = 1024
 
 _Grid = namedtuple("_Grid", "low_x low_y rows columns side span")
-"""See compiled_cells.Cells."""
+"""See Cells."""
 _Targets = namedtuple("_Targets", "x y scan block row")
 """Points in the order of their cells; row: (k,) where each stood before."""
 _Around = namedtuple("_Around", "place square count nearest scan other bound")
@@ -291,7 +291,7 @@ def shared_neighbours(
     sources, source_scans, places, scans, blocks, count, cut, tie,
     low_x, low_y, rows, columns, side, span, target_starts, target_order, source_starts, source_order,
 ):  # fmt: skip
-    """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see association.Neighbours.
+    """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see comparisons.Neighbours.
 
     sources: (n, 2) m. places: (k, 2) m, scans: (k,), blocks: (k,) from 0 to before `count`: of the targets, k > 0.
     low_x to source_order: Cells for a reach of `cut` + `tie`.

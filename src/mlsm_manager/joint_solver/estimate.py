@@ -105,7 +105,7 @@ def misfit_covariance(variances: np.ndarray) -> np.ndarray:
 
 class Turns(NamedTuple):
     """n turns. times: (n,) s of their ends. agreements: (n,), surfaces: (n, 2, 2), see LiveEstimate. radii: (n,) m,
-    told deviation of the position. apart: (n,) bool, whether their place in the map is not known.
+    stated deviation of the position. apart: (n,) bool, whether their place in the map is not known.
     """
 
     times: np.ndarray

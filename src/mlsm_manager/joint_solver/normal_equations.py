@@ -1,4 +1,4 @@
-"""Names of the unknowns and where they stand in a vector.
+"""Names of the unknowns, where they stand in a vector, and sums of weighted residuals as normal equations for them.
 
 A node is a moment between two scans. Its first three columns correct the odometry there: T_map_base is the odometry's
 pose plus x, y and yaw. An odometry model may add columns of its own. The run's unknowns come after all nodes.

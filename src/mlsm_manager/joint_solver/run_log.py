@@ -10,6 +10,8 @@ from mlsm_manager.joint_solver.surface_points import SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
+_SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
+
 
 class PointTable:
     """The points of scans 0, 1, ... in the order of time."""
@@ -63,13 +65,10 @@ class PointTable:
         return self._scans.values[rows].astype(np.int64)
 
 
-_SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
-
-
 class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
-    sonar_in_base: (2,) m. lone: points of what is small.
+    sonar_in_base: (2,) m. posts: echoes of what is small.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -151,9 +150,6 @@ class RunLog:
         return self.odometry.at(self.node_times[nodes])
 
 
-_SHORTEST_TURN = 1.0  # s: a first scan without points still needs a beginning before its end
-
-
 def parts_of(scan: Scan, count: int, newest: Optional[float]) -> List[Scan]:
     """Return `count` scans of equal durations that follow each other, with the points of each.
 
@@ -171,7 +167,7 @@ def parts_of(scan: Scan, count: int, newest: Optional[float]) -> List[Scan]:
 def _start(scan: Scan, newest: Optional[float]) -> float:
     """Return when the turn began [s]; a scan without points, or with one beam, does not tell."""
     if newest is None:
-        return min(scan.start, scan.reference_time - _SHORTEST_TURN)
+        return min(scan.start, scan.reference_time - _SHORTEST_SCAN)
     return max(scan.start, newest) if scan.start < scan.reference_time else newest
 
 
