@@ -1,12 +1,12 @@
-"""One ping: the wait for its reply, and what the device makes of what comes instead."""
+"""One ping of the 852: the wait for its reply, what the device makes of what comes instead, and one after the other."""
 
 import pytest
-from driver_line import served
-from virtual_line import VirtualLine, VirtualStop, VirtualStopAt, VirtualTime
+from emulated_drivers import EPOCH, IMAGENEX_852, VirtualScan, running, served
+from virtual_line import VirtualStopAt, VirtualTime
 
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
 from imagenex_852_driver.line.device import ReplyWait, SonarDevice
-from imagenex_852_driver.line.parameters import ConnectionParameters
+from imagenex_852_driver.line.parameters import ConnectionParameters, Direction, HeadSettings
 from imagenex_852_driver.protocol.command import SwitchCommand
 from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 from imagenex_852_driver.protocol.reply_parser import ParsedReply
@@ -20,9 +20,6 @@ START = 100.0
 BEGINS = START + 27 * 10 / 115200 + 2 * 30 / 1500
 REPLY = Reply(ReplyKind.IGX, 30, bytes(500))
 COMMAND = SwitchCommand(max_range=50)
-FAST = ConnectionParameters(
-    baud_rate=1152000, speed_of_sound=15000.0, reply_margin=0.1, late_window=0.15, byte_gap=0.06
-)  # fmt: skip
 
 
 @pytest.fixture
@@ -90,99 +87,61 @@ def test_the_missing_bytes_are_those_of_a_whole_reply(wait, received):
     assert wait.missing_bytes == 513 - received
 
 
-class FixedStatusHead(Emulated852):
-    """Answers every command with one reply, whatever was asked."""
-
-    def __init__(self, reply):
-        super().__init__()
-        self._reply = reply
-
-    def _ping(self, command, time, overrun):
-        return self._reply
-
-
-def virtual_device(head, connection, stop=None):
-    """Return an open device on a head, in a time that begins at 1000 s."""
-    time = stop.time if stop else VirtualTime()
-    line = VirtualLine(head, connection.baud_rate, time)
-    device = SonarDevice(connection, stop or VirtualStop(time), lambda: 1000.0 + time.now, time.elapsed, line.open)
-    device.open()
-    return device
-
-
 @pytest.fixture
 def faults():
     return FaultInjector(EmulatorParameters(lateness=0.2, silence_duration=0.3))
 
 
 @pytest.fixture
-def line(faults):
-    """Return a device in virtual time, and the faults of its head."""
-    return virtual_device(Emulated852(faults=faults, timing=FAST.timing()), FAST), faults
+def device(faults):
+    """Return a device in virtual time on a head with these faults."""
+    return VirtualScan(IMAGENEX_852, faults=faults).device
 
 
-def test_a_ping_brings_the_reply_to_its_command(line):
-    ping = line[0].ping(COMMAND)
+def test_a_ping_brings_the_reply_to_its_command(device):
+    ping = device.ping(COMMAND)
     assert (ping.command, ping.reply.kind, ping.reply.max_range) == (COMMAND, ReplyKind.IGX, 50)
-    assert line[0].stats.replies == 1
+    assert device.stats.replies == 1
 
 
-def test_the_stamp_is_when_the_last_byte_of_the_command_left(line):
-    assert line[0].ping(COMMAND).stamp == pytest.approx(1000.0 + 27 * 10 / 1152000)
+def test_the_stamp_is_when_the_last_byte_of_the_command_left(device):
+    assert device.ping(COMMAND).stamp == pytest.approx(EPOCH + 27 * 10 / 1152000)
 
 
-def test_the_next_command_may_ask_for_something_else(line):
-    line[0].ping(COMMAND)
-    assert line[0].ping(SwitchCommand(max_range=20, data_points=250)).reply.kind is ReplyKind.IMX
+def test_the_next_command_may_ask_for_something_else(device):
+    device.ping(COMMAND)
+    assert device.ping(SwitchCommand(max_range=20, data_points=250)).reply.kind is ReplyKind.IMX
 
 
-@pytest.mark.parametrize("fault", [Fault.DROPPED, Fault.LATE, Fault.SILENCE])
-def test_a_reply_that_does_not_come_in_time_is_a_timeout(line, fault):
-    device, faults = line
+@pytest.mark.parametrize(
+    ("fault", "count", "told"),
+    [
+        (Fault.DROPPED, "timeouts", "no reply within"),
+        (Fault.SILENCE, "timeouts", "no reply within"),
+        (Fault.LATE, "timeouts", "came late"),
+        (Fault.GARBLED, "bad_frames", "bad reply"),
+        (Fault.TRUNCATED, "bad_frames", "bad reply"),
+    ],
+)
+def test_a_reply_that_does_not_come_in_time_is_a_timeout_and_a_spoilt_one_a_bad_frame(
+    device, faults, fault, count, told
+):
     faults.order(fault)
     assert device.ping(COMMAND) is None
-    assert (device.stats.timeouts, device.stats.bad_frames) == (1, 0)
+    assert getattr(device.stats, count) == device.stats.timeouts + device.stats.bad_frames == 1
+    assert told in device.stats.last_error
 
 
-def test_a_timeout_is_the_last_error(line):
-    device, faults = line
-    faults.order(Fault.DROPPED)
-    device.ping(COMMAND)
-    assert "no reply within" in device.stats.last_error
-
-
-@pytest.mark.parametrize("fault", [Fault.GARBLED, Fault.TRUNCATED])
-def test_a_spoilt_reply_is_a_bad_frame(line, fault):
-    device, faults = line
-    faults.order(fault)
-    assert device.ping(COMMAND) is None
-    assert (device.stats.timeouts, device.stats.bad_frames) == (0, 1)
-    assert "bad reply" in device.stats.last_error
-
-
-@pytest.mark.parametrize("fault", [Fault.DROPPED, Fault.LATE, Fault.GARBLED, Fault.TRUNCATED, Fault.DOUBLED])
-def test_the_ping_after_a_fault_gets_its_own_reply(line, fault):
-    device, faults = line
-    faults.order(fault)
-    device.ping(COMMAND)
-    # Every ping steps by 20 positions, so the position tells which ping was answered.
-    assert device.ping(COMMAND).reply.head_position == 1420
-
-
-@pytest.mark.parametrize("fault", [Fault.LATE, Fault.DOUBLED])
-def test_a_reply_that_nobody_waits_for_is_counted(line, fault):
-    device, faults = line
-    faults.order(fault)
-    device.ping(COMMAND)
-    device.ping(COMMAND)
-    assert device.stats.unexpected_replies == 1
-
-
-def test_an_overrun_is_counted_and_its_reply_delivered(line):
-    device, faults = line
+def test_the_overrun_of_a_reply_is_handed_on(device, faults):
     faults.order(Fault.OVERRUN)
     assert device.ping(COMMAND).reply.overrun
-    assert device.stats.overruns == 1
+
+
+class FixedReplyHead(Emulated852):
+    """Answers every command with one reply, whatever was asked."""
+
+    def _ping(self, command, time, overrun):
+        return Reply(ReplyKind.IGX, 50, bytes(500))
 
 
 @pytest.mark.parametrize(
@@ -192,27 +151,15 @@ def test_an_overrun_is_counted_and_its_reply_delivered(line):
         (SwitchCommand(max_range=50, head_id=0x12), "head identification 16 instead of 18"),
     ],
 )
-def test_an_answer_to_another_question_is_a_bad_frame(line, asked, complaint):
-    head = FixedStatusHead(line[0].ping(COMMAND).reply)
-    head._head_id = asked.head_id
-    device = virtual_device(head, ConnectionParameters())
+def test_an_answer_to_another_question_is_a_bad_frame(asked, complaint):
+    device = VirtualScan(IMAGENEX_852, head=lambda *line: FixedReplyHead(*line, head_id=asked.head_id)).device
     assert device.ping(asked) is None
     assert complaint in device.stats.last_error
 
 
-def test_every_ping_ends_in_exactly_one_count(line):
-    device, faults = line
-    for fault in (Fault.DROPPED, Fault.GARBLED, Fault.DOUBLED, Fault.NONE):
-        faults.order(fault)
-    for _ in range(4):
-        device.ping(COMMAND)
-    stats = device.stats
-    assert stats.pings == stats.replies + stats.timeouts + stats.bad_frames + stats.interrupted == 4
-
-
 def test_a_stop_interrupts_a_ping_at_once(faults):
     stop = VirtualStopAt(VirtualTime(), 0.05)
-    device = virtual_device(Emulated852(faults=faults, timing=FAST.timing()), FAST, stop)
+    device = VirtualScan(IMAGENEX_852, faults=faults, stop=stop).device
     faults.order(Fault.SILENCE)
     assert device.ping(SwitchCommand(max_range=50, switch_delay_ms=510)) is None
     assert stop.time.now < 0.05 + 0.1
@@ -220,7 +167,7 @@ def test_a_stop_interrupts_a_ping_at_once(faults):
 
 
 def test_a_port_that_goes_away_is_reported_and_closed(tmp_path):
-    with served(tmp_path) as (server, connection):
+    with served(IMAGENEX_852, tmp_path / "sonar") as (server, connection):
         device = SonarDevice(connection)
         device.open()
         server.disappear()
@@ -235,7 +182,7 @@ def test_pinging_without_a_port_is_refused(tmp_path):
         device.ping(COMMAND)
 
 
-def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
+def test_a_device_that_only_echoes_gives_bad_frames():
     device = SonarDevice(ConnectionParameters(port="loop://", reply_margin=0.05, byte_gap=0.02))
     device.open()
     assert device.ping(SwitchCommand(max_range=5)) is None
@@ -244,11 +191,13 @@ def test_a_device_that_only_echoes_gives_bad_frames(tmp_path):
 
 
 def test_replies_before_sound_can_have_returned_are_dropped_and_counted_on_their_own():
-    head = Emulated852(timing=ConnectionParameters(speed_of_sound=2000.0).timing())
-    device = virtual_device(head, ConnectionParameters(speed_of_sound=1400.0))
-    assert [device.ping(SwitchCommand(max_range=50)) for _ in range(5)] == [None] * 5
-    stats = device.stats
-    assert (stats.early_replies, stats.unexpected_replies, stats.timeouts) == (5, 0, 5)
+    timing = ConnectionParameters(speed_of_sound=2000.0).timing()
+    scan = VirtualScan(
+        IMAGENEX_852, head=lambda echoes, faults, _: Emulated852(echoes, faults, timing),
+        baud_rate=115200, speed_of_sound=1400.0,
+    )  # fmt: skip
+    assert [scan.device.ping(COMMAND) for _ in range(5)] == [None] * 5
+    assert (scan.stats.early_replies, scan.stats.unexpected_replies, scan.stats.timeouts) == (5, 0, 5)
 
 
 class EchoingLine(Emulated852):
@@ -258,8 +207,33 @@ class EchoingLine(Emulated852):
         return [Transmission(time, data), *super().receive(data, time)]
 
 
-def test_an_adapter_that_echoes_the_command_does_no_harm():
-    device = virtual_device(EchoingLine(timing=FAST.timing()), FAST)
-    replies = [device.ping(COMMAND).reply.head_position for _ in range(3)]
-    assert replies == [1400, 1420, 1440]
-    assert (device.stats.replies, device.stats.bad_frames, device.stats.unexpected_replies) == (3, 0, 0)
+@pytest.mark.parametrize("head", [Emulated852, EchoingLine])
+def test_pings_come_one_after_the_other_also_where_an_adapter_echoes_the_command(head):
+    scan = VirtualScan(IMAGENEX_852, head=head)
+    scan.beams(5)
+    assert positions(scan.pings) == [1400, 1420, 1440, 1460, 1480]
+    assert (scan.stats.replies, scan.stats.bad_frames, scan.stats.unexpected_replies) == (5, 0, 0)
+
+
+def positions(pings):
+    return [ping.reply.head_position for ping in pings]
+
+
+def test_new_settings_take_effect_at_the_next_ping():
+    scan = VirtualScan(IMAGENEX_852)
+    scan.beams(2)
+    scan.settings = HeadSettings(max_range=20, direction=Direction.COUNTERCLOCKWISE)
+    scan.beams(2)
+    assert [ping.reply.max_range for ping in scan.pings] == [50, 50, 20, 20]
+    assert positions(scan.pings) == [1400, 1420, 1440, 1420]
+
+
+def test_the_scan_goes_on_after_the_head_rebooted(tmp_path):
+    sector = HeadSettings(max_range=50, train_angle_deg=30, sector_width_deg=6)
+    with running(IMAGENEX_852, tmp_path / "sonar", sector) as (scan, server):
+        assert scan.wait_for_more(15)
+        before = len(scan.pings)
+        server.head.reboot()
+        assert scan.wait_for_more(20)
+    assert 1400 in positions(scan.pings[before:])
+    assert set(positions(scan.pings[-4:])) == {1580, 1600, 1620}

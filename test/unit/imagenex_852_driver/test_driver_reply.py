@@ -35,9 +35,6 @@ def test_a_recorded_header_is_read_field_by_field():
 
 def test_the_range_resolution_is_the_length_of_one_bin():
     assert Reply(ReplyKind.IGX, 50, bytes(500)).range_resolution == pytest.approx(0.1)
-
-
-def test_a_reply_without_echoes_has_no_range_resolution():
     assert Reply(ReplyKind.IPX, 50, b"").range_resolution == 0.0
 
 
@@ -140,28 +137,19 @@ def test_the_offset_is_where_the_reply_began_in_the_stream():
     assert parser.feed(b"de" + WHOLE.encode())[0].offset == 5
 
 
-def test_straight_ahead_is_zero():
-    assert head_angle(1400) == 0.0
+@pytest.mark.parametrize(
+    ("position", "inverted", "angle"),
+    [(1400, False, 0.0), (2000, False, -math.pi / 2), (2000, True, math.pi / 2), (2800, False, head_angle(400))],
+)
+def test_the_head_counts_clockwise_from_ahead_and_the_angle_counter_clockwise(position, inverted, angle):
+    assert head_angle(position, inverted) == pytest.approx(angle)
 
 
-def test_the_head_counts_clockwise_and_the_angle_counter_clockwise():
-    assert head_angle(1400 + 600) == pytest.approx(-math.pi / 2)
-
-
-def test_a_head_upside_down_turns_the_other_way():
-    assert head_angle(1400 + 600, inverted=True) == pytest.approx(math.pi / 2)
-
-
-@pytest.mark.parametrize("position", range(0, 2801, 20))
+@given(st.integers(0, 2800))
 def test_angles_stay_within_half_a_turn(position):
     assert abs(head_angle(position)) <= math.pi
 
 
-def test_positions_a_turn_apart_have_one_angle():
-    assert head_angle(2800) == pytest.approx(head_angle(2800 - 2400))
-
-
-@pytest.mark.parametrize("inverted", [False, True])
-@pytest.mark.parametrize("position", range(201, 2600, 7))
+@given(st.integers(201, 2599), st.booleans())
 def test_positions_come_back_from_their_angles(position, inverted):
     assert head_position(head_angle(position, inverted), inverted) == position

@@ -7,7 +7,7 @@ import time
 
 import pytest
 import serial
-from driver_line import served
+from emulated_drivers import IMAGENEX_852, free_udp_port, served
 
 from imagenex_852_driver.emulated_852 import Emulated852
 from imagenex_852_driver.line.device import SonarDevice
@@ -26,17 +26,12 @@ from sonar_driver.line.port import (
 NO_SPEED = 0
 
 
-def test_a_second_driver_on_a_port_is_told_so(tmp_path):
-    with served(tmp_path) as (_, connection):
+def test_a_second_driver_on_a_port_is_told_so_until_the_first_one_ended(tmp_path):
+    with served(IMAGENEX_852, tmp_path / "sonar") as (_, connection):
         first = open_port(connection.port, 115200)
         with pytest.raises(PortRefusedError, match="second driver"):
             open_port(connection.port, 115200)
         first.close()
-
-
-def test_a_port_is_free_again_after_the_first_driver_ended(tmp_path):
-    with served(tmp_path) as (_, connection):
-        open_port(connection.port, 115200).close()
         open_port(connection.port, 115200).close()
 
 
@@ -91,12 +86,10 @@ def test_waits_that_would_shrink_are_refused():
 @pytest.fixture
 def line():
     """Yield a head's end of a connection, and the name under which a driver opens the other end."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        number = probe.getsockname()[1]
-    head = UdpLine("127.0.0.1", number)
+    name = free_udp_port()
+    head = UdpLine(*datagram_address(name))
     head.open()
-    yield head, f"udp://127.0.0.1:{number}"
+    yield head, name
     head.close()
 
 
