@@ -1,5 +1,8 @@
 """Motion models of small vehicles, and parameters of the joint solver with a DVL."""
 
+from made_harbour import SONAR_IN_BASE
+
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import (
     Compass,
     DvlFactors,
@@ -38,6 +41,14 @@ UNAIDED = UnaidedFactors(UnaidedOdometry(SPEEDS, 0.05, 10.0, 0.00035))
 def solver_parameters(**values):
     """Return parameters of the joint solver with `values` of some, and the model of a DVL unless another is given."""
     return SolverParameters(**{"odometry": DVL, **values})
+
+
+def followed(scans, parameters=None):
+    """Return the live solver after `scans`, by default of a vehicle with a DVL whose beams may be late."""
+    solver = LiveSolver(parameters or solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
+    for scan in scans:
+        solver.add(scan)
+    return solver
 
 
 def solution_of(log, odometry, state):

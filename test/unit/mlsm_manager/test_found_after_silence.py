@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
-from made_compass import PARAMETERS, with_heading_only
 from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, tour
+from made_models import HEADING, solver_parameters
 
 from mlsm_manager.joint_solver.estimate import Turns
 from mlsm_manager.joint_solver.live_solver import LiveSolver
@@ -12,10 +12,23 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; the search over places is tested with every version")]
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
+
+
+PARAMETERS = solver_parameters(
+    odometry=HEADING, sonar_delay_deviation=1.0, scans_per_group=1, normal_deviation=0.2, free_scans=12
+)
+
+
+def with_heading_only(scan):
+    """Return a scan of an odometry whose position stays at 0."""
+    poses = scan.track.poses * [0.0, 0.0, 1.0]
+    points = scan.points.copy()
+    points[:, :2] -= scan.track.at(scan.times)[:, :2]
+    return Scan(points, scan.times, scan.moving, Track(scan.track.times, poses), scan.reference_time)
 
 
 def run(path, corners, without):

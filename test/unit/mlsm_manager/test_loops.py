@@ -4,11 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, tour
-from made_models import solver_parameters
+from made_harbour import tour
+from made_models import followed
 
 from mlsm_manager.joint_solver.batch_solver import LoopClosure, solved, with_loops_closed
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -33,13 +32,6 @@ def _heard_by(scan, number, track):
     points = transformed(track.at(scan.times), transformed(inverse(scan.track.at(scan.times)), scan.points))
     heard = np.full(len(points), number not in DEAF)
     return Scan(points[heard], scan.times[heard], scan.moving[heard], track, scan.reference_time)
-
-
-def followed(scans):
-    solver = LiveSolver(solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
-    for scan in scans:
-        solver.add(scan)
-    return solver
 
 
 def errors(solver, batch, track, made):

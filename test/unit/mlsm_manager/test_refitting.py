@@ -1,14 +1,14 @@
-"""Further fits of a run come to the same path where there are surfaces, and not where all surfaces look alike."""
+"""Further fits of a run and of its parts: to the same path where there are surfaces, and not where all look alike."""
 
 from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, tour
-from made_models import solver_parameters
+from made_harbour import tour
+from made_models import followed, solver_parameters
 
-from mlsm_manager.joint_solver.batch_solver import solved
-from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.batch_solver import solved, solved_part
+from mlsm_manager.joint_solver.normal_equations import DELAY, RUN_COLUMNS
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
 from node_support.geometry import inverse, transformed
 
@@ -26,13 +26,6 @@ def among_furrows(scan, truth, rng):
     points = scan.points.copy()
     points[:, :2] = transformed(scan.track.at(scan.times), heard)
     return replace(scan, points=points)
-
-
-def followed(scans):
-    solver = LiveSolver(solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
-    for scan in scans:
-        solver.add(scan)
-    return solver
 
 
 def verdicts_of(scans):
@@ -68,3 +61,23 @@ def test_other_settings_differ_from_the_run_s_in_one_thing_each():
     own = solver_parameters()
     for other in other_settings(own):
         assert sum(getattr(other, one.name) != getattr(own, one.name) for one in fields(own)) == 1
+
+
+FIRST = 8
+
+
+@pytest.fixture(scope="module")
+def part():
+    return solved_part(followed(WALLS), FIRST)
+
+
+def test_it_finds_what_a_run_of_its_scans_alone_finds(part):
+    alone = solved(followed(WALLS[FIRST:]))
+    np.testing.assert_allclose(part.run, alone.state.run, atol=0.01)
+    np.testing.assert_allclose(part.node[2:], alone.state.nodes[-1, 2:], atol=0.005)
+    np.testing.assert_allclose(part.covariance[-RUN_COLUMNS:, -RUN_COLUMNS:], alone.run_covariance, rtol=0.1)
+
+
+def test_it_knows_the_delay_less_well_than_the_whole_run(part):
+    whole = solved(followed(WALLS))
+    assert part.covariance[-RUN_COLUMNS:, -RUN_COLUMNS:][DELAY, DELAY] > whole.run_covariance[DELAY, DELAY]

@@ -1,4 +1,4 @@
-"""What a recording says of its echoes and its odometry, and the profiles."""
+"""What a recording and map_bag's command line say of echoes, motion and odometry, and the profiles."""
 
 import numpy as np
 import pytest
@@ -9,6 +9,7 @@ from dead_reckoning.parameters import DeadReckoningParameters
 from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
+from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
 from mlsm_manager.offline.suited_parameters import (
     EchoShape,
@@ -20,6 +21,7 @@ from mlsm_manager.offline.suited_parameters import (
 )
 from mlsm_manager.scan_matching.scan import Track
 from node_support.health import Health
+from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.beams.beam import Beam
 from sonar_processing.filters.echo_extractor import ExtractionMode
 
@@ -146,3 +148,42 @@ def test_a_velocity_that_is_not_estimated_any_more_fades_as_fast_as_the_profile_
         DeadReckoningParameters(**live["dead_reckoning"]).velocity_fading
         == profile_values(kind)["rate_correlation_time"]
     )
+
+
+def command_line(*words):
+    return map_bag_arguments(["a.bag", "--out", "out", *words])
+
+
+def refusal(capsys, *words):
+    with pytest.raises(SystemExit) as ended:
+        command_line(*words)
+    assert ended.value.code == 2
+    return capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.parametrize("odometry", [(), ("--odometry", "none")])
+def test_an_unknown_motion_means_no_odometry(odometry):
+    options = command_line("--unknown-motion", *odometry)
+    assert options.odometry is OdometryKind.NONE
+    assert options.request.motion.declared is MotionSource.UNKNOWN
+
+
+def test_standing_leaves_the_odometry_to_the_recording():
+    options = command_line("--standing")
+    assert options.odometry is None
+    assert options.request.motion.declared is MotionSource.STANDING
+
+
+def test_a_moving_vehicle_is_not_said_to_stand(capsys):
+    line = refusal(capsys, "--standing", "--odometry", "none")
+    assert "--standing is for a vehicle that did not move" in line
+    assert line.endswith("give --unknown-motion instead")
+
+
+def test_an_unknown_motion_has_no_other_odometry(capsys):
+    line = refusal(capsys, "--unknown-motion", "--odometry", "heading")
+    assert "--odometry heading: must be none, or left out, with --unknown-motion" in line
+
+
+def test_a_vehicle_either_stands_or_moves(capsys):
+    assert "not allowed with argument --standing" in refusal(capsys, "--standing", "--unknown-motion")

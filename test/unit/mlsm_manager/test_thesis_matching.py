@@ -1,8 +1,9 @@
-"""The thesis's matcher: closest block, directional search, rotation at rest, segments (6.5.6, figures 6.4 to 6.8)."""
+"""Matchers to compare with: the thesis's (6.5.6, figures 6.4 to 6.8), and Open3D's generalised ICP."""
 
 import numpy as np
 import pytest
-from hypothesis import given
+from benchmarks.matchers import GicpMatcher
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
@@ -10,7 +11,7 @@ from mlsm_manager.scan_matching.scan import MatchStatus
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.thesis_matching.registration import ClosestBlocks, rigid_motion, translate_segments
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
-from node_support.geometry import transformed
+from node_support.geometry import composed, transformed
 
 POSTS = np.array([[4.0, 0.0], [0.0, 6.0], [-5.0, -1.0], [2.0, -7.0], [8.0, 8.0]])
 OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)
@@ -172,3 +173,30 @@ def test_a_wall_lets_it_slide_and_it_does_not_notice():
     result = match(scan, map_of(wall((-20, 5), (20, 5))), [3.0, 0.0, 0.0])
     assert result.accepted
     assert abs(result.pose[0]) > 1.0
+
+
+def gicp_match(scan, target, expected):
+    pytest.importorskip("open3d")
+    return GicpMatcher().match(scan, target, prior_of_pose(scan, expected))
+
+
+@settings(max_examples=25)
+@given(
+    st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(-0.05, 0.05),
+    st.tuples(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0), st.floats(-3.0, 3.0)),
+)  # fmt: skip
+def test_a_pose_is_found_from_a_wrong_expectation_anywhere(x, y, yaw, place):
+    to_place = np.array(place)
+    here = composed(to_place, np.column_stack([harbour(), np.zeros(len(harbour()))]))[:, :2]
+    scan = scan_of(here, still(to_place))
+    result = gicp_match(scan, map_of(here), composed(to_place, np.array([x, y, yaw])))
+    assert result.status is MatchStatus.CONVERGED
+    np.testing.assert_allclose(result.pose[:2], to_place[:2], atol=0.15)
+    assert np.cos(result.pose[2] - place[2]) > np.cos(0.02)
+
+
+@pytest.mark.parametrize(("points", "aside"), [(5, 0.0), (None, 400.0)])
+def test_too_few_points_or_a_map_out_of_reach_leave_the_prior(points, aside):
+    result = gicp_match(scan_of(harbour()[:points], still()), map_of(harbour() + aside), [0.3, 0.2, 0.0])
+    assert result.status is MatchStatus.TOO_FEW_POINTS
+    np.testing.assert_allclose(result.pose, [0.3, 0.2, 0.0], atol=1e-9)

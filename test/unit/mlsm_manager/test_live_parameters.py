@@ -1,4 +1,4 @@
-"""live.yaml takes what map_bag did and found to the live nodes, and back."""
+"""What mlsm_core's parameters allow together, and live.yaml, which takes what map_bag found to live nodes and back."""
 
 import dataclasses
 from enum import Enum
@@ -14,7 +14,7 @@ from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.localisation.parameters import MapInput
+from mlsm_manager.localisation.parameters import MapInput, MlsmCoreParameters
 from mlsm_manager.offline.findings import Calibration
 from mlsm_manager.offline.replay_parameters import (
     NODES,
@@ -193,3 +193,30 @@ def test_a_run_that_went_astray_is_told_within_what_parameters_allow():
     astray = Calibration(NAMES, np.array([9.0, -99.0, 0.0, 9.0]), np.full(4, 9.0))
     after = astray.applied(ReplayParameters())
     assert (after.range_scale, after.sonar_delay, after.odometry_direction) == (2.0, -10.0, 3.2)
+
+
+def test_a_user_meets_no_more_parameters_than_fit_on_a_page():
+    assert len(dataclasses.fields(MlsmCoreParameters)) - len(MlsmCoreParameters.expert_names()) <= 40
+
+
+def test_the_default_reserves_the_thesis_basin():
+    assert MlsmCoreParameters().expected_blocks == 240 * 100
+
+
+def test_an_extent_that_no_memory_holds_is_refused():
+    with pytest.raises(ParameterError, match=r"size_x_meters = 90000\.0.*at most 16000000 cells"):
+        MlsmCoreParameters(size_x_meters=90000.0, size_y_meters=90000.0)
+
+
+def test_an_extent_may_be_zero():
+    assert MlsmCoreParameters(size_x_meters=0, size_y_meters=0).expected_blocks == 0
+
+
+def test_map_and_odom_must_be_two_frames():
+    with pytest.raises(ParameterError, match=r"map_frame = 'odom': must differ from odom_frame"):
+        MlsmCoreParameters(map_frame="odom")
+
+
+def test_parts_of_turns_without_any_heading_are_refused():
+    with pytest.raises(ParameterError, match=r"parts_per_turn = 3: must be 1 with odometry = NONE"):
+        MlsmCoreParameters(odometry="NONE", parts_per_turn=3)
