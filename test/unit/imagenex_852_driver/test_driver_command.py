@@ -28,12 +28,8 @@ def test_the_bytes_are_those_of_the_thesis_table():
 
 
 @given(commands)
-def test_every_valid_command_round_trips(command):
+def test_every_valid_command_round_trips_and_has_the_terminator_at_its_end_only(command):
     assert SwitchCommand.decode(command.encode()) == command
-
-
-@given(commands)
-def test_the_terminator_occurs_at_the_end_only(command):
     assert command.encode().find(0xFD) == 26
 
 

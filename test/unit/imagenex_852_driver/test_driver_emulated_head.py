@@ -6,7 +6,6 @@ from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters, He
 from imagenex_852_driver.protocol.command import SwitchCommand
 from imagenex_852_driver.protocol.reply import ReplyKind
 from imagenex_852_driver.protocol.reply_parser import ReplyParser
-from node_support.parameters import ParameterError
 from sonar_driver.emulator.emulated_head import EchoSource
 from sonar_driver.emulator.faults import Fault, FaultInjector
 
@@ -33,24 +32,14 @@ class Recorder(EchoSource):
         return bytes(ping.bin_count)
 
 
-@pytest.mark.parametrize(("points", "kind"), [(250, ReplyKind.IMX), (500, ReplyKind.IGX)])
-def test_the_reply_has_the_commanded_range_and_points(points, kind):
-    reply = answers(Emulated852(), SwitchCommand(max_range=40, data_points=points))[0]
+@pytest.mark.parametrize(
+    ("asked", "kind"),
+    [({"data_points": 250}, ReplyKind.IMX), ({"data_points": 500}, ReplyKind.IGX), ({"profile": True}, ReplyKind.IPX)],
+)
+def test_the_reply_has_the_commanded_range_and_points_and_says_that_it_was_understood(asked, kind):
+    reply = answers(Emulated852(), SwitchCommand(max_range=40, **asked))[0]
     assert (reply.max_range, reply.kind) == (40, kind)
-
-
-def test_an_echo_sounder_in_profile_mode_answers_without_echoes():
-    assert answers(Emulated852(), SwitchCommand(max_range=40, profile=True))[0].kind is ReplyKind.IPX
-
-
-def test_the_reply_says_that_the_switches_were_accepted():
-    reply = answers(Emulated852())[0]
     assert (reply.switches_accepted, reply.overrun) == (True, False)
-
-
-def test_the_head_steps_between_pings():
-    head = Emulated852()
-    assert [answers(head)[0].head_position for _ in range(3)] == [1400, 1420, 1440]
 
 
 def test_a_rebooted_head_starts_straight_ahead():
@@ -104,42 +93,15 @@ def test_the_echo_source_gets_the_angle_counter_clockwise():
     assert (source.pings[1].time, source.pings[1].max_range, source.pings[1].bin_count) == (5.0, 30, 500)
 
 
-@pytest.mark.parametrize("fault", [Fault.DROPPED, Fault.GARBLED, Fault.TRUNCATED, Fault.SILENCE])
-def test_a_faulty_reply_has_no_whole_frame_and_the_next_one_is_good(fault):
-    head = head_with(fault)
-    assert answers(head) == []
-    assert len(answers(head, time=10.0)) == 1
-
-
-def test_a_doubled_reply_comes_twice():
-    first, second = answers(head_with(Fault.DOUBLED))
-    assert first == second
-
-
 def test_a_late_reply_comes_later_by_what_was_ordered():
     late, good = head_with(Fault.LATE), Emulated852()
     difference = late.receive(COMMAND.encode(), 0.0)[0].time - good.receive(COMMAND.encode(), 0.0)[0].time
     assert difference == pytest.approx(0.5)
 
 
-def test_an_overrun_is_reported_in_the_status():
-    assert answers(head_with(Fault.OVERRUN))[0].overrun
-
-
 def test_a_silent_head_says_nothing_until_the_silence_is_over():
     head = head_with(Fault.SILENCE)
     assert [len(answers(head, time=time)) for time in (0.0, 1.0, 2.9, 3.1)] == [0, 0, 0, 1]
-
-
-def test_a_disappearance_names_the_time_of_return():
-    head = head_with(Fault.DISAPPEARANCE)
-    head.receive(COMMAND.encode(), 100.0)
-    assert head.absent_until == 104.0
-
-
-def test_fault_rates_above_one_in_all_are_refused():
-    with pytest.raises(ParameterError, match=r"dropped = 0\.6"):
-        EmulatorParameters(dropped=0.6, late=0.6)
 
 
 def test_the_same_seed_gives_the_same_faults():
@@ -166,24 +128,21 @@ def positions(command, count, motion=None):
     return pytest.approx(found)
 
 
-def test_a_full_turn_goes_round_clockwise():
-    command = SwitchCommand(max_range=20, step_size_deg=6)
-    expected = [*range(0, 180, 6), *range(-180, 0, 6), 0, 6]
-    assert positions(command, 62) == expected
-
-
-def test_reverse_goes_round_counter_clockwise():
-    assert positions(SwitchCommand(max_range=20, reverse=True), 3) == [0, -3, -6]
-
-
-def test_a_sector_is_scanned_to_and_fro():
-    command = SwitchCommand(max_range=20, sector_width_deg=12)
-    assert positions(command, 9) == [0, 3, 6, 3, 0, -3, -6, -3, 0]
-
-
-def test_a_head_outside_of_its_sector_steps_towards_it_and_then_scans_it():
-    command = SwitchCommand(max_range=20, train_angle_deg=12, sector_width_deg=6)
-    assert positions(command, 8) == [0, 3, 6, 9, 12, 15, 12, 9]
+@pytest.mark.parametrize(
+    ("sector", "expected"),
+    [
+        ({"step_size_deg": 6}, [*range(0, 180, 6), *range(-180, 0, 6), 0, 6]),
+        ({"reverse": True}, [0, -3, -6]),
+        ({"sector_width_deg": 12}, [0, 3, 6, 3, 0, -3, -6, -3, 0]),
+        # From outside of its sector it steps towards it.
+        ({"train_angle_deg": 12, "sector_width_deg": 6}, [0, 3, 6, 9, 12, 15, 12, 9]),
+        ({"step_size_deg": 0}, [0, 0, 0]),
+        ({"train_angle_deg": -6, "sector_width_deg": 0}, [0, -3, -6, -6, -6]),
+    ],
+    ids=["full turn", "reverse", "sector", "outside", "no step", "fixed beam"],
+)
+def test_the_head_turns_as_it_is_commanded(sector, expected):
+    assert positions(SwitchCommand(max_range=20, **sector), len(expected)) == expected
 
 
 def test_reverse_turns_a_sector_scan_around_at_once():
@@ -191,12 +150,3 @@ def test_reverse_turns_a_sector_scan_around_at_once():
     positions(SwitchCommand(max_range=20, sector_width_deg=60), 2, motion)
     reverse = SwitchCommand(max_range=20, sector_width_deg=60, reverse=True)
     assert positions(reverse, 3, motion) == [6, 3, 0]
-
-
-def test_without_a_step_the_head_stays():
-    assert positions(SwitchCommand(max_range=20, step_size_deg=0), 3) == [0, 0, 0]
-
-
-def test_a_sector_of_no_width_is_a_fixed_beam_at_the_train_angle():
-    command = SwitchCommand(max_range=20, train_angle_deg=-6, sector_width_deg=0)
-    assert positions(command, 5) == [0, -3, -6, -6, -6]

@@ -6,11 +6,6 @@ from ping360_driver.line.parameters import DriverParameters, HeadSettings
 from ping360_driver.protocol.scan_command import ScanCommand, SectorWalk
 
 
-def walk(count, **sector):
-    steps = SectorWalk()
-    return [steps.next(ScanCommand(**sector)) for _ in range(count)]
-
-
 @pytest.mark.parametrize(
     ("values", "complaint"),
     [
@@ -31,14 +26,7 @@ def test_what_line_or_head_cannot_do_is_refused(values, complaint):
 
 def test_line_and_frame_cannot_be_changed_while_the_driver_runs():
     names = {field.name for field in DriverParameters.tunable_fields()}
-    assert {
-        "max_range",
-        "gain_setting",
-        "frequency_khz",
-        "sector_width_deg",
-        "step_gradians",
-        "speed_of_sound",
-    } <= names
+    assert {"max_range", "gain_setting", "frequency_khz", "step_gradians", "speed_of_sound"} <= names
     assert names.isdisjoint({"port", "baud_rate", "frame_id"})
 
 
@@ -80,20 +68,20 @@ def test_the_speed_of_sound_turns_the_range_into_a_time():
     assert slow / fast == pytest.approx(1550 / 1400, rel=0.002)
 
 
-def test_by_request_a_full_turn_goes_round():
-    assert walk(402)[398:] == [398, 399, 0, 1]
-
-
-def test_by_request_a_sector_is_scanned_to_and_fro_and_to_its_edges():
-    assert walk(8, center=200, width=10, step=4) == [195, 199, 203, 205, 201, 197, 195, 199]
-
-
-def test_by_request_a_sector_astern_is_scanned_across_zero():
-    assert walk(5, center=0, width=4) == [398, 399, 0, 1, 2]
-
-
-def test_by_request_a_sector_of_no_width_is_a_fixed_beam():
-    assert walk(3, center=120, width=0) == [120, 120, 120]
+@pytest.mark.parametrize(
+    ("sector", "expected"),
+    [
+        ({}, [*range(400), 0, 1]),
+        # To and fro, and to the edges of the sector.
+        ({"center": 200, "width": 10, "step": 4}, [195, 199, 203, 205, 201, 197, 195, 199]),
+        ({"center": 0, "width": 4}, [398, 399, 0, 1, 2]),
+        ({"center": 120, "width": 0}, [120, 120, 120]),
+    ],
+    ids=["full turn", "sector", "astern", "fixed beam"],
+)
+def test_by_request_the_sector_is_walked_through(sector, expected):
+    steps = SectorWalk()
+    assert [steps.next(ScanCommand(**sector)) for _ in expected] == expected
 
 
 def test_a_changed_sector_begins_at_its_start():

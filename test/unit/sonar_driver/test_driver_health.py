@@ -28,8 +28,10 @@ def line():
     return Line()
 
 
-def test_a_device_that_answers_is_ok(line):
-    assert line.report(pings=10, replies=10).level is Level.OK
+def test_a_device_that_answers_is_ok_and_shows_all_counts(line):
+    report = line.report(pings=10, replies=10, last_error="no reply")
+    assert report.level is Level.OK
+    assert (report.values["bad frames"], report.values["last error"]) == ("0", "no reply")
 
 
 def test_pings_are_counted_and_have_a_rate(line):
@@ -62,16 +64,8 @@ def test_a_count_that_stands_still_warns_no_longer(line):
     assert line.report().level is Level.OK
 
 
-def test_counts_that_are_zero_are_shown(line):
-    assert line.report().values["bad frames"] == "0"
-
-
 @pytest.mark.parametrize(
     ("connected", "connections", "losses"), [(False, 0, 0), (True, 1, 0), (False, 1, 1), (True, 3, 2)]
 )
 def test_losses_of_the_port_are_counted(line, connected, connections, losses):
     assert line.report(connected=connected, connections=connections).values["losses of the port"] == str(losses)
-
-
-def test_the_last_error_is_shown(line):
-    assert line.report(last_error="no reply").values["last error"] == "no reply"
