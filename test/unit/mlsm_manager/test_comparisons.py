@@ -20,10 +20,7 @@ from node_support.geometry import rotated
 
 SAME = 1e-9
 STEP = 1e-6
-MODELS = [
-    DVL, THRUSTERS, HEADING,
-    UNAIDED,
-]  # fmt: skip
+MODELS = [DVL, THRUSTERS, HEADING, UNAIDED]
 
 
 @pytest.fixture(scope="module")
@@ -222,31 +219,18 @@ def as_matrix(found, count):
     return result
 
 
-@given(st.integers(0, 1000), st.lists(st.floats(0.0, 3.0), max_size=4), st.floats(0.0, 9.0))
-def test_neighbours_are_what_a_look_at_all_points_says_however_far_these_move(seed, moves, common):
+MOVES = st.tuples(st.floats(0.0, 3.0), st.sampled_from([1.0, 2.0, 3.5]))
+
+
+@given(st.integers(0, 1000), st.lists(MOVES, max_size=4), st.floats(0.0, 9.0))
+def test_neighbours_are_what_a_look_at_all_points_says_however_far_these_move_and_whatever_the_cut(seed, moves, common):
     rng = np.random.RandomState(seed)
     places = rng.uniform(0.0, 15.0, (len(SCANS), 2))
     lists = Neighbours(placed(places), BLOCK_SCANS)
-    for move in [0.0, *moves]:
+    for move, cut in [(0.0, CUT), *moves]:
         places = places + rng.normal(0.0, move, places.shape) + common
-        found = lists.within(placed(places), placed(places), CUT)
-        np.testing.assert_allclose(as_matrix(found, len(places)), looked_at_all(places, CUT), atol=1e-9)
-
-
-def test_each_search_may_have_another_cut():
-    places = np.random.RandomState(2).uniform(0.0, 15.0, (len(SCANS), 2))
-    lists = Neighbours(placed(places), BLOCK_SCANS)
-    for cut in (2.0, 1.0, 3.5):
         found = lists.within(placed(places), placed(places), cut)
         np.testing.assert_allclose(as_matrix(found, len(places)), looked_at_all(places, cut), atol=1e-9)
-
-
-def test_two_neighbours_that_are_as_near_share_the_comparison():
-    places = np.array([[0.0, 0.0], [1.0, 0.0], [-1.0, 0.0]])
-    source, others = placed(places[:1], np.array([9])), placed(places[1:], np.array([0, 1]))
-    found = Neighbours(others, BLOCK_SCANS).within(source, others, CUT)
-    np.testing.assert_array_equal(np.sort(found[1]), [0, 1])
-    np.testing.assert_allclose(found[3], 0.5)
 
 
 def test_no_neighbour_takes_over_at_once():
@@ -261,11 +245,6 @@ def test_no_neighbour_takes_over_at_once():
     assert (shares[0], shares[-1]) == (0.0, 1.0)
     assert steps.min() >= 0.0
     assert steps.max() < 2.5e-3 / TIE
-
-
-def test_points_far_from_all_others_are_compared_with_nothing():
-    source, others = placed(np.array([[50.0, 0.0]]), np.array([9])), placed(np.zeros((1, 2)), np.array([0]))
-    assert not len(Neighbours(others, BLOCK_SCANS).within(source, others, CUT)[0])
 
 
 def test_a_point_far_outside_costs_no_memory_and_hides_no_neighbour():

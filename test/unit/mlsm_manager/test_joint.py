@@ -22,15 +22,21 @@ def localiser_after(count, **changes):
     return localiser, [localiser.take_scan(scan).scan for scan in SCANS[:count]]
 
 
-def test_no_scan_is_rejected_and_those_with_neighbours_give_a_fix():
-    _, updates = localiser_after(8)
+@pytest.fixture(scope="module")
+def run():
+    """Return a localiser after six scans, and its updates, which are only looked at."""
+    return localiser_after(6)
+
+
+def test_no_scan_is_rejected_and_those_with_neighbours_give_a_fix(run):
+    _, updates = run
     assert all(update.accepted for update in updates)
     assert updates[0].result is None
     assert updates[-1].result.points_used > 100
 
 
-def test_the_map_has_all_points_of_all_scans():
-    localiser, _ = localiser_after(4)
+def test_the_map_has_all_points_of_all_scans(run):
+    localiser, _ = run
     assert localiser.blocks.mean[:, 3].min() > 0.0
     assert localiser.block_count == len(localiser.blocks) > 100
 
@@ -110,9 +116,8 @@ def test_a_scan_that_comes_twice_is_refused_and_the_run_goes_on():
     assert localiser.take_scan(SCANS[3]).scan.accepted
 
 
-def test_a_run_says_whether_it_can_be_trusted():
-    localiser, _ = localiser_after(6)
-    assert [verdict.fires for verdict in localiser.verdicts()] == [False, False]
+def test_a_run_says_whether_it_can_be_trusted(run):
+    assert [verdict.fires for verdict in run[0].verdicts()] == [False, False]
 
 
 def test_the_first_turn_is_not_doubted_for_a_speed_that_only_the_second_tells():
@@ -134,8 +139,8 @@ def test_late_beams_make_it_wait_for_odometry():
     assert localiser_after(0, sonar_delay_deviation=0.1)[0].lookahead == pytest.approx(0.3)
 
 
-def test_free_space_is_known_between_the_vehicle_and_the_walls():
-    localiser, _ = localiser_after(6)
+def test_free_space_is_known_between_the_vehicle_and_the_walls(run):
+    localiser, _ = run
     free = localiser.free
     assert len(free) > 1000
     assert np.hypot(*(free.centers - SCANS[2].reference_pose[:2]).T).min() < 1.0
@@ -148,8 +153,8 @@ def test_free_space_is_known_without_matching_too_but_not_where_nobody_wants_it(
     assert (len(localiser_after(3, **change)[0].free) > 1000) == known
 
 
-def test_a_stored_map_gives_its_free_space_back():
-    localiser, _ = localiser_after(4)
+def test_a_stored_map_gives_its_free_space_back(run):
+    localiser, _ = run
     stored = localiser.stored("map", {}, 0.0, "")
     other, _ = localiser_after(0)
     other.restore(stored, same_odometry=False)

@@ -7,14 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import logged, tour
-from made_models import DVL, DVL_ODOMETRY, solution_of, solver_parameters
+from made_models import DVL, solution_of, solver_parameters
 from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
 from mlsm_manager.joint_solver.estimate import stacked, unstacked
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
-from mlsm_manager.joint_solver.motion_models import DvlFactors
-from mlsm_manager.joint_solver.normal_equations import DenseSolution, Layout, NormalEquations, SparseSolution, State
+from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, SparseSolution, State
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
@@ -53,35 +52,6 @@ def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown)
     change = (solution_of(log, DVL, moved).placed(rows).places - placed.places) / step
     np.testing.assert_allclose(change, placed.by_run[..., unknown], atol=0.5)
     np.testing.assert_allclose(np.median(np.abs(change - placed.by_run[..., unknown])), 0.0, atol=0.03)
-
-
-def test_odometry_that_went_as_expected_pulls_at_nothing():
-    factors = DvlFactors(replace(DVL_ODOMETRY, direction=0.2, scale=0.05))
-    nodes = [factors.first_node()]
-    for node in range(2):
-        after = factors.advanced(nodes[-1][np.newaxis], MOTION[node : node + 1], MOTION[node + 1 : node + 2])
-        nodes.append(after[0])
-    equations = NormalEquations(Layout(0, 2, factors.width).size)
-    factors.add_steps(equations, Layout(0, 2, factors.width), np.array(nodes), MOTION)
-    np.testing.assert_allclose(equations.gradient, 0.0, atol=1e-9)
-
-
-@pytest.mark.parametrize("column", range(4))
-def test_odometry_residuals_and_derivatives_agree(column):
-    factors, layout = DVL, Layout(0, 2, DVL.width)
-    nodes = np.random.RandomState(2).normal(0.0, 0.05, (3, 5))
-    nodes[:, 4] = 0.0  # about scale 0, residuals per unit of scale and residuals are the same
-
-    def equations_at(values):
-        found = NormalEquations(layout.size)
-        factors.add_steps(found, layout, values, MOTION)
-        return found
-
-    moved = nodes.copy()
-    moved[1, column] += STEP
-    cost = (equations_at(moved).cost - equations_at(nodes).cost) / STEP / 2.0
-    expected = equations_at(nodes).gradient[factors.width + column]
-    assert cost == pytest.approx(expected, rel=1e-3, abs=1e-3)
 
 
 @given(st.lists(st.floats(0.0, 1e3), min_size=1, max_size=60), st.integers(1, 20))

@@ -79,13 +79,6 @@ def map_of(*numbers):
     return shown
 
 
-def test_a_keyframe_that_moves_leaves_nothing_behind():
-    shown = map_of(1)
-    shown.draw(MovedBy(0.0), NEVER)
-    shown.draw(MovedBy(50.0), NEVER)
-    assert_same(shown.map.blocks, made_at_once(MovedBy(50.0).points(patch(1))))
-
-
 def test_a_settled_keyframe_stays_where_it_was_drawn():
     shown = map_of(1, 2)
     shown.draw(MovedBy(0.0), settled_until=1.0)
@@ -163,13 +156,6 @@ def test_what_is_settled_is_as_if_every_keyframe_had_carved_once_from_its_last_p
     assert cells(shown.free.blocks) == cells(free.blocks)
     assert sorted(shown.map.blocks.crossed) == sorted(occupied.blocks.crossed)
     assert sorted(shown.free.blocks.count) == sorted(free.blocks.count)
-
-
-def test_free_space_moves_with_the_keyframe_that_saw_it():
-    shown = carved_map(cloud(1, (10.25, 0.25)), place=MovedBy(0.0))
-    assert [cell for cell in cells(shown.free.blocks) if cell[1] == 0] == [(x, 0) for x in range(19)]
-    shown.draw(MovedBy(5.0), NEVER)
-    assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
 
 
 @pytest.mark.parametrize("looks", [True, False])

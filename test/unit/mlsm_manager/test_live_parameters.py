@@ -106,10 +106,6 @@ def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     assert ReplayParameters.from_mapping(replay_values(live)[0]) == parameters
 
 
-def test_map_bag_takes_it_back(written):
-    assert ReplayParameters.from_mapping(replay_values(yaml.safe_load(written.read_text()))[0]) == USED
-
-
 def test_plain_keys_stay_as_they_are_and_those_for_experts_may_stand_under_a_key_of_their_own():
     assert replay_values({"min_points": 20, "expert": {"free_scans": 30}}) == ({"min_points": 20, "free_scans": 30}, [])
 

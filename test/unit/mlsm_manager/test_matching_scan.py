@@ -115,17 +115,6 @@ VELOCITIES = st.tuples(*[st.floats(-0.5, 0.5)] * 2, st.sampled_from([-0.03, 0.0,
 
 
 @given(VELOCITIES, STATE)
-def test_the_derivative_of_the_path_is_what_differences_say(velocity, theta):
-    motion = PlanarMotion(scan_of(harbour(), at_velocity(velocity)))
-    expected = np.empty((len(motion.beam_times), 3, STATES))
-    for state in range(STATES):
-        change = np.zeros(STATES)
-        change[state] = 1e-6
-        expected[:, :, state] = (motion.path(theta + change) - motion.path(theta - change)) / 2e-6
-    np.testing.assert_allclose(motion.jacobian(theta), expected, atol=1e-6)
-
-
-@given(VELOCITIES, STATE)
 def test_the_derivative_of_the_points_is_what_differences_say(velocity, theta):
     motion = PlanarMotion(scan_of(harbour(), at_velocity(velocity)))
     path = motion.path(theta)

@@ -108,22 +108,6 @@ def test_each_source_pulls_to_its_nearest_target(seed, sources, targets):
     np.testing.assert_allclose(pulls_of(particles, heard, nearby), expected, rtol=1e-9, atol=1e-9)
 
 
-def test_a_post_pulls_a_particle_towards_an_earlier_one():
-    particles, heard = resting(1, 3), post(1, [5.0, 0.0], 1.0)
-    nearby = nearby_of(particles, heard, post(0, [5.5, 0.5]))
-    move = pulls_of(particles, heard, nearby)[0]
-    assert 0.2 < move[0] < 0.5
-    assert move[0] == pytest.approx(move[1])
-
-
-def test_a_wall_pulls_a_particle_across_itself_only():
-    particles = resting(1, 3)
-    heard, wall = (replace(echo, post=np.array([False])) for echo in (post(1, [5.0, 0.0]), post(0, [5.5, 1.0])))
-    move = pulls_of(particles, heard, nearby_of(particles, heard, wall))[0]
-    assert 0.1 < move[0] < 1.0
-    assert move[1] == 0.0
-
-
 def test_some_particles_are_pulled_and_their_speeds_with_them():
     particles = resting(400, 3)
     heard = post(1, [5.0, 0.0], 1.0)
@@ -146,14 +130,6 @@ def test_few_particles_far_from_all_others_are_compared_with_what_they_heard_the
 def test_particles_that_end_in_one_square_are_one_group():
     groups = groups_of(np.array([[1.0, 1.0], [50.0, 1.0], [2.0, 1.5], [51.0, 2.0], [1.0, 50.0]]))
     assert sorted(sorted(group.tolist()) for group in groups) == [[0, 2], [1, 3], [4]]
-
-
-def test_a_particle_on_which_an_echo_lies_on_an_earlier_one_is_worth_that_echo():
-    particles = Particles(
-        np.array([[[0.0, 0.0]] * 3, [[0.0, 0.0], [0.0, 0.0], [9.0, 0.0]]]), np.zeros((2, 2)), np.zeros(2)
-    )
-    log_weights = likelihoods(particles, post(1, [5.0, 0.0]), post(0, [5.0, 0.0]))
-    np.testing.assert_allclose(log_weights, [3.0, 0.0], atol=0.01)
 
 
 def test_a_surface_tells_nothing_to_one_that_faces_the_other_way():
