@@ -49,9 +49,9 @@ def tour(
     return Tour(scans, truth, odometry)
 
 
-def logged(scans: Sequence[Scan]) -> RunLog:
+def logged(scans: Sequence[Scan], sonar_in_base: np.ndarray = SONAR_IN_BASE) -> RunLog:
     """Return the log of a run with these scans, as the joint solver keeps it."""
-    log = RunLog(SONAR_IN_BASE)
+    log = RunLog(sonar_in_base)
     for scan in scans:
         log.append(scan, 1.0)
     return log

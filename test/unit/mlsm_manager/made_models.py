@@ -43,9 +43,9 @@ def solver_parameters(**values):
     return SolverParameters(**{"odometry": DVL, **values})
 
 
-def followed(scans, parameters=None):
+def followed(scans, parameters=None, sonar_in_base=SONAR_IN_BASE):
     """Return the live solver after `scans`, by default of a vehicle with a DVL whose beams may be late."""
-    solver = LiveSolver(parameters or solver_parameters(sonar_delay_deviation=1.0), SONAR_IN_BASE)
+    solver = LiveSolver(parameters or solver_parameters(sonar_delay_deviation=1.0), sonar_in_base)
     for scan in scans:
         solver.add(scan)
     return solver

@@ -5,11 +5,11 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from made_harbour import CANAL, SONAR_IN_BASE, ahead, along_canal, tour
+from made_harbour import CANAL, ahead, along_canal, tour
+from made_models import followed
 
 from mlsm_manager.joint_solver.batch_solver import solved
 from mlsm_manager.joint_solver.estimate import scale_covariance
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -33,13 +33,6 @@ def parameters(kind, **changes):
 
 def model_of(kind, **changes):
     return parameters(kind, **changes).odometry
-
-
-def followed(scans, kind, **changes):
-    solver = LiveSolver(parameters(kind, **changes), SONAR_IN_BASE)
-    for scan in scans:
-        solver.add(scan)
-    return solver
 
 
 def some_nodes(model, seed=2):
@@ -135,7 +128,7 @@ def made():
 @pytest.fixture(scope="module")
 def solver_of(made):
     """Return a call that gives the solver of a kind of odometry, after the whole tour."""
-    return lru_cache(maxsize=None)(lambda kind: followed(made.scans, kind))
+    return lru_cache(maxsize=None)(lambda kind: followed(made.scans, parameters(kind)))
 
 
 def errors_of(solver, made):
@@ -170,7 +163,7 @@ def scaled(scan, factor):
 
 @pytest.mark.newest_only("dear; the tests above follow the same tour")
 def test_thrusters_find_a_scale_that_is_30_percent_off(made):
-    solver = followed([scaled(scan, 1.0 / 1.3) for scan in made.scans], OdometryKind.THRUSTERS)
+    solver = followed([scaled(scan, 1.0 / 1.3) for scan in made.scans], parameters(OdometryKind.THRUSTERS))
     newest = solver.estimates[-1]
     column = solver.odometry.calibrated["odometry_scale"]
     assert newest.node[column] == pytest.approx(0.3, abs=0.06)
@@ -182,7 +175,7 @@ def silent(scan):
 
 def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
     scans = [silent(scan) if 8 <= number < 17 else scan for number, scan in enumerate(made.scans)]
-    solver = followed(scans, OdometryKind.HEADING)
+    solver = followed(scans, parameters(OdometryKind.HEADING))
     radii = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
     distance = np.hypot(*errors_of(solver, made)[:, :2].T)
     assert (np.diff(radii[8:17]) > 0.0).all()
@@ -199,7 +192,7 @@ def unheard_beyond(scan, reach):
 
 def test_in_a_straight_canal_the_told_deviation_covers_the_error():
     canal = tour(45, noise=0.3, path=along_canal, corners=CANAL)
-    solver = followed([unheard_beyond(scan, 30.0) for scan in canal.scans], OdometryKind.HEADING)
+    solver = followed([unheard_beyond(scan, 30.0) for scan in canal.scans], parameters(OdometryKind.HEADING))
     told = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
     distance = np.hypot(*errors_of(solver, canal)[:, :2].T)
     assert (distance < 3.0 * told).all()
@@ -209,6 +202,6 @@ def test_in_a_straight_canal_the_told_deviation_covers_the_error():
 def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
     canal = tour(15, noise=0.3, path=along_canal, corners=CANAL)
     scans = [unheard_beyond(scan, 30.0) for scan in canal.scans]
-    batch = solved(followed(scans, OdometryKind.HEADING, free_scans=5))
+    batch = solved(followed(scans, parameters(OdometryKind.HEADING, free_scans=5)))
     assert batch.converged
     assert batch.steps < 15

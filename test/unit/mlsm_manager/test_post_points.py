@@ -2,11 +2,10 @@
 
 import numpy as np
 import pytest
-from made_models import HEADING, solver_parameters
+from made_models import HEADING, followed, solver_parameters
 from made_posts import SPEED, cluttered, heard, true_path
 
 from mlsm_manager.joint_solver.batch_solver import solved
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, crowds, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
@@ -80,21 +79,17 @@ def test_the_last_echo_of_a_wall_does_not_stand_alone():
     assert not len(found_in(scan))
 
 
-@pytest.fixture(scope="module")
-def scans():
-    return heard(TURNS)
-
-
 def solver_of(scans, post_confidence):
-    odometry = HEADING
     parameters = solver_parameters(
-        odometry=odometry, range_scale_deviation=0.0, normal_deviation=0.2, scans_per_group=1, echo_deviation=0.2,
+        odometry=HEADING, range_scale_deviation=0.0, normal_deviation=0.2, scans_per_group=1, echo_deviation=0.2,
         post_confidence=post_confidence,
     )  # fmt: skip
-    solver = LiveSolver(parameters, AT_BASE)
-    for scan in scans:
-        solver.add(scan)
-    return solver
+    return followed(scans, parameters, AT_BASE)
+
+
+@pytest.fixture(scope="module")
+def with_posts():
+    return solver_of(heard(TURNS), post_confidence=1.0)
 
 
 def gone(solver, nodes):
@@ -103,20 +98,20 @@ def gone(solver, nodes):
     return nodes[-1, 0] - nodes[0, 0], ends[-1, 0] - ends[0, 0]
 
 
-def test_posts_tell_the_way_along_a_canal(scans):
-    solver = solver_of(scans, post_confidence=1.0)
-    for nodes in (solver.state.nodes, solved(solver).state.nodes):
-        found, true = gone(solver, nodes)
+def test_posts_tell_the_way_along_a_canal(with_posts):
+    for nodes in (with_posts.state.nodes, solved(with_posts).state.nodes):
+        found, true = gone(with_posts, nodes)
         assert found == pytest.approx(true, abs=1.5)
 
 
-def test_the_told_deviation_is_smaller_where_posts_tell_the_way(scans):
-    with_posts, without = (solver_of(scans, quality).estimates[-1].pose_covariance[0, 0] for quality in (1.0, 0.0))
-    assert with_posts < 0.1 * without
+def test_the_told_deviation_is_smaller_where_posts_tell_the_way(with_posts):
+    without = solver_of(heard(TURNS), post_confidence=0.0)
+    known, unknown = (solver.estimates[-1].pose_covariance[0, 0] for solver in (with_posts, without))
+    assert known < 0.1 * unknown
 
 
-def test_speed_is_found_from_posts(scans):
-    assert solver_of(scans, post_confidence=1.0).estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
+def test_speed_is_found_from_posts(with_posts):
+    assert with_posts.estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
 
 
 @pytest.mark.newest_only("dear; the tests above follow the same canal")

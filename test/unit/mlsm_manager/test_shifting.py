@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_harbour import CANAL, SONAR_IN_BASE, along_canal, tour
+from made_harbour import CANAL, along_canal, tour
+from made_models import followed
 
 from mlsm_manager.hovering.echoes import Echoes
 from mlsm_manager.hovering.particle_filter import likelihoods_of, nearby_of, on_path
@@ -14,7 +15,6 @@ from mlsm_manager.hovering.particles import Particles
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
 from mlsm_manager.joint_solver.batch_solver import fit_path
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
 
@@ -133,9 +133,7 @@ def test_a_run_that_heard_nothing_stays_as_it_is():
 def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():
     made = tour(6, path=along_canal, corners=CANAL)
     profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(OdometryKind.HEADING))
-    live = LiveSolver(profile.solver_parameters(), SONAR_IN_BASE)
-    for scan in made.scans:
-        live.add(scan)
+    live = followed(made.scans, profile.solver_parameters())
     motion = live.log.node_motion(np.arange(len(live.log.node_times)))
     true = made.truth.at(live.log.node_times)[:, :2]
     start = replace(live.state, nodes=on_path(live.state.nodes, true, motion))

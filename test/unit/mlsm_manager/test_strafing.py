@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, tour
+from made_models import followed
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted, profile_values, strafes
@@ -30,26 +31,19 @@ def strafed(times):
 MADE = tour(14, path=strafed)
 
 
-def solver_of(kind):
+def solver_of(kind, scans=MADE.scans):
     profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(kind))
-    return LiveSolver(profile.solver_parameters(), SONAR_IN_BASE)
-
-
-def followed(kind, scans=MADE.scans):
-    solver = solver_of(kind)
-    for scan in scans:
-        solver.add(scan)
-    return solver
+    return followed(scans, profile.solver_parameters())
 
 
 @pytest.fixture(scope="module")
 def hovering():
-    return followed(OdometryKind.HOVERING)
+    return solver_of(OdometryKind.HOVERING)
 
 
 @pytest.fixture(scope="module")
 def ahead():
-    return followed(OdometryKind.HEADING)
+    return solver_of(OdometryKind.HEADING)
 
 
 def errors_of(solver):
@@ -76,7 +70,7 @@ def test_a_short_run_does_not_tell(ahead):
 
 
 def test_refined_it_is_as_near_as_echoes_tell():
-    solver = followed(OdometryKind.HOVERING, MADE.scans[:5])
+    solver = solver_of(OdometryKind.HOVERING, MADE.scans[:5])
     fit = fitted(solver)
     places = solver.log.node_poses(np.arange(len(fit.node_times)))[:, :2] + fit.state.nodes[:, :2]
     true = MADE.truth.at(fit.node_times)[:, :2]
@@ -90,7 +84,7 @@ def test_each_part_of_a_turn_has_an_estimate(hovering):
 
 
 def test_equal_runs_find_equal_paths(hovering):
-    again = followed(OdometryKind.HOVERING, MADE.scans[:4])
+    again = solver_of(OdometryKind.HOVERING, MADE.scans[:4])
     few = len(again.estimates)
     np.testing.assert_allclose(
         [estimate.T_map_base for estimate in again.estimates],
@@ -99,14 +93,14 @@ def test_equal_runs_find_equal_paths(hovering):
 
 
 def test_a_stored_run_goes_on_as_it_would_have():
-    first = followed(OdometryKind.HOVERING, MADE.scans[:5])
+    first = solver_of(OdometryKind.HOVERING, MADE.scans[:5])
     again = LiveSolver.resumed(first.parameters, SONAR_IN_BASE, MADE.scans[:5], first.stored())
     ends = [solver.add(MADE.scans[5]).T_map_base for solver in (first, again)]
     np.testing.assert_allclose(ends[1], ends[0])
 
 
 def test_a_scan_that_comes_twice_leaves_nothing_behind():
-    solver = followed(OdometryKind.HOVERING, MADE.scans[:3])
+    solver = solver_of(OdometryKind.HOVERING, MADE.scans[:3])
     before = solver.state.copy(), solver.log.scan_count
     with pytest.raises(RefusedInput):
         solver.add(MADE.scans[2])
