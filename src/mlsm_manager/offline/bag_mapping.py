@@ -34,8 +34,7 @@ from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
 
-# The frame that live.yaml's nodes call their map by default.
-_MAP_FRAME = "map"
+_MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
 
 
 @dataclass(frozen=True)

@@ -49,8 +49,7 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: Ma
     return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)
 
 
-_NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5
-"""Factors of settings that nobody knows better than that."""
+_NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5  # factors of settings that nobody knows better than that
 _MORE_SCANS = 2
 _MANY_SCANS = 40  # in a group, from which on it is made smaller
 _TURNS = 1.0  # of the direction in which the second start lies beside the path, along the whole run

@@ -13,8 +13,7 @@ from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry import composed, inverse, transformed
 
-# Loops that are printed; summary.json has all.
-_MOST_LOOPS = 5
+_MOST_LOOPS = 5  # loops that are printed; summary.json has all
 
 
 def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: float) -> Dict[str, Any]:

@@ -15,8 +15,7 @@ from mlsm_manager.self_check.map_checks import scans_go_on
 from sonar_processing.beams.beam import Beam
 from sonar_processing.filters.echo_extractor import ExtractionMode
 
-# Share of non-zero strengths that equal the strongest.
-_BINARY = 0.9
+_BINARY = 0.9  # share of non-zero strengths that equal the strongest
 _AT_ONCE = 1000  # beams that are counted together: bounds the memory
 
 

@@ -18,12 +18,9 @@ from node_support.ros.callbacks import every_clock_period
 from node_support.ros.transforms import pose_from_matrix
 from sonar_processing.ros.conversions import header
 
-# m^2 and rad^2: what a filter such as robot_localization takes for "not measured".
-_UNKNOWN_VARIANCE = 1e6
-# x, y and yaw among the six axes of a covariance message.
-_ROS_AXES = np.array([0, 1, 5])
-# Poses: four days of scans of 16 s, 1.5 MB.
-_LONGEST_PATH = 20000
+_UNKNOWN_VARIANCE = 1e6  # m^2 and rad^2: what a filter such as robot_localization takes for "not measured"
+_ROS_AXES = np.array([0, 1, 5])  # x, y and yaw among the six axes of a covariance message
+_LONGEST_PATH = 20000  # poses: four days of scans of 16 s, 1.5 MB
 
 
 class FixPublisher:

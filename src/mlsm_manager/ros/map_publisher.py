@@ -26,8 +26,7 @@ from node_support.ros.callbacks import guarded, on_change
 from sonar_processing.ros.conversions import header, point_cloud
 
 CLOUD_FIELDS = ("x", "y", "z", "intensity", "height", "depth", "count")
-# Share of the time that may go into sending the whole map on one topic again and again.
-_MOST_TIME = 0.1
+_MOST_TIME = 0.1  # share of the time that may go into sending the whole map on one topic again and again
 
 
 def map_cloud(blocks: Blocks, stamp_ns: int, frame_id: str) -> PointCloud2:

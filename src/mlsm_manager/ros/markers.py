@@ -18,14 +18,10 @@ COLORS = {kind: ColorRGBA(*color, 1.0) for kind, color in TYPE_COLORS.items()}
 # Four lengths of 4 bytes and the flag; behind the points follow the other three and the flag.
 _EMPTY_LISTS_BYTES = 17
 _NO_COLORS = struct.pack("<I", 0)
-_POINT_BYTES, _COLOR_BYTES = 24, 16
-"""Three float64 and four float32."""
-_AFTER_STAMP_BYTES = 16
-"""Of a message: sequence, seconds, nanoseconds and the length of the frame's name."""
-_OUTGROWN = 0.25
-"""Share of the range of colours by which values may lie beyond it."""
-_POWERS = 64
-"""So many classes of boxes share a tile's number: heights from a sixteenth of a cell to 2 ** 59 cells."""
+_POINT_BYTES, _COLOR_BYTES = 24, 16  # three float64 and four float32
+_AFTER_STAMP_BYTES = 16  # of a message: sequence, seconds, nanoseconds and the length of the frame's name
+_OUTGROWN = 0.25  # share of the range of colours by which values may lie beyond it
+_POWERS = 64  # so many classes of boxes share a tile's number: heights from a sixteenth of a cell to 2 ** 59 cells
 
 
 class PackedMarkerArray(MarkerArray):

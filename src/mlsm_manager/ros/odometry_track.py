@@ -10,12 +10,9 @@ from node_support.headers import DAY
 from node_support.health import Health
 from node_support.ros.transforms import TfBuffer, stamp_of
 
-# s that tf remembers: three slow turns of the head.
-_CACHE = 180.0
-# s to wait for odometry that is on its way; then the scan is given up.
-_PATIENCE = 1.0
-# Times of a track besides those of the beams: four a second in a turn of 16 s.
-_STEADY = 65
+_CACHE = 180.0  # s that tf remembers: three slow turns of the head
+_PATIENCE = 1.0  # s to wait for odometry that is on its way; then the scan is given up
+_STEADY = 65  # times of a track besides those of the beams: four a second in a turn of 16 s
 
 
 class OdometryTrack:

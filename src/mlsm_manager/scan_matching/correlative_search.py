@@ -10,8 +10,7 @@ from mlsm_manager.scan_matching.scan_path import POSE, POSITION, RATE_YAW, YAW, 
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry import rotated, wrapped
 
-YAW_STEP = np.radians(2.75)
-"""rad: a point 20 m away moves by two search cells of 0.5 m."""
+YAW_STEP = np.radians(2.75)  # rad: a point 20 m away moves by two search cells of 0.5 m
 _BROAD = 4.0  # times the field's width: what is as dense over four widths is clutter
 _MOST_POINTS = 160  # a scan has about 150 echoes; a dense one is thinned, so that it takes no longer
 _APART, _APART_YAW = 2.0, np.radians(8.0)  # m and rad: nearer candidates end in the same fit

@@ -16,25 +16,18 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.surface_map.blocks import Blocks
 
-# Blocks that make one distribution: 16 fill the broad window where blocks lie as close as cells allow.
-_NEIGHBOURS = 16
+_NEIGHBOURS = 16  # blocks that make one distribution: 16 fill the broad window where blocks lie as close as cells allow
 # The window reaches to the second neighbour: with the block itself three, the fewest that show a line.
 _WINDOW_NEIGHBOUR = 2
 # m: above the diagonal of a cell of 0.5 m, below the distance of two jetties.
 _LEAST_WINDOW = 0.7
 _GREATEST_WINDOW = 2.5
-# Times the information that a window itself makes up along a wall.
-_ALONG_MARGIN = 3.0
-# The typical thickness of surfaces counts as this many points more.
-_PRIOR_POINTS = 2.0
-# m: range resolution of 50 m in 500 bins.
-_LEAST_DEVIATION = 0.1
-# m: a block without neighbours may be anything within its cell.
-_LONE_DEVIATION = 0.5
-# m: what is thicker is clutter and no surface.
-_SURFACE_DEVIATION = 0.4
-# m: free to slide along a wall.
-_UNBOUNDED = 100.0
+_ALONG_MARGIN = 3.0  # times the information that a window itself makes up along a wall
+_PRIOR_POINTS = 2.0  # the typical thickness of surfaces counts as this many points more
+_LEAST_DEVIATION = 0.1  # m: range resolution of 50 m in 500 bins
+_LONE_DEVIATION = 0.5  # m: a block without neighbours may be anything within its cell
+_SURFACE_DEVIATION = 0.4  # m: what is thicker is clutter and no surface
+_UNBOUNDED = 100.0  # m: free to slide along a wall
 
 
 class LocalDistributions:

@@ -14,12 +14,9 @@ SCALES = (8.0, 4.0, 2.5)
 _ITERATIONS_PER_SCALE = 4
 # m: echoes of one surface within this distance are compared with the same window of the map and err alike.
 _CLUSTER = 3.0
-# 150 echoes of five clusters are worth five points at least.
-_GREATEST_INFLATION = 30.0
-# Standard deviations: a smaller step changes nothing that a fix tells.
-_LAST_STEP = 0.1
-# Keeps an average defined where no point has a weight.
-_LEAST_WEIGHT = 1e-9
+_GREATEST_INFLATION = 30.0  # 150 echoes of five clusters are worth five points at least
+_LAST_STEP = 0.1  # standard deviations: a smaller step changes nothing that a fix tells
+_LEAST_WEIGHT = 1e-9  # keeps an average defined where no point has a weight
 
 
 @dataclass(frozen=True)

@@ -11,8 +11,7 @@ from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.scan_path import POSITION, STATES, PlanarMotion
 from node_support.geometry import rotated
 
-# Standard deviations: of a planar Gaussian, 99 % lie within three.
-INLIER = 3.0
+INLIER = 3.0  # standard deviations: of a planar Gaussian, 99 % lie within three
 # m per standard deviation of the kernel: no block of another surface within a gate of 6 m at first, 1.9 m at last.
 _GATE = 0.75
 # Points of a scan that can share one window of the map: a window of 2.5 m holds five of a wall on either side.

@@ -24,19 +24,15 @@ from scipy.linalg import eigh
 
 from mlsm_manager.scan_matching.scan_path import POSE, STATES
 
-# CR2 divides by the root of one minus the leverage, which must not vanish.
-_GREATEST_LEVERAGE = 0.95
-# Square of a tenth: noise is never less than that of the points' deviations, see above.
-_LEAST_SCALE = 0.01
+_GREATEST_LEVERAGE = 0.95  # CR2 divides by the root of one minus the leverage, which must not vanish
+_LEAST_SCALE = 0.01  # square of a tenth: noise is never less than that of the points' deviations, see above
 # A gradient that hardly changes is a matter of few neighbours: it inflates a deviation ten times at most.
 _LEAST_CURVATURE = 0.1
 # Standard deviations to either side over which the gradient is differenced.
 _SPAN = 2.0
 _LEAST_SPAN = 0.1
-# Share of all information: keeps a matrix invertible where no point tells anything.
-_LEAST_INFORMATION = 1e-6
-# Share of the information: where the prior tells more, the points' curvature is noise.
-_TOLD_BY_PRIOR = 0.95
+_LEAST_INFORMATION = 1e-6  # share of all information: keeps a matrix invertible where no point tells anything
+_TOLD_BY_PRIOR = 0.95  # share of the information: where the prior tells more, the points' curvature is noise
 Gradient = Callable[[np.ndarray], np.ndarray]
 """From a state (8,) to the gradient (8,) of all points."""
 

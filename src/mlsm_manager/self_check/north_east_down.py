@@ -15,10 +15,8 @@ _CLIMB = 2.0
 _AS_REPORTED, _TURNED_UP = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
 # Echoes of a scan: with fewer their mean distance tells little, and more take time and tell nothing new.
 _FEWEST, _MOST = 30, 1000
-# m: echoes that are farther from all others say no more than that something else is seen.
-_OTHER_SURFACE = 5.0
-# times: by less the two odometries do not differ, as on a straight way or where the vehicle stands.
-_CLEARLY = 1.2
+_OTHER_SURFACE = 5.0  # m: echoes that are farther from all others say no more than that something else is seen
+_CLEARLY = 1.2  # times: by less the two odometries do not differ, as on a straight way or where the vehicle stands
 # Pairs of scans that tell the two apart, and the share of them that at most may speak against the odometry.
 _LEAST_PAIRS = 5
 _SHARE = 0.7

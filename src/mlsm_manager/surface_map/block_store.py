@@ -12,12 +12,9 @@ from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
 from mlsm_manager.surface_map.large_array import LargeArray
 from node_support.numba_cache import compiled
 
-_PIECE = 1 << 15
-"""Rows copied at once: 3 MB, one or two milliseconds."""
-_PAUSE = 0.001
-"""s between two pieces: a lock that is taken again at once is never given to somebody who waits for it."""
-_MIN_ROWS = 1024
-"""Reserved from the start (96 kB), so that small maps do not grow scan by scan."""
+_PIECE = 1 << 15  # rows copied at once: 3 MB, one or two milliseconds
+_PAUSE = 0.001  # s between two pieces: a lock that is taken again at once is never given to somebody who waits for it
+_MIN_ROWS = 1024  # reserved from the start (96 kB), so that small maps do not grow scan by scan
 
 
 class StoreArrays(NamedTuple):

@@ -12,8 +12,7 @@ COUNT = 8
 BOTTOM = 9
 TOP = 10
 ROW_WIDTH = 11
-MOST_CROSSINGS = np.iinfo(np.uint16).max
-"""Crossings are counted up to here, in two bytes per block."""
+MOST_CROSSINGS = np.iinfo(np.uint16).max  # crossings are counted up to here, in two bytes per block
 
 
 class BlockType(IntEnum):

@@ -7,8 +7,7 @@ from node_support.numba_cache import compiled
 
 NO_BLOCK = -1
 _EMPTY = np.iinfo(np.int64).min
-_SEGMENT_BITS = 12
-"""A segment has 4096 places (48 kB): splitting one takes well below a millisecond."""
+_SEGMENT_BITS = 12  # a segment has 4096 places (48 kB): splitting one takes well below a millisecond
 _PLACES = 1 << _SEGMENT_BITS
 _LEAST_LOAD, _LOAD_SPREAD = 0.58, 0.2
 """Share of a segment in use from which on it is split. The shares differ from segment to segment, because all fill at

@@ -23,8 +23,7 @@ from node_support.parameters import ParameterSet, parameter
 
 _MOST_POINTS = 50
 """More points make a block no surer: a ship that lay there for an hour has left once it is not heard any more."""
-_ENOUGH = 5
-"""So many crossings make a cell as free as it gets: OctoMap's cells too reach their limit after five misses."""
+_ENOUGH = 5  # so many crossings make a cell as free as it gets: OctoMap's cells too reach their limit after five misses
 
 
 @dataclass(frozen=True)

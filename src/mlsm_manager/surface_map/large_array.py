@@ -5,8 +5,7 @@ from typing import Tuple
 
 import numpy as np
 
-_COPIED_BYTES = 1 << 22
-"""Copying up to 4 MB takes about a millisecond, and a small array needs no mapping of its own."""
+_COPIED_BYTES = 1 << 22  # copying up to 4 MB takes about a millisecond, and a small array needs no mapping of its own
 _PRIVATE = getattr(mmap, "MAP_PRIVATE", 0) | getattr(mmap, "MAP_ANONYMOUS", 0)
 """Both 0 where the system has no such mappings: arrays are then copied whenever they grow."""
 

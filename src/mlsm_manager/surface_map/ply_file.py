@@ -20,8 +20,7 @@ _HEADER = re.compile(
     rb"ply\nformat binary_little_endian 1\.0\ncomment multi level surface map, resolution (?P<resolution>\S+) m\n"
     rb"element vertex (?P<count>\d+)\n(?P<properties>(?:property .*\n)*)end_header\n"
 )
-_ROUNDING = 1e-6
-"""Of a mean, which is summed up from many points and may leave its bottom and top by rounding alone."""
+_ROUNDING = 1e-6  # of a mean, which is summed up from many points and may leave its bottom and top by rounding alone
 
 
 def write_ply(path: Path, blocks: Blocks) -> None:

@@ -12,10 +12,8 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP
 from node_support.numba_cache import compiled
 
-VALUES = 4
-"""Mean of x y z and strength, then as many sums of squares: the first columns of a row."""
-_FEW = 24
-"""Up to so many points insertion sort is the fastest."""
+VALUES = 4  # mean of x y z and strength, then as many sums of squares: the first columns of a row
+_FEW = 24  # up to so many points insertion sort is the fastest
 _FIBONACCI = np.uint64(0x9E3779B97F4A7C15)
 _FINITE = np.finfo(np.float64).max
 

@@ -16,8 +16,7 @@ from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 TILE_BITS = 4
 """A tile has 2 ** 4 = 16 cells on a side: 8 m at 0.5 m. Larger ones repeat more that did not change, smaller ones make
 more markers than rviz draws fluidly."""
-THINNEST = -4
-"""Power of two: a sixteenth of a cell is the thinnest box that still shows."""
+THINNEST = -4  # power of two: a sixteenth of a cell is the thinnest box that still shows
 _MOST_PARTS = 64
 """So many insertions are noted before what they changed is put together; it bounds the memory of a map unasked."""
 

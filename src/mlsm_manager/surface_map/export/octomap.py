@@ -9,14 +9,10 @@ from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support.files import whole_file
 
-_HIT, _MISS = 0.85, -0.4
-"""Log-odds of one hit and one miss, OctoMap's own (probabilities 0.7 and 0.4)."""
-_MOST_HITS, _MOST_MISSES = 5, 5
-"""More change nothing: OctoMap keeps log-odds between -2 and 3.5."""
-_HALF_TREE = 32768
-"""An OcTree has 16 levels: so many cells to each side of the origin."""
-_MOST_VOXELS = 100_000_000
-"""A tree of more takes gigabytes; one tall block of noise can ask for that."""
+_HIT, _MISS = 0.85, -0.4  # log-odds of one hit and one miss, OctoMap's own (probabilities 0.7 and 0.4)
+_MOST_HITS, _MOST_MISSES = 5, 5  # more change nothing: OctoMap keeps log-odds between -2 and 3.5
+_HALF_TREE = 32768  # an OcTree has 16 levels: so many cells to each side of the origin
+_MOST_VOXELS = 100_000_000  # a tree of more takes gigabytes; one tall block of noise can ask for that
 _HOW_TO_INSTALL = "needs pyoctomap; install it with: pip install pyoctomap"
 
 

@@ -21,8 +21,7 @@ _RAMP = np.array(
      [0.64, 0.99, 0.24], [0.98, 0.73, 0.22], [0.79, 0.16, 0.00]]
 )  # fmt: skip
 """From low to high, six points of the colour map "turbo" (Mikhailov 2019), whose steps the eye tells apart."""
-_INNER_SHARE = (2.0, 98.0)
-"""Percent: a few echoes far off do not take the colours from all others."""
+_INNER_SHARE = (2.0, 98.0)  # percent: a few echoes far off do not take the colours from all others
 _FREE_COLOR = (0.91, 0.95, 0.98)
 _WIDTH_INCHES = 10.0
 _DPI = 150
