@@ -44,22 +44,16 @@ class ScoreField:
         excess = np.maximum(near - broad, 0.0)
         return cls(excess / (1.0 + excess), origin, cell)
 
-    def index(self, points: np.ndarray) -> np.ndarray:
-        """Return (..., 2) int64 column and row of the cells that hold points (..., 2)."""
-        return np.floor((points - self.origin) / self.cell).astype(np.int64)
-
-    def shifted_sums(self, points: np.ndarray, weights: np.ndarray, reach: int) -> np.ndarray:
-        """Return (2 reach + 1, 2 reach + 1) weighted sums of the values at points (n, 2) shifted by whole cells.
+    def shifted_means(self, points: np.ndarray, reach: int) -> np.ndarray:
+        """Return (2 reach + 1, 2 reach + 1) means of the values at points (n, 2), n > 0, shifted by whole cells.
 
         Entry [i, j] is for a shift by j - reach cells in x and i - reach cells in y.
         """
-        index = self.index(points)
+        x, y = np.floor((points - self.origin) / self.cell).astype(np.int64).T
         rows, columns = self.values.shape
-        x, y = index[:, 0], index[:, 1]
         near = (x >= reach) & (x < columns - reach) & (y >= reach) & (y < rows - reach)
-        size = 2 * reach + 1
-        patches = _windows(self.values, size)[y[near] - reach, x[near] - reach]
-        return np.tensordot(weights[near].astype(np.float32), patches, axes=1)
+        patches = _windows(self.values, 2 * reach + 1)[y[near] - reach, x[near] - reach]
+        return np.tensordot(np.full(len(patches), 1.0 / len(points), dtype=np.float32), patches, axes=1)
 
 
 def _windows(values: np.ndarray, size: int) -> np.ndarray:
@@ -74,40 +68,23 @@ def _windows(values: np.ndarray, size: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class SearchWindow:
-    """Where to look.
-
-    distance: m to either side in x and y. angle: rad to either side. yaw_rates: (k,) errors of the yaw rate, rad/s.
-    """
+    """distance: m to either side in x and y. angle: rad to either side. yaw_rates: (k,) errors of that rate, rad/s."""
 
     distance: float
     angle: float
     yaw_rates: np.ndarray
 
 
-@dataclass(frozen=True)
-class Candidate:
-    """A state (8,) as in scan_path, and its score, 0 to 1, less the prior's cost."""
-
-    theta: np.ndarray
-    score: float
-
-
 def search(
-    motion: PlanarMotion,
-    weights: np.ndarray,
-    field: ScoreField,
-    center: np.ndarray,
-    window: SearchWindow,
-    penalty: np.ndarray,
-    count: int,
-) -> List[Candidate]:
-    """Return up to `count` candidates, best first, none of them near a better one.
+    motion: PlanarMotion, field: ScoreField, center: np.ndarray, window: SearchWindow, penalty: np.ndarray, count: int
+) -> List[np.ndarray]:
+    """Return up to `count` states (8,) as in scan_path, the best first, none of them near a better one.
 
-    weights: (n,) of the scan's points. center: (8,) state in the middle of the window. penalty: (3, 3) matrix A; a pose
-    that lies d = (x, y, yaw) from the center loses d^T A d of its score.
+    center: (8,) state in the middle of the window. penalty: (3, 3) matrix A; a pose that lies d = (x, y, yaw) from the
+    center loses d^T A d of its score.
     """
-    chosen = _thinned(len(weights))
-    weights = weights[chosen] / max(weights[chosen].sum(), 1e-12)
+    points = len(motion.local)
+    chosen = np.unique(np.linspace(0, points - 1, min(points, _MOST_POINTS)).astype(np.int64))
     reach = int(np.ceil(window.distance / field.cell))
     steps = int(np.ceil(window.angle / YAW_STEP))
     yaws = np.arange(-steps, steps + 1) * YAW_STEP
@@ -120,12 +97,8 @@ def search(
         arms = motion.points(motion.path(theta))[chosen] - center[POSITION]
         for index, yaw in enumerate(yaws):
             points = center[POSITION] + rotated(arms, yaw)
-            scores[number, index] = field.shifted_sums(points, weights, reach) - prior_cost[index]
+            scores[number, index] = field.shifted_means(points, reach) - prior_cost[index]
     return _peaks(scores, center, window.yaw_rates, yaws, offsets, count)
-
-
-def _thinned(count: int) -> np.ndarray:
-    return np.unique(np.linspace(0, count - 1, min(count, _MOST_POINTS)).astype(np.int64))
 
 
 def _prior_costs(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> np.ndarray:
@@ -136,10 +109,10 @@ def _prior_costs(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> 
 
 def _peaks(
     scores: np.ndarray, center: np.ndarray, rates: np.ndarray, yaws: np.ndarray, offsets: np.ndarray, count: int
-) -> List[Candidate]:
+) -> List[np.ndarray]:
     best_rate = scores.argmax(axis=0)
     best = np.take_along_axis(scores, best_rate[np.newaxis], axis=0)[0]
-    found: List[Candidate] = []
+    found: List[np.ndarray] = []
     while len(found) < count:
         index = np.unravel_index(int(best.argmax()), best.shape)
         if not np.isfinite(best[index]):
@@ -147,7 +120,7 @@ def _peaks(
         theta = np.array(center, dtype=np.float64)
         theta[POSE] += offsets[index[2]], offsets[index[1]], yaws[index[0]]
         theta[RATE_YAW] += rates[best_rate[index]]
-        found.append(Candidate(theta, float(best[index])))
+        found.append(theta)
         _clear_around(best, index, yaws, offsets)
     return found
 

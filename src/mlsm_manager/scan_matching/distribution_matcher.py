@@ -122,15 +122,13 @@ class DistributionMatcher:
         self, motion: PlanarMotion, target: Blocks, state: PriorState, window: SearchWindow
     ) -> Tuple[List[Fit], Refiner]:
         parameters = self.parameters
-        weights = np.ones(len(motion.local))
         margin = window.distance + 2.0 * parameters.search_cell
         field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
         pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
-        found = search(
-            motion, weights, field, state.mean, window, _PRIOR_COST_SHARE * pose_information, parameters.candidates
-        )
-        refiner = Refiner(motion, weights, LocalDistributions(target), state, parameters.range_scale_deviation)
-        fits = [refiner.refine(candidate.theta, parameters.max_steps) for candidate in found]
+        penalty = _PRIOR_COST_SHARE * pose_information
+        starts = search(motion, field, state.mean, window, penalty, parameters.candidates)
+        refiner = Refiner(motion, LocalDistributions(target), state, parameters.range_scale_deviation)
+        fits = [refiner.refine(start, parameters.max_steps) for start in starts]
         inflation = max(fits, key=lambda fit: fit.log_likelihood_gain).inflation
         return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
 
@@ -181,18 +179,14 @@ class DistributionMatcher:
         for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
-                return (
-                    MatchStatus.AMBIGUOUS,
-                    f"another pose fits nearly as well: its log-likelihood is only {lead:.1f} less",
-                )
+                reason = f"another pose fits nearly as well: its log-likelihood is only {lead:.1f} less"
+                return MatchStatus.AMBIGUOUS, reason
         values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
         excluded = _EXCLUDED * float(np.sqrt(values[-1]))
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
-            return (
-                MatchStatus.AMBIGUOUS,
-                f"a pose beside it fits nearly as well: its log-likelihood is only {lead:.1f} less",
-            )
+            reason = f"a pose beside it fits nearly as well: its log-likelihood is only {lead:.1f} less"
+            return MatchStatus.AMBIGUOUS, reason
         return MatchStatus.CONVERGED, ""
 
 

@@ -66,18 +66,12 @@ class Refiner:
     """
 
     def __init__(
-        self,
-        motion: PlanarMotion,
-        point_weights: np.ndarray,
-        target: LocalDistributions,
-        prior: PriorState,
-        range_scale_deviation: float = 0.0,
+        self, motion: PlanarMotion, target: LocalDistributions, prior: PriorState, range_scale_deviation: float
     ) -> None:
-        """`point_weights` is (n,), n > 0; `range_scale_deviation` is relative, 0 where ranges are certain."""
+        """`motion` has at least one point; `range_scale_deviation` is relative, 0 where ranges are certain."""
         self._motion = motion
-        self._target = target
         self._prior = prior
-        self._points = PointEquations(motion, point_weights, target, prior.mean, range_scale_deviation)
+        self._points = PointEquations(motion, target, prior.mean, range_scale_deviation)
 
     def refine(self, start: np.ndarray, max_iterations: int) -> Fit:
         """Return the fit found from `start` (8,)."""
@@ -120,12 +114,11 @@ class Refiner:
             *self._points.evidence(normal, gain, fit.inflation), _clusters(normal.correspondences.world),
             self._hidden_share(normal),
         )  # fmt: skip
-        return residual_covariance(
-            fit.theta,
-            evidence,
-            lambda theta: self._points.gradient(theta, SCALES[-1], gain) / fit.inflation,
-            self._prior.information,
-        )
+
+        def gradient(theta: np.ndarray) -> np.ndarray:
+            return self._points.gradient(theta, SCALES[-1], gain) / fit.inflation
+
+        return residual_covariance(fit.theta, evidence, gradient, self._prior.information)
 
     def _hidden_share(self, normal: Normal) -> float:
         """Return how much of the map's error the residuals do not show, as a share of the noise that they show.

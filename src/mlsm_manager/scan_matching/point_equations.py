@@ -71,16 +71,10 @@ class PointEquations:
     """
 
     def __init__(
-        self,
-        motion: PlanarMotion,
-        point_weights: np.ndarray,
-        target: LocalDistributions,
-        expected: np.ndarray,
-        range_scale_deviation: float,
+        self, motion: PlanarMotion, target: LocalDistributions, expected: np.ndarray, range_scale_deviation: float
     ) -> None:
-        """`point_weights` is (n,), n > 0; `expected` (8,) a state; `range_scale_deviation` relative, 0: certain."""
+        """`expected`: (8,) a state; `range_scale_deviation`: relative, 0 where ranges are certain."""
         self._motion = motion
-        self._point_weights = point_weights
         self._target = target
         self._range_scale_deviation = range_scale_deviation
         spots = motion.points(motion.path(expected))
@@ -127,11 +121,8 @@ class PointEquations:
         mixed = np.einsum("nas,na->s", normal.weighted_jacobian, normal.correspondences.arms) / inflation
         if self._range_scale_deviation == 0.0:
             return np.zeros_like(mixed), mixed
-        known = (
-            float((normal.weighted_arms * normal.correspondences.arms).sum()) / inflation
-            + self._range_scale_deviation**-2
-        )
-        return mixed / known, mixed
+        by_points = float((normal.weighted_arms * normal.correspondences.arms).sum()) / inflation
+        return mixed / (by_points + self._range_scale_deviation**-2), mixed
 
     def evidence(self, normal: Normal, gain: np.ndarray, inflation: float) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return gradient (n, 8) and information (n, 8, 8) of each point, and (8, 8) of what is known of the scale.
@@ -139,12 +130,8 @@ class PointEquations:
         gain: (8,) as of scale_gain. All are 1 / `inflation` of what independent points would say; their sums are those
         of `weighed`.
         """
-        gradient, jacobian, weighted_jacobian, of_scale = (
-            normal.gradient,
-            normal.jacobian,
-            normal.weighted_jacobian,
-            np.zeros((STATES, STATES)),
-        )
+        gradient, jacobian, weighted_jacobian = normal.gradient, normal.jacobian, normal.weighted_jacobian
+        of_scale = np.zeros((STATES, STATES))
         if self._range_scale_deviation > 0.0:
             gradient = gradient - _scale_gradient(normal)[:, np.newaxis] * gain
             jacobian = jacobian - normal.correspondences.arms[:, :, np.newaxis] * gain
@@ -192,9 +179,8 @@ class PointEquations:
         return Correspondences(world, arms, nearest, distances, metric, residual, squared)
 
     def _weights(self, correspondences: Correspondences, scale: float) -> np.ndarray:
-        places = len(correspondences.nearest) // len(self._point_weights)
         share = self._target.weight[correspondences.nearest] * self.map_share(correspondences.nearest)
-        return np.tile(self._point_weights, places) * share * (correspondences.distances < _GATE * scale)
+        return share * (correspondences.distances < _GATE * scale)
 
 
 def log_likelihood_gain(normal: Normal, scale: float) -> float:
@@ -203,7 +189,8 @@ def log_likelihood_gain(normal: Normal, scale: float) -> float:
 
 
 def _saved(squared: np.ndarray, scale: float) -> np.ndarray:
-    return scale**2 / 2.0 - geman_mcclure_cost(squared, scale)
+    """Return by how much the costs (n,), whose slope the weights are, are below those far off: half of `scale`^2."""
+    return scale**2 / 2.0 - 0.5 * squared / (1.0 + squared / scale**2)
 
 
 def _scale_gradient(normal: Normal) -> np.ndarray:
@@ -225,8 +212,3 @@ def geman_mcclure(squared: np.ndarray, scale: float) -> np.ndarray:
     Geman and McClure (1985).
     """
     return (1.0 + squared / scale**2) ** -2
-
-
-def geman_mcclure_cost(squared: np.ndarray, scale: float) -> np.ndarray:
-    """Return costs (n,) whose slope the weights are: half the square near 0, never above half of `scale` squared."""
-    return 0.5 * squared / (1.0 + squared / scale**2)

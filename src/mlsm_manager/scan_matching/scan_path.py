@@ -25,19 +25,12 @@ from node_support.geometry import composed, inverse, rotated
 
 X, Y, YAW, RATE_X, RATE_Y, RATE_YAW, SCALE, DIRECTION = range(8)
 STATES = 8
-
 POSITION = slice(X, YAW)  # x y [m] of base_link in map at the reference time
-
 POSE = slice(X, RATE_X)  # position and yaw [rad]: T_map_base at the reference time
-
 RATE_XY = slice(RATE_X, RATE_YAW)  # error of the odometry's speed in the vehicle's frame, m/s
-
 RATE = slice(RATE_X, SCALE)  # the same and the error of its turn rate, rad/s
-
 MOTION = slice(SCALE, STATES)  # relative error of the odometry's distances, and error of their direction [rad]
-
 ERRORS = slice(RATE_X, STATES)  # all errors of the odometry
-
 _LEAST_NODES = 33  # two a second in a turn of 16 s, where a scan has fewer echoes than that
 
 
@@ -55,7 +48,8 @@ class PlanarMotion:
         self.beam_times = times[times <= scan.reference_time]
         self.beam = np.minimum(np.searchsorted(self.beam_times, scan.times), len(self.beam_times) - 1)
         odometry = scan.track.at(self.beam_times)
-        self.local = _seen_from(odometry[self.beam], scan.points[:, :2])
+        poses = odometry[self.beam]
+        self.local = rotated(scan.points[:, :2] - poses[:, :2], -poses[:, 2])
         self._tau = self.beam_times - scan.reference_time
         relative = composed(inverse(odometry[-1]), odometry)
         self._heading = relative[:, 2]
@@ -146,10 +140,6 @@ class PlanarMotion:
 
     def _middle_heading(self) -> np.ndarray:
         return (self._heading[1:] + self._heading[:-1]) / 2.0
-
-
-def _seen_from(poses: np.ndarray, points: np.ndarray) -> np.ndarray:
-    return rotated(points - poses[:, :2], -poses[:, 2])
 
 
 def _sum_to_end(steps: np.ndarray) -> np.ndarray:
