@@ -5,19 +5,20 @@ from argparse import Namespace
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
-from typing import Dict, List, Optional
+from typing import List, Optional
 
 import numpy as np
 from tqdm import tqdm
 
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
-from mlsm_manager.offline.findings import Findings
+from mlsm_manager.offline.findings import Findings, Trust
 from mlsm_manager.offline.recording import Recording, read_recording, scans_of
 from mlsm_manager.offline.refinement import Refined, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.run_files import CORRECTED, FURTHER_COLORS, ODOMETRY, REFINED, Run
-from mlsm_manager.offline.sessions import Session, add_session, executor_for, prepared_in_parallel
+from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
+from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import (
     OdometryFound,
     echo_shape_of,
@@ -29,7 +30,6 @@ from mlsm_manager.offline.suited_parameters import (
 )
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
-from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
@@ -55,10 +55,20 @@ class MappedBag:
     sessions: List[Session]
     run: Run
 
+    @property
+    def solution(self) -> Optional[Solution]:
+        """The run as the joint solver knows it best; None where it did not follow it."""
+        if self.refined is not None:
+            return self.refined.solution
+        return None if self.replayed.solver is None else self.replayed.solver.solution
+
 
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
-    odometry = _odometry(recording, options)
+    if options.odometry is None:
+        odometry = odometry_of(recording.track)
+    else:
+        odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
     parameters = _suited_parameters(recording, odometry, options)
     recording = recording.corrected(parameters.part(BeamCorrection))
     scans = _scans(recording, parameters, options)
@@ -72,33 +82,25 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
         if again.solver is not None and strafes(replayed.solver, again.solver):
             odometry, parameters, replayed = other, changed, again
     _tell_of_refused(replayed, options)
-    refined = _refined(recording, replayed, parameters) if options.refine else None
-    refitted = _refitted(replayed, refined) if options.check else []
+    refined, refitted = None, []
+    if options.refine:
+        with _bar(None, "", "refine"):
+            refined = refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
+    if options.check:
+        with _bar(None, "", "check"):
+            refitted = refitted_verdicts(replayed.solver, refined.batch)
     findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted])
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
-    run = _run(replayed, refined, sessions, known)
-    run = run if findings is None else replace(run, trust=findings.trust)
+    run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
     return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
-
-
-def poses_of(replayed: Replayed) -> Dict[str, np.ndarray]:
-    """Return the trajectories (m, 3) of a replay by the names that files and plots give them."""
-    return {ODOMETRY: replayed.odometry, CORRECTED: replayed.corrected}
 
 
 def _suited_parameters(recording: Recording, odometry: OdometryFound, options: Namespace) -> ReplayParameters:
     parameters = with_odometry(options.parameters, odometry.kind, options.fixed)
     beams = [placed.beam for placed in recording.beams]
     return suited(parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
-
-
-def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
-    """Return which odometry the recording is mapped with: the one that was said, or else the one that it looks like."""
-    if options.odometry is not None:
-        return OdometryFound(options.odometry, "--odometry or a parameter says so")
-    return odometry_of(recording.track)
 
 
 def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:
@@ -138,16 +140,6 @@ def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
     return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
 
 
-def _refined(recording: Recording, replayed: Replayed, parameters: ReplayParameters) -> Refined:
-    with _bar(None, "", "refine"):
-        return refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
-
-
-def _refitted(replayed: Replayed, refined: Refined) -> List[Verdict]:
-    with _bar(None, "", "check"):
-        return refitted_verdicts(replayed.solver, refined.batch)
-
-
 def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Namespace) -> List[Session]:
     """Replay all bags but the first, each in the map of those before, with the first one's calibration."""
     bags, sessions = options.bags[1:], []
@@ -156,9 +148,11 @@ def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Na
     known = _stored(first, parameters)
     with executor_for(len(bags), options.scheduler) as executor:
         read = partial(read_recording, request=replace(options.request, truth=None))
-        for bag, ready in zip(bags, prepared_in_parallel(bags, read, parameters, executor)):
-            with _bar(len(ready[1]), "scan", bag.name[:9]) as bar:
-                sessions.append(add_session(bag, ready, parameters, known, bar.update))
+        waiting = [executor.submit(prepared, bag, read, parameters) for bag in bags]
+        for bag, job in zip(bags, waiting):
+            recording, scans = job.result()
+            with _bar(len(scans), "scan", bag.name[:9]) as bar:
+                sessions.append(Session(bag, replay(recording, scans, parameters, bar.update, known)))
             known = _stored(sessions[-1].replayed, parameters)
     return sessions
 
@@ -169,8 +163,11 @@ def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
     return StoredMap(_MAP_FRAME, dict(replayed.estimator.layers), calibration, replayed.times[-1])
 
 
-def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters) -> Run:
-    poses = poses_of(replayed)
+def _run(
+    replayed: Replayed, refined: Optional[Refined], sessions: List[Session], parameters: ReplayParameters,
+    trust: Optional[Trust],
+) -> Run:  # fmt: skip
+    poses = replayed.poses
     stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
     counts = {
         "scans": len(replayed.scans),
@@ -183,4 +180,4 @@ def _run(replayed: Replayed, refined: Optional[Refined], sessions: List[Session]
         stored = replace(stored, layers=refined.layers)
     paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
     further = [path for path in paths if len(path.times)]
-    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, further=further)
+    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, trust, further)

@@ -1,7 +1,7 @@
 """What the joint solver found in a run besides the path: the calibration, and whether the run can be trusted."""
 
 from dataclasses import dataclass, fields
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -9,8 +9,10 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, Par
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
-from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION, OdometryModel
-from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, RUN_COLUMNS, State
+from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION
+from mlsm_manager.joint_solver.normal_equations import RUN_COLUMNS
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -28,7 +30,7 @@ from node_support.parameters import describe
 from sonar_processing.beams.parameters import BeamCorrection
 
 _FEWEST_SCANS = 20  # a window's worth: fewer say too little of scale and delay
-_OF_RUN = {"range_scale_error": RANGE_SCALE, "sonar_delay": DELAY}
+_OF_RUN = ("range_scale_error", "sonar_delay")  # as the solver's unknowns of the run are ordered
 
 
 @dataclass(frozen=True)
@@ -44,49 +46,38 @@ class Calibration:
     deviations: np.ndarray
 
     @classmethod
-    def expected(cls, solver: LiveSolver) -> "Calibration":
+    def expected(cls, parameters: SolverParameters) -> "Calibration":
         """Return what was known before the run."""
-        odometry, parameters = solver.odometry, solver.parameters
-        columns = list(odometry.calibrated.values())
+        odometry, columns = parameters.odometry, list(parameters.odometry.calibrated.values())
         deviations = np.append(parameters.run_deviations, odometry.first_deviations()[columns])
         values = np.append(parameters.run_mean, odometry.first_node()[columns])
         return cls((*_OF_RUN, *odometry.calibrated), values, np.maximum(deviations, HELD_DEVIATION))
 
     @classmethod
-    def of_live(cls, solver: LiveSolver) -> "Calibration":
-        """Return what the newest estimate of a run knows; the solver must have taken a scan."""
-        return cls.of_estimate(solver, solver.estimates[-1])
-
-    @classmethod
-    def of_estimate(cls, solver: LiveSolver, estimate: LiveEstimate) -> "Calibration":
-        """Return what one of the estimates of `solver` knows."""
-        deviations = np.sqrt(np.diag(estimate.covariance))
-        return cls._of(solver, estimate.run, estimate.node, deviations[-RUN_COLUMNS:], deviations)
+    def found(cls, parameters: SolverParameters, known: Union[LiveEstimate, PartResult]) -> "Calibration":
+        """Return what an estimate during a run, or the fit of a part of it, knows."""
+        variances = np.diag(known.covariance)
+        return cls._of(parameters, known.run, known.node, variances[-RUN_COLUMNS:], variances)
 
     @classmethod
     def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
         """Return what the fit of a whole run found; scale and direction are those of the last node."""
-        of_run, of_node = (np.sqrt(np.diag(one)) for one in (batch.run_covariance, solver.estimates[-1].covariance))
-        return cls._of(solver, batch.state.run, batch.state.nodes[-1], of_run, of_node)
-
-    @classmethod
-    def of_part(cls, solver: LiveSolver, part: PartResult) -> "Calibration":
-        """Return what the fit of a part of a run found; scale and direction are those of the last node."""
-        deviations = np.sqrt(np.diag(part.covariance))
-        return cls._of(solver, part.run, part.node, deviations[-RUN_COLUMNS:], deviations)
+        of_run, of_node = np.diag(batch.run_covariance), np.diag(solver.estimates[-1].covariance)
+        return cls._of(solver.parameters, batch.state.run, batch.state.nodes[-1], of_run, of_node)
 
     @classmethod
     def _of(
-        cls, solver: LiveSolver, run: np.ndarray, node: np.ndarray, of_run: np.ndarray, of_node: np.ndarray
+        cls, parameters: SolverParameters, run: np.ndarray, node: np.ndarray, of_run: np.ndarray, of_node: np.ndarray
     ) -> "Calibration":
-        """Return that of the unknowns of run (2,) and node, with their deviations.
+        """Return that of the unknowns of run (2,) and node, with their variances.
 
         A range scale that the run could not tell is as uncertain as before.
         """
-        rows, columns = list(_OF_RUN.values()), list(solver.odometry.calibrated.values())
-        deviations = np.append(of_run[rows], of_node[columns])
-        deviations[0] = np.hypot(deviations[0], solver.parameters.world_scale_deviation)
-        return cls((*_OF_RUN, *solver.odometry.calibrated), np.append(run[rows], node[columns]), deviations)
+        calibrated = parameters.odometry.calibrated
+        columns = list(calibrated.values())
+        deviations = np.sqrt(np.append(of_run, of_node[columns]))
+        deviations[0] = np.hypot(deviations[0], parameters.world_scale_deviation)
+        return cls((*_OF_RUN, *calibrated), np.append(run, node[columns]), deviations)
 
     @property
     def by_name(self) -> Dict[str, Tuple[float, float]]:
@@ -96,26 +87,21 @@ class Calibration:
     def to_mapping(self) -> Dict[str, Any]:
         """Return values and deviations by name, rounded for people."""
         return {
-            name: {"value": round(float(value), 5), "deviation": round(float(deviation), 5)}
-            for name, value, deviation in zip(self.names, self.values, self.deviations)
+            name: {"value": round(value, 5), "deviation": round(deviation, 5)}
+            for name, (value, deviation) in self.by_name.items()
         }
 
     def applied(self, parameters: ReplayParameters) -> ReplayParameters:
         """Return `parameters` with what was found as what is known before the next run, in the sonar's own terms."""
-        value = dict(zip(self.names, self.values.tolist()))
-        deviation = dict(zip(self.names, self.deviations.tolist()))
-        before = parameters.part(BeamCorrection)
+        before, value = parameters.part(BeamCorrection), {name: value for name, (value, _) in self.by_name.items()}
         value["range_scale"] = before.range_scale * (1.0 + value.pop("range_scale_error"))
         value["sonar_delay"] = before.sonar_delay + value["sonar_delay"]
-        value["range_scale_deviation"] = deviation["range_scale_error"]
-        value["sonar_delay_deviation"] = deviation["sonar_delay"]
-        return parameters.changed(_allowed(value))
-
-
-def _allowed(values: Dict[str, float]) -> Dict[str, float]:
-    """Return `values` within their ranges, so that a run that went astray has a live.yaml too."""
-    ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in values}
-    return {name: float(np.clip(value, ranges[name].low, ranges[name].high)) for name, value in values.items()}
+        value["range_scale_deviation"], value["sonar_delay_deviation"] = self.deviations[:2].tolist()
+        # Within their ranges, so that a run that went astray has a live.yaml too.
+        ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in value}
+        return parameters.changed(
+            {name: float(np.clip(one, ranges[name].low, ranges[name].high)) for name, one in value.items()}
+        )
 
 
 @dataclass(frozen=True)
@@ -160,27 +146,23 @@ class Trust:
         return {"checks": checks, "deviation_per_minute": stated}
 
 
-def trust(
-    replayed: Replayed, refined: Optional[Refined], calibration: Calibration, further: Sequence[Verdict] = ()
+def _trust(
+    replayed: Replayed, refined: Optional[Refined], calibration: Calibration, further: Sequence[Verdict]
 ) -> Trust:
-    """Return what the checks say of a run of the joint solver; of the refined path where there is one.
-
-    calibration: what was found. further: what other checks say.
-    """
+    """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
     solver = replayed.solver
     parts, apart = solver.parameters.parts_per_turn, solver.submaps.apart
     turns = Turns.of(solver.estimates, apart, parts)
     heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
     if refined is None:
-        path, state, times = replayed.corrected, solver.state, np.array([one.time for one in solver.estimates])
+        path, solution, times = replayed.corrected, solver.solution, np.array([one.time for one in solver.estimates])
         covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
     else:
-        path, state, times = refined.poses, refined.batch.state, refined.batch.node_times
+        path, solution, times = refined.poses, refined.solution, refined.batch.node_times
         covariances = refined.batch.pose_covariances[:, :2, :2]
-    start, before = float(solver.log.node_times[0]), Calibration.expected(solver)
+    start, before = float(solver.log.node_times[0]), Calibration.expected(solver.parameters)
     verdicts = [
-        *_against_odometry(replayed, path, solver.odometry),
-        *_going_on(solver, state, turns.times),
+        *_against_odometry_or_before(replayed, path, solution, turns.times),
         recent_agreement(heard.times, heard.agreements),
         position_uncertainty(times, _radii(covariances)),
         *surfaces_tell(start, turns.times, turns.surfaces, solver.odometry.distance_deviation),
@@ -196,22 +178,20 @@ def _radii(covariances: np.ndarray) -> np.ndarray:
     return np.sqrt(np.trace(covariances, axis1=1, axis2=2))
 
 
-def _against_odometry(replayed: Replayed, path: np.ndarray, odometry: OdometryModel) -> Tuple[Verdict, ...]:
-    """Compare a path (m, 3) with the odometry's; nothing where that reports no distances."""
+def _against_odometry_or_before(
+    replayed: Replayed, path: np.ndarray, solution: Solution, ends: np.ndarray
+) -> Tuple[Verdict, ...]:
+    """Compare a path (m, 3) with the odometry's, or, where that reports no distances, scans with those before them.
+
+    ends: (n,) s of the turns.
+    """
+    odometry = solution.odometry
     if np.isinf(odometry.distance_deviation):
-        return ()
+        return (scans_go_on(ends, shares_heard_before(solution, 0)),)
     return against_odometry(
         replayed.times, replayed.odometry, path,
         scale_deviation=odometry.distance_deviation, position_walk=odometry.position_walk,
     )  # fmt: skip
-
-
-def _going_on(solver: LiveSolver, state: State, ends: np.ndarray) -> Tuple[Verdict, ...]:
-    """Ask whether scans lie on those before them, where the motion between them is unknown."""
-    if not np.isinf(solver.odometry.distance_deviation):
-        return ()
-    shares = shares_heard_before(solver.solution.with_state(state), 0)
-    return (scans_go_on(ends, shares),)
 
 
 def _halves(solver: LiveSolver) -> Tuple[Verdict, ...]:
@@ -223,8 +203,8 @@ def _halves(solver: LiveSolver) -> Tuple[Verdict, ...]:
     middle = solver.log.scan_count // parts // 2
     if middle < _FEWEST_SCANS:
         return ()
-    first = Calibration.of_estimate(solver, solver.estimates[middle * parts - 1])
-    second = Calibration.of_part(solver, solved_part(solver, middle * parts))
+    first = Calibration.found(solver.parameters, solver.estimates[middle * parts - 1])
+    second = Calibration.found(solver.parameters, solved_part(solver, middle * parts))
     return (halves_agree(first.names, first.values, first.deviations, second.values, second.deviations),)
 
 
@@ -237,14 +217,14 @@ class Findings:
     closing: Optional[LoopClosure] = None
 
     @classmethod
-    def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict] = ()) -> "Findings":
+    def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict]) -> "Findings":
         """Return what was found in a run that the joint solver has followed; `further`: what other checks say."""
         solver = replayed.solver
-        live = Calibration.of_live(solver)
-        calibration = live if refined is None else Calibration.of_batch(solver, refined.batch)
-        return cls(
-            calibration, trust(replayed, refined, calibration, further), None if refined is None else refined.closing
-        )
+        if refined is None:
+            calibration, closing = Calibration.found(solver.parameters, solver.estimates[-1]), None
+        else:
+            calibration, closing = Calibration.of_batch(solver, refined.batch), refined.closing
+        return cls(calibration, _trust(replayed, refined, calibration, further), closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""

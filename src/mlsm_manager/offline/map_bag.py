@@ -9,13 +9,13 @@ from typing import Any, Dict, List
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag, poses_of
+from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
 from mlsm_manager.offline.recording import read_recording
-from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values, write_live
+from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text, replay_values
 from mlsm_manager.offline.run_files import REPORT, errors_of, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.run_reports import mission_of, summary_lines, summary_of
 from mlsm_manager.report.mission import Mission
-from node_support.files import make_folder
+from node_support.files import make_folder, write_whole
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import OLD_KEYS, ParameterError
@@ -64,8 +64,9 @@ def _write_results(mapped: MappedBag, options: Namespace) -> None:
     """Write map, trajectories and live.yaml, each whole or not at all."""
     write_run(options.out, mapped.title, mapped.run, mapped.recording)
     for number, session in enumerate(mapped.sessions, start=2):
-        write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, poses_of(session.replayed))
-    write_live(options.out / "live.yaml", mapped.parameters, options.odom_frame, options.base_frame)
+        write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
+    live = live_text(mapped.parameters, options.odom_frame, options.base_frame)
+    write_whole(options.out / "live.yaml", live.encode())
 
 
 def _write_report(folder: Path, mission: Mission) -> None:
@@ -96,7 +97,6 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     parser = _parser()
     options = parser.parse_args(arguments)
     _check(parser, options)
-    _check_motion(parser, options)
     values = _values(options)
     options.fixed = frozenset(values)
     if options.odometry is not None:
@@ -155,7 +155,10 @@ def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuse options that contradict each other, and a command without a folder to write to."""
+    """Refuse options that contradict each other, and a command without a folder to write to.
+
+    Of a vehicle of whose motion nothing is known the odometry is none.
+    """
     if options.refine and len(options.bags) > 1:
         parser.error("--refine fits one recording, not several")
     if options.check and not options.refine:
@@ -164,6 +167,13 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
         parser.error("--out is required, unless --inspect is given")
     if options.vehicle and len(options.bags) > 1:
         parser.error("--vehicle belongs to one recording, not to several")
+    none, declared = OdometryKind.NONE.value.lower(), options.declared
+    if declared is MotionSource.STANDING and options.odometry == none:
+        parser.error("--standing is for a vehicle that did not move; for one that moved, give --unknown-motion instead")
+    if declared is MotionSource.UNKNOWN:
+        if options.odometry not in (None, none):
+            parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")
+        options.odometry = none
 
 
 def _values(options: argparse.Namespace) -> Dict[str, Any]:
@@ -178,14 +188,3 @@ def _values(options: argparse.Namespace) -> Dict[str, Any]:
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
     return values
-
-
-def _check_motion(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None:
-    """Refuse what is said of the motion where it contradicts itself; nothing known means odometry none."""
-    none, declared = OdometryKind.NONE.value.lower(), options.declared
-    if declared is MotionSource.STANDING and options.odometry == none:
-        parser.error("--standing is for a vehicle that did not move; for one that moved, give --unknown-motion instead")
-    if declared is MotionSource.UNKNOWN:
-        if options.odometry not in (None, none):
-            parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")
-        options.odometry = none

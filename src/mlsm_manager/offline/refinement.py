@@ -7,9 +7,10 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, solved, with_loops_closed
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.normal_equations import POSE, State
+from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import solved_path
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
@@ -25,12 +26,13 @@ from mlsm_manager.surface_map.map_file import Layer
 class Refined:
     """poses: (m, 3) T_map_base at the recording's odometry times. layers: of the map drawn anew.
 
-    closing: the fit, and the places visited again that it goes back to.
+    closing: the fit, and the places visited again that it goes back to. solution: the run as fitted.
     """
 
     poses: np.ndarray
     layers: Mapping[Layer, Blocks]
     closing: LoopClosure
+    solution: Solution
 
     @property
     def batch(self) -> BatchResult:
@@ -41,12 +43,13 @@ class Refined:
 def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
     """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
     closing = with_loops_closed(solver, fitted(solver))
+    solution = solver.solution.with_state(closing.batch.state)
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(MapCloud.of_scan(scan))
-    surfaces.settle(solver.solution.with_state(closing.batch.state))
+    surfaces.settle(solution)
     poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
-    return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing)
+    return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing, solution)
 
 
 _NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5  # factors of settings that nobody knows better than that
@@ -57,13 +60,15 @@ _TURNS = 1.0  # of the direction in which the second start lies beside the path,
 
 def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
     """Return what further fits of the run that `solver` followed say of `batch`, its fit with its own settings."""
+
+    def path(state: State) -> np.ndarray:
+        return solver.solution.with_state(state).node_places(np.arange(len(state.nodes)))
+
     deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
     start = displaced(batch.state, deviations, solver.parameters.cut)
-    others = [solved(solver, parameters, batch.state) for parameters in other_settings(solver.parameters)]
-    second = solved(solver, start=start)
-    fitted_path = _path(solver, batch.state)
-    paths = np.stack([fitted_path, *(_path(solver, other.state) for other in others)])
-    again = np.stack([fitted_path, _path(solver, start), _path(solver, second.state)])
+    others = [solved(solver, parameters, batch.state).state for parameters in other_settings(solver.parameters)]
+    paths = np.stack([path(state) for state in (batch.state, *others)])
+    again = [path(state) for state in (batch.state, start, solved(solver, start=start).state)]
     return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
 
 
@@ -86,12 +91,5 @@ def displaced(state: State, deviations: np.ndarray, most: float) -> State:
     """
     angles = 2.0 * np.pi * _TURNS * np.linspace(0.0, 1.0, len(deviations))
     moved = state.copy()
-    moved.nodes[:, :2] += np.minimum(deviations, most)[:, np.newaxis] * np.column_stack(
-        [np.cos(angles), np.sin(angles)]
-    )
+    moved.nodes[:, :2] += (np.minimum(deviations, most) * [np.cos(angles), np.sin(angles)]).T
     return moved
-
-
-def _path(solver: LiveSolver, state: State) -> np.ndarray:
-    nodes = np.arange(len(state.nodes))
-    return solver.log.node_poses(nodes) + state.nodes[:, POSE]

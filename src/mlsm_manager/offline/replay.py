@@ -1,8 +1,8 @@
 """Gives a recording to the localiser as the live graph would have given it."""
 
 from collections import Counter
-from dataclasses import dataclass, field
-from typing import Callable, List, Mapping, Optional, Sequence
+from dataclasses import dataclass
+from typing import Callable, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from mlsm_manager.surface_map.map_file import StoredMap
 from node_support.errors import RefusedInput
 from node_support.geometry import composed
 
+ODOMETRY = "dead_reckoning"
+CORRECTED = "corrected"
+
 
 @dataclass(frozen=True)
 class Replayed:
@@ -30,8 +33,13 @@ class Replayed:
     odometry: np.ndarray
     corrected: np.ndarray
     estimator: Estimator
-    updates: List[ScanUpdate] = field(default_factory=list)
-    refused: Mapping[str, int] = field(default_factory=dict)
+    updates: List[ScanUpdate]
+    refused: Mapping[str, int]
+
+    @property
+    def poses(self) -> Dict[str, np.ndarray]:
+        """Both trajectories by the names that files and plots give them."""
+        return {ODOMETRY: self.odometry, CORRECTED: self.corrected}
 
     @property
     def scans(self) -> List[Scan]:

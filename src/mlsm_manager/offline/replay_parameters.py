@@ -1,7 +1,6 @@
 """Parameters of map_bag, and live.yaml: those with which the live nodes do what map_bag did."""
 
 from dataclasses import dataclass, fields
-from pathlib import Path
 from typing import Any, Dict, List, Mapping, Tuple, Type
 
 import yaml
@@ -14,7 +13,6 @@ from mlsm_manager.localisation.parameters import (
     MatchInput,
     MlsmCoreParameters,
 )
-from node_support.files import write_whole
 from node_support.parameters import ParameterSet, with_defaults
 from recordings.reader import ReadingParameters
 from sonar_processing.beams.parameters import BeamCorrection
@@ -97,11 +95,6 @@ def replay_values(values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]
             found.update(_common(own, name))
             remarks += told
     return found, remarks
-
-
-def write_live(path: Path, parameters: ReplayParameters, odom_frame: str, base_frame: str) -> None:
-    """Write live.yaml whole or not at all; raises OSError."""
-    write_whole(path, live_text(parameters, odom_frame, base_frame).encode())
 
 
 def live_text(parameters: ReplayParameters, odom_frame: str, base_frame: str) -> str:

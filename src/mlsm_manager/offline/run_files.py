@@ -1,7 +1,7 @@
 """What map_bag leaves in its folder."""
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Sequence
 
@@ -9,6 +9,7 @@ import numpy as np
 
 from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import StoredMap, write_map
@@ -17,8 +18,6 @@ from node_support.files import write_whole
 from node_support.geometry import wrapped
 from recordings.bags.bag import RecordingError
 
-ODOMETRY = "dead_reckoning"
-CORRECTED = "corrected"
 REFINED = "refined"
 REPORT = "report.html"
 LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
@@ -43,6 +42,11 @@ class Run:
     further: Sequence[Trajectory] = ()
 
     @property
+    def best(self) -> np.ndarray:
+        """(m, 3) x y yaw of the trajectory that counts."""
+        return list(self.poses.values())[-1]
+
+    @property
     def blocks(self) -> Blocks:
         """The blocks of the final map."""
         return self.stored.shown
@@ -56,8 +60,12 @@ def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
     write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
     write_trajectory(folder / "trajectory.csv", run.times, run.poses)
-    for path, text in tum_files(run.times, run.poses, recording.truth).items():
-        write_whole(folder / path, text.encode("ascii"))
+    for tum, poses in run.poses.items():
+        _write_tum(folder / f"{tum}.tum", run.times, poses)
+    if recording.truth is not None:
+        # The truth has no heading: its quaternions are those of heading 0.
+        level = np.pad(recording.truth.positions, ((0, 0), (0, 1)), mode="constant")
+        _write_tum(folder / "truth.tum", recording.truth.times, level)
     known, uncertainty = trajectories_of(run, recording), None if run.trust is None else run.trust.uncertainty
     draw_map(folder / "map.png", name, run.blocks, [], [*known, *run.further], known[-1], uncertainty)
 
@@ -71,24 +79,23 @@ def errors_of(run: Run, recording: Recording) -> Dict[str, Dict[str, float]]:
     """Return the error of every trajectory of the run; nothing without a truth. Raises RecordingError."""
     if recording.truth is None:
         return {}
-    return {name: position_error(run.times, poses, recording.truth).to_mapping() for name, poses in run.poses.items()}
+    return {name: position_error(run.times, poses, recording.truth) for name, poses in run.poses.items()}
 
 
 def write_trajectory(path: Path, times: np.ndarray, poses: Mapping[str, np.ndarray]) -> None:
-    """Write trajectories (m, 3) at `times` (m,) s whole or not at all; raises OSError."""
-    write_whole(path, trajectory_csv(times, poses).encode("ascii"))
+    """Write the table of trajectories (m, 3) at `times` (m,): time [s], then x y [m] and yaw [rad] of each.
 
-
-def trajectory_csv(times: np.ndarray, poses: Mapping[str, np.ndarray]) -> str:
-    """Return the table of trajectories (m, 3) at `times` (m,): time [s], then x y [m] and yaw [rad] of each."""
+    It is written whole or not at all; raises OSError.
+    """
     header = ["time"] + [f"{_COLUMNS[name]}_{axis}" for name in poses for axis in ("x", "y", "yaw")]
     columns: List[np.ndarray] = [times[:, np.newaxis]]
-    for path in poses.values():
-        columns += [path[:, :2], wrapped(path[:, 2:])]
+    for own in poses.values():
+        columns += [own[:, :2], wrapped(own[:, 2:])]
     rows = np.concatenate(columns, axis=1)
     line = ",".join(["%.6f"] + ["%.4f"] * (rows.shape[1] - 1)) + "\n"
     # All lines at once: that takes half the time of one after the other.
-    return ",".join(header) + "\n" + line * len(rows) % tuple(rows.ravel().tolist())
+    text = ",".join(header) + "\n" + line * len(rows) % tuple(rows.ravel().tolist())
+    write_whole(path, text.encode("ascii"))
 
 
 def trajectories_of(run: Run, recording: Recording) -> List[Trajectory]:
@@ -100,41 +107,19 @@ def trajectories_of(run: Run, recording: Recording) -> List[Trajectory]:
     return found
 
 
-def tum_files(times: np.ndarray, poses: Mapping[str, np.ndarray], truth: Optional[Truth]) -> Dict[str, str]:
-    """Return names and texts of the files: one for each of `poses`, (m, 3) at `times` (m,) s, and one for the truth.
-
-    The truth has no heading, its quaternions are those of heading 0.
-    """
-    files = {f"{name}.tum": tum_text(times, path) for name, path in poses.items()}
-    if truth is not None:
-        level = np.column_stack([truth.positions, np.zeros(len(truth.times))])
-        files["truth.tum"] = tum_text(truth.times, level)
-    return files
-
-
-def tum_text(times: np.ndarray, poses: np.ndarray) -> str:
-    """Return one line for each pose (m, 3), x y [m] and yaw [rad]: time, x y z, quaternion x y z w."""
+def _write_tum(path: Path, times: np.ndarray, poses: np.ndarray) -> None:
+    """Write one line for each pose (m, 3), x y [m] and yaw [rad]: time, x y z, quaternion x y z w."""
     half = poses[:, 2] / 2.0
     rows = np.column_stack([times, poses[:, :2], np.sin(half), np.cos(half)])
     # All lines at once: that takes half the time of one after the other.
-    return "%.9f %.6f %.6f 0 0 0 %.9f %.9f\n" * len(rows) % tuple(rows.ravel().tolist())
+    text = "%.9f %.6f %.6f 0 0 0 %.9f %.9f\n" * len(rows) % tuple(rows.ravel().tolist())
+    write_whole(path, text.encode("ascii"))
 
 
-@dataclass(frozen=True)
-class PositionError:
-    """Horizontal distance from the truth at the truth's stamps, m."""
+def position_error(times: np.ndarray, positions: np.ndarray, truth: Truth) -> Dict[str, float]:
+    """Return "mean", "sd" and "max" of a trajectory's horizontal distance [m] from the truth, to a millimetre.
 
-    mean: float
-    sd: float
-    max: float
-
-    def to_mapping(self) -> Dict[str, float]:
-        """Return plain values, rounded to a millimetre."""
-        return {name: round(value, 3) for name, value in asdict(self).items()}
-
-
-def position_error(times: np.ndarray, positions: np.ndarray, truth: Truth) -> PositionError:
-    """Return the error of a trajectory: positions (m, >= 2) x y [m] at increasing times (m,) s.
+    positions: (m, >= 2) x y [m] at increasing times (m,) s.
 
     Only stamps of the truth that the trajectory covers count; the two are aligned by a translation that lets them
     begin at the same place, and not turned. Raises RecordingError when they have no time in common.
@@ -147,13 +132,13 @@ def position_error(times: np.ndarray, positions: np.ndarray, truth: Truth) -> Po
         )
     shifted = aligned_truth(times, positions, truth)[common]
     distance = np.hypot(*(positions_at(times, positions, truth.times[common]) - shifted).T)
-    return PositionError(float(distance.mean()), float(distance.std()), float(distance.max()))
+    figures = {"mean": distance.mean(), "sd": distance.std(), "max": distance.max()}
+    return {name: round(float(value), 3) for name, value in figures.items()}
 
 
 def aligned_truth(times: np.ndarray, positions: np.ndarray, truth: Truth) -> np.ndarray:
     """Return the truth's positions (t, 2), shifted to begin where the trajectory was at the first common stamp."""
-    first = int(np.searchsorted(truth.times, times[0]))
-    first = min(first, len(truth.times) - 1)
+    first = min(int(np.searchsorted(truth.times, times[0])), len(truth.times) - 1)
     return truth.positions - truth.positions[first] + positions_at(times, positions, truth.times[first : first + 1])
 
 

@@ -8,9 +8,10 @@ import numpy as np
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording
-from mlsm_manager.offline.run_files import CORRECTED, ODOMETRY, REFINED, REPORT, Run, trajectories_of
+from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
+from mlsm_manager.offline.run_files import REFINED, REPORT, Run, trajectories_of
 from mlsm_manager.report.mission import Mission, ScanRecord
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import composed, inverse, transformed
 
 _MOST_LOOPS = 5  # loops that are printed; summary.json has all
@@ -80,12 +81,9 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
 
 
 def _facts(recording: Recording, run: Run) -> Dict[str, str]:
-    minutes = recording.seconds / 60.0
-    best = list(run.poses.values())[-1]
-    length = float(np.hypot(*np.diff(best[:, :2], axis=0).T).sum())
-    counts = run.counts
+    length, counts = float(np.hypot(*np.diff(run.best[:, :2], axis=0).T).sum()), run.counts
     return {
-        "duration": f"{minutes:.1f} minutes",
+        "duration": f"{recording.seconds / 60.0:.1f} minutes",
         "way": f"{length:.0f} m",
         "beams": f"{len(recording.beams)}, and {recording.unplaced} that could not be placed",
         "scans": f"{counts['scans']}: {counts['matched']} matched, {counts['rejected']} rejected",
@@ -121,11 +119,7 @@ def _rejection(update: ScanUpdate) -> str:
 
 def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:
     """Return the points (n, 2) of a scan where the best path says that they are."""
-    solver, run = mapped.replayed.solver, mapped.run
-    if solver is not None:
-        state = solver.state if mapped.refined is None else mapped.refined.batch.state
-        return solver.solution.with_state(state).points(scan)[:, :2]
-    best = list(run.poses.values())[-1]
-    poses = np.column_stack([np.interp(scan.times, run.times, best[:, 0]), np.interp(scan.times, run.times, best[:, 1]),
-                             np.interp(scan.times, run.times, np.unwrap(best[:, 2]))])  # fmt: skip
+    if mapped.solution is not None:
+        return mapped.solution.points(scan)[:, :2]
+    poses = Track(mapped.run.times, mapped.run.best).at(scan.times)
     return transformed(composed(poses, inverse(scan.track.at(scan.times))), scan.points)[:, :2]

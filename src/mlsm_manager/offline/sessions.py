@@ -5,17 +5,15 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import cpu_count, get_context
 from pathlib import Path
-from typing import Callable, Dict, Iterator, List, Optional, Sequence, Tuple
+from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
 from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.replay import Replayed, replay
+from mlsm_manager.offline.replay import CORRECTED, Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.run_files import CORRECTED
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
 
@@ -23,14 +21,13 @@ from sonar_processing.beams.parameters import BeamCorrection
 CLUSTER_TIMEOUT = 10.0
 _SHOWN_AFTER = 3.0
 """s after the end of a scan at which its correction is shown: it waits for odometry and is blended in."""
-Prepared = Tuple[Recording, List[Scan]]
 Reader = Callable[[Path], Recording]
 """Reads a recording; a function at the top of a module or a partial of one, so that other processes can call it."""
 
 
 @dataclass(frozen=True)
 class Session:
-    """bag: its file. replayed: what came of it."""
+    """bag: its file. replayed: what came of it in the map of those before, in which the vehicle is searched first."""
 
     bag: Path
     replayed: Replayed
@@ -59,30 +56,13 @@ class Session:
         return accepted[0] if accepted else None
 
 
-def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Prepared:
+def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
     """Return the corrected recording and its scans. Raises RecordingError, and OSError, as `read` does."""
     recording = read(bag).corrected(parameters.part(BeamCorrection))
     scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
     if not scans:
         raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one")
     return recording, scans
-
-
-def prepared_in_parallel(
-    bags: Sequence[Path], read: Reader, parameters: ReplayParameters, executor: Executor
-) -> Iterator[Prepared]:
-    """Prepare all bags at the same time, and give them in their order."""
-    waiting = [executor.submit(prepared, bag, read, parameters) for bag in bags]
-    for one in waiting:
-        yield one.result()
-
-
-def add_session(
-    bag: Path, ready: Prepared, parameters: ReplayParameters, known: StoredMap, on_scans: Callable[[int], None]
-) -> Session:
-    """Replay a recording in a known map: the vehicle is searched in it until a scan is found, and then matched."""
-    recording, scans = ready
-    return Session(bag, replay(recording, scans, parameters, on_scans, known))
 
 
 @contextmanager

@@ -22,7 +22,6 @@ from mlsm_manager.offline.replay_parameters import (
     live_text,
     live_values,
     replay_values,
-    write_live,
 )
 from node_support.parameters import ParameterError, describe
 
@@ -35,7 +34,7 @@ USED = ReplayParameters().changed(
 @pytest.fixture
 def written(tmp_path):
     path = tmp_path / "live.yaml"
-    write_live(path, USED, "dead_reckoning", "hull")
+    path.write_text(live_text(USED, "dead_reckoning", "hull"))
     return path
 
 

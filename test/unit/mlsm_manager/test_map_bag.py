@@ -13,7 +13,7 @@ from map_bag_runs import BASIN, refused, run, summary_of
 from mlsm_manager.offline import sessions
 from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.sessions import executor_for, prepared, prepared_in_parallel
+from mlsm_manager.offline.sessions import executor_for, prepared
 from mlsm_manager.surface_map.map_file import Layer, read_map
 from recordings.reader import Request
 
@@ -161,7 +161,7 @@ def test_a_dask_cluster_prepares_further_recordings():
     with distributed.LocalCluster(
         n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None, host="127.0.0.1"
     ) as cluster, executor_for(2, cluster.scheduler_address) as executor:
-        ((there, scans),) = prepared_in_parallel([BASIN], read, ReplayParameters(), executor)
+        there, scans = executor.submit(prepared, BASIN, read, ReplayParameters()).result()
     here, expected = prepared(BASIN, read, ReplayParameters())
     assert len(there.beams) == len(here.beams)
     assert [scan.points.tobytes() for scan in scans] == [scan.points.tobytes() for scan in expected]
