@@ -13,11 +13,17 @@ def random_points(seed, count, extent=10.0):
     return np.column_stack([rng.uniform(-extent, extent, (count, 3)), rng.uniform(0, 127, count)])
 
 
+def map_with(points, resolution=0.5, batches=1, **options):
+    """Return a map into which points (n, 4) went in so many batches."""
+    surface_map = MultiLevelSurfaceMap(resolution, **options)
+    for batch in np.array_split(np.asarray(points, dtype=np.float64).reshape(-1, 4), batches):
+        surface_map.insert(batch)
+    return surface_map
+
+
 def random_map(seed=0, count=2000, resolution=0.5, extent=10.0):
     """Return a map of random points."""
-    surface_map = MultiLevelSurfaceMap(resolution)
-    surface_map.insert(random_points(seed, count, extent))
-    return surface_map
+    return map_with(random_points(seed, count, extent), resolution)
 
 
 def stored_map(seed=0, **options):

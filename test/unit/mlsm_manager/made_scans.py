@@ -1,9 +1,9 @@
 """Scans of a small harbour without noise: what a vehicle on a known path hears, placed by an odometry that may err."""
 
 import numpy as np
+from made_maps import map_with
 
 from mlsm_manager.scan_matching.scan import Prior, Scan, Track
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, inverse, transformed
 
 SECONDS = 16.0
@@ -77,9 +77,8 @@ def elsewhere(turn):
 
 def map_of(places, resolution=0.5):
     """Return the blocks of a map of `places` (n, 2)."""
-    surface_map = MultiLevelSurfaceMap(resolution)
-    surface_map.insert(np.column_stack([places, np.full(len(places), -2.0), np.full(len(places), 50.0)]))
-    return surface_map.blocks
+    points = np.column_stack([places, np.full(len(places), -2.0), np.full(len(places), 50.0)])
+    return map_with(points, resolution).blocks
 
 
 def prior_of_pose(scan, pose, deviations=DEVIATIONS):

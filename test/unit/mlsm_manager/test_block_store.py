@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_maps import map_with
 
 from mlsm_manager.surface_map import block_store
 from mlsm_manager.surface_map.block_store import finished
@@ -108,9 +109,7 @@ def small_pieces(monkeypatch):
 
 
 def map_of(seed, count=60):
-    surface_map = MultiLevelSurfaceMap(0.5)
-    surface_map.insert(np.random.RandomState(seed).uniform(-4.0, 4.0, (count, 4)))
-    return surface_map
+    return map_with(np.random.RandomState(seed).uniform(-4.0, 4.0, (count, 4)))
 
 
 def changed(surface_map, rng):

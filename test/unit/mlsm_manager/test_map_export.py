@@ -7,7 +7,7 @@ import subprocess
 import numpy as np
 import pytest
 import yaml
-from made_maps import random_map
+from made_maps import map_with, random_map
 from PIL import Image
 
 from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd
@@ -24,16 +24,13 @@ from mlsm_manager.surface_map.export.rasters import (
     write_map_server,
 )
 from mlsm_manager.surface_map.map_file import ExportError, Layer, StoredMap
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.ply_file import write_ply
 
 RESOLUTION = 0.5
 
 
 def _blocks(*places):
-    surface_map = MultiLevelSurfaceMap(RESOLUTION)
-    surface_map.insert(np.array([[*place, 50.0] for place in places], dtype=np.float64).reshape(-1, 4))
-    return surface_map.blocks
+    return map_with([[*place, 50.0] for place in places], RESOLUTION).blocks
 
 
 @pytest.fixture(scope="module")
@@ -102,32 +99,25 @@ def test_the_more_points_the_surer_a_cell_of_the_tree():
 
 
 def test_a_map_wider_than_a_tree_is_refused():
-    surface_map = MultiLevelSurfaceMap(RESOLUTION, limit=1e6)
-    surface_map.insert(np.array([[20000.0, 0.0, 0.0, 1.0]]))
+    blocks = map_with([20000.0, 0.0, 0.0, 1.0], RESOLUTION, limit=1e6).blocks
     with pytest.raises(ExportError, match="reaches beyond 16384 m"):
-        block_voxels(surface_map.blocks)
+        block_voxels(blocks)
 
 
-def test_open3d_reads_what_a_pcd_holds(tmp_path, occupied):
+# Open3D does not read unsigned numbers from a PLY.
+@pytest.mark.parametrize(
+    ("write", "file", "unread"), [(write_pcd, "map.pcd", set()), (write_ply, "map.ply", {"count"})]
+)
+def test_open3d_reads_what_a_pcd_or_a_ply_holds(tmp_path, occupied, write, file, unread):
     open3d = pytest.importorskip("open3d")
-    write_pcd(tmp_path / "map.pcd", occupied)
-    cloud = open3d.t.io.read_point_cloud(str(tmp_path / "map.pcd"))
-    _assert_cloud(cloud, occupied)
-    np.testing.assert_array_equal(cloud.point["count"].numpy()[:, 0], occupied.count)
-
-
-def test_open3d_reads_what_a_ply_holds(tmp_path, occupied):
-    open3d = pytest.importorskip("open3d")
-    write_ply(tmp_path / "map.ply", occupied)
-    _assert_cloud(open3d.t.io.read_point_cloud(str(tmp_path / "map.ply")), occupied)
-
-
-def _assert_cloud(cloud, blocks):
-    np.testing.assert_allclose(cloud.point["positions"].numpy(), blocks.mean[:, :3], rtol=1e-6, atol=1e-6)
-    expected = {"intensity": blocks.mean[:, 3], "type": blocks.type, "height": blocks.height}
-    expected.update(variance_x=blocks.variance[:, 0], variance_intensity=blocks.variance[:, 3], bottom=blocks.bottom)
-    for name, values in expected.items():
-        np.testing.assert_allclose(cloud.point[name].numpy()[:, 0], values, rtol=1e-6, atol=1e-6)
+    write(tmp_path / file, occupied)
+    cloud = open3d.t.io.read_point_cloud(str(tmp_path / file))
+    np.testing.assert_allclose(cloud.point["positions"].numpy(), occupied.mean[:, :3], rtol=1e-6, atol=1e-6)
+    expected = {"intensity": occupied.mean[:, 3], "type": occupied.type, "height": occupied.height}
+    expected.update(variance_x=occupied.variance[:, 0], variance_intensity=occupied.variance[:, 3])
+    expected.update(bottom=occupied.bottom, count=occupied.count)
+    for name in set(expected) - unread:
+        np.testing.assert_allclose(cloud.point[name].numpy()[:, 0], expected[name], rtol=1e-6, atol=1e-6)
 
 
 def test_a_grid_tells_free_unknown_and_occupied_apart():
@@ -175,10 +165,9 @@ def test_a_geotiff_is_tied_to_the_upper_left_corner(tmp_path):
 
 
 def test_a_raster_that_would_not_fit_into_memory_is_refused():
-    surface_map = MultiLevelSurfaceMap(0.01, limit=1e6)
-    surface_map.insert(np.array([[-9e5, -9e5, 0, 1], [9e5, 9e5, 0, 1]]))
+    blocks = map_with([[-9e5, -9e5, 0, 1], [9e5, 9e5, 0, 1]], resolution=0.01, limit=1e6).blocks
     with pytest.raises(ExportError, match="crop the map first"):
-        elevation(surface_map.blocks)
+        elevation(blocks)
 
 
 @pytest.mark.parametrize("by", list(ColorBy))

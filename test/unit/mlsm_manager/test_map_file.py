@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_maps import content, in_order, partition, random_map, random_points, stored_map
+from made_maps import content, in_order, map_with, partition, random_map, random_points, stored_map
 
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
@@ -81,9 +81,8 @@ def test_a_file_holds_layers_frame_calibration_time_and_arrays(tmp_path):
 
 
 def test_cells_at_the_ends_of_the_grid_are_kept():
-    surface_map = MultiLevelSurfaceMap(0.01, limit=1e6)
-    surface_map.insert(np.array([[x, y, 0.0, 1.0] for x in (-1e6, 1e6) for y in (-1e6, 1e6)]))
-    assert partition(_loaded(surface_map.blocks)) == partition(surface_map.blocks)
+    blocks = map_with([[x, y, 0.0, 1.0] for x in (-1e6, 1e6) for y in (-1e6, 1e6)], 0.01, limit=1e6).blocks
+    assert partition(_loaded(blocks)) == partition(blocks)
 
 
 @pytest.mark.parametrize("extent", [2.0, 30.0])

@@ -8,12 +8,11 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_maps import in_order, partition, random_map, random_points, stored_map
+from made_maps import in_order, map_with, partition, random_map, random_points, stored_map
 from programs import ROOT
 
 from mlsm_manager.map_tool import run_map_tool
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map, write_map
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged, merged_blocks
 from mlsm_manager.surface_map.ply_file import write_ply
 
@@ -113,12 +112,6 @@ RESOLUTION = 0.5
 seeds = st.integers(0, 2**31)
 
 
-def _blocks(points):
-    surface_map = MultiLevelSurfaceMap(RESOLUTION)
-    surface_map.insert(points)
-    return surface_map.blocks
-
-
 def _points_moved(points, T_new_old):
     result = points.copy()
     result[:, :2] = points[:, :2] @ T_new_old.rotation().T + (T_new_old.x, T_new_old.y)
@@ -142,8 +135,8 @@ def test_where_cells_align_merging_makes_the_map_of_all_points(seed, x, y, z, qu
     first, second = random_points(seed, 300, 2.0), random_points(seed + 1, 300, 2.0)
     # A 2 ** -20 m grid: moving it rounds nothing, so that no point changes its cell by rounding.
     first, second = (np.rint(points * 2**20) / 2**20 + 2.0**-22 for points in (first, second))
-    expected = _blocks(np.concatenate([first, _points_moved(second, transform)]))
-    blocks = merged_blocks(_blocks(first), _blocks(second), transform)
+    expected = map_with(np.concatenate([first, _points_moved(second, transform)])).blocks
+    blocks = merged_blocks(map_with(first).blocks, map_with(second).blocks, transform)
     assert partition(blocks) == partition(expected)
     blocks, expected = blocks.take(in_order(blocks)), expected.take(in_order(expected))
     np.testing.assert_allclose(blocks.mean, expected.mean, rtol=1e-12, atol=1e-12)
@@ -156,7 +149,7 @@ def test_where_cells_do_not_align_the_points_as_a_whole_keep_number_mean_height_
     transform = LevelTransform(x, y, z, yaw)
     first, second = random_points(seed, 200, 4.0), random_points(seed + 1, 200, 4.0)
     points = np.concatenate([first, _points_moved(second, transform)])
-    blocks = merged_blocks(_blocks(first), _blocks(second), transform)
+    blocks = merged_blocks(map_with(first).blocks, map_with(second).blocks, transform)
     count, mean, variance = _total(blocks)
     assert count == 400
     np.testing.assert_allclose(mean, points.mean(axis=0), rtol=1e-9, atol=1e-9)
@@ -167,7 +160,7 @@ def test_where_cells_do_not_align_the_points_as_a_whole_keep_number_mean_height_
 
 
 def test_merged_maps_have_the_layers_of_both():
-    shown, other = _blocks(random_points(0, 50)), _blocks(random_points(1, 50))
+    shown, other = map_with(random_points(0, 50)).blocks, map_with(random_points(1, 50)).blocks
     first = StoredMap("map", {Layer.SHOWN: shown}, {"range_scale": 0.9})
     second = StoredMap("other", {Layer.SHOWN: other, Layer.FREE: other})
     both = merged(first, second, LevelTransform(x=100.0))
@@ -177,22 +170,22 @@ def test_merged_maps_have_the_layers_of_both():
 
 
 def test_a_cropped_map_holds_what_lies_in_the_box():
-    blocks = _blocks(random_points(0, 500))
+    blocks = map_with(random_points(0, 500)).blocks
     stored = cropped(StoredMap("map", {Layer.SHOWN: blocks}), np.array([0.0, -5.0]), np.array([5.0, 5.0]))
     assert 0 < len(stored.shown) < len(blocks)
     assert (stored.shown.mean[:, 0] >= 0.0).all()
 
 
 def test_a_map_does_not_differ_from_itself():
-    blocks = _blocks(random_points(0, 500))
+    blocks = map_with(random_points(0, 500)).blocks
     result = difference(blocks, blocks)
     assert (len(result.only_first), len(result.only_second), len(result.both)) == (0, 0, len(blocks))
     assert result.shift.tolist() == [0.0] * len(blocks)
 
 
 def test_a_difference_is_told_by_place_and_height():
-    first = _blocks(np.array([[0.1, 0.1, 0.0, 1.0], [5.1, 0.1, 0.0, 1.0], [9.1, 0.1, 0.0, 1.0]]))
-    second = _blocks(np.array([[0.1, 0.1, 0.3, 1.0], [5.1, 0.1, 2.0, 1.0], [9.1, 4.1, 0.0, 1.0]]))
+    first = map_with([[0.1, 0.1, 0.0, 1.0], [5.1, 0.1, 0.0, 1.0], [9.1, 0.1, 0.0, 1.0]]).blocks
+    second = map_with([[0.1, 0.1, 0.3, 1.0], [5.1, 0.1, 2.0, 1.0], [9.1, 4.1, 0.0, 1.0]]).blocks
     result = difference(first, second)
     assert sorted(result.only_first.mean[:, 0]) == [5.1, 9.1]
     assert sorted(result.only_second.mean[:, 1]) == [0.1, 4.1]
@@ -201,6 +194,6 @@ def test_a_difference_is_told_by_place_and_height():
 
 
 def test_all_of_a_map_is_new_to_an_empty_one():
-    blocks = _blocks(random_points(0, 50))
-    result = difference(MultiLevelSurfaceMap(RESOLUTION).blocks, blocks)
+    blocks = map_with(random_points(0, 50)).blocks
+    result = difference(map_with([]).blocks, blocks)
     assert (len(result.only_first), len(result.only_second)) == (0, len(blocks))

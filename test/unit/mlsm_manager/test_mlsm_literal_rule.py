@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from made_maps import in_order, partition
-
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from made_maps import in_order, map_with, partition
 
 RESOLUTIONS = st.sampled_from([0.1, 0.25, 0.3, 0.5, 1.0])
 BATCHES = st.integers(1, 6)
@@ -73,21 +71,13 @@ class LiteralMap:
         return sorted(pairs, key=lambda pair: (pair[0], pair[1].bottom))
 
 
-def batch_map(points, resolution, batches=1):
-    """Return the blocks of a map into which `points` went in so many batches."""
-    mlsm = MultiLevelSurfaceMap(resolution)
-    for batch in np.array_split(points, batches):
-        mlsm.insert(batch)
-    return mlsm.blocks
-
-
 def assert_follows_the_literal_rule(points, resolution, batches=1):
     """Compare a map built in batches with one built point by point."""
     points = np.asarray(points, dtype=np.float64).reshape(-1, 4)
     literal = LiteralMap(resolution)
     literal.insert(points)
     expected = literal.sorted_blocks()
-    blocks = batch_map(points, resolution, batches)
+    blocks = map_with(points, resolution, batches).blocks
     assert partition(blocks) == [
         (cell, block.bottom, block.height, len(block.points), int(block.height - block.bottom >= resolution))
         for cell, block in expected
@@ -137,10 +127,10 @@ def test_a_scan_of_many_points(batches):
 def test_the_order_of_the_points_changes_nothing(data, points, resolution):
     lattice = _on_lattice(points, resolution * 0.5)
     shuffled = data.draw(st.permutations(lattice))
-    maps = [batch_map(np.array(order).reshape(-1, 4), resolution, 3) for order in (lattice, shuffled)]
+    maps = [map_with(order, resolution, 3).blocks for order in (lattice, shuffled)]
     assert partition(maps[0]) == partition(maps[1])
 
 
 @pytest.mark.parametrize(("gap", "counts"), [(0.5, [1, 1]), (np.nextafter(0.5, 0.0), [2])])
 def test_a_gap_of_the_resolution_separates_and_a_little_less_does_not(gap, counts):
-    assert batch_map(np.array([[0, 0, 0.0, 1], [0, 0, gap, 1]]), 0.5).count.tolist() == counts
+    assert map_with([[0, 0, 0.0, 1], [0, 0, gap, 1]]).blocks.count.tolist() == counts

@@ -4,18 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_maps import partition, random_map
+from made_maps import map_with, partition, random_map
 
 from mlsm_manager.surface_map import cell_index, insertion, point_groups
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-
-
-def _map_of(points, resolution=0.5, **options):
-    mlsm = MultiLevelSurfaceMap(resolution, **options)
-    mlsm.insert(np.array(points, dtype=np.float64).reshape(-1, 4))
-    return mlsm
 
 
 def _grid(side, z, place=0.0):
@@ -24,7 +18,7 @@ def _grid(side, z, place=0.0):
 
 
 def test_a_cell_holds_its_lower_border_and_not_its_upper():
-    blocks = _map_of([[0.5, 1.0, 0, 1], [np.nextafter(0.5, 0), np.nextafter(1.0, 0), 0, 1]]).blocks
+    blocks = map_with([[0.5, 1.0, 0, 1], [np.nextafter(0.5, 0), np.nextafter(1.0, 0), 0, 1]]).blocks
     assert sorted(blocks.cells.tolist()) == [[0, 1], [1, 2]]
 
 
@@ -33,15 +27,13 @@ def test_a_cell_holds_its_lower_border_and_not_its_upper():
 def test_points_on_a_border_stay_in_their_cell_when_their_mean_is_taken(resolution, batches):
     borders = np.arange(-40, 41) * resolution
     points = np.column_stack([borders, borders, np.zeros(81), np.ones(81)])
-    mlsm = MultiLevelSurfaceMap(resolution)
-    for batch in np.array_split(np.tile(points, (7, 1)), batches):
-        mlsm.insert(batch)
+    mlsm = map_with(np.tile(points, (7, 1)), resolution, batches)
     expected = {tuple(cell) for cell in cells_of(points, resolution).tolist()}
     assert {tuple(cell) for cell in mlsm.blocks.cells.tolist()} == expected
 
 
 def test_a_cells_centre_lies_half_a_cell_from_its_borders():
-    assert _map_of([[-0.1, 0.7, 0, 1]]).blocks.centers.tolist() == [[-0.25, 0.75]]
+    assert map_with([[-0.1, 0.7, 0, 1]]).blocks.centers.tolist() == [[-0.25, 0.75]]
 
 
 def test_an_empty_map_has_no_blocks():
@@ -71,22 +63,19 @@ def test_a_point_beyond_the_limit_is_counted_and_left_out(column, value):
 
 def test_the_smallest_cells_reach_the_widest_limit():
     corners = np.array([[x, y, 0.0, 1.0] for x in (-1e6, 1e6) for y in (-1e6, 1e6)])
-    blocks = _map_of(corners, resolution=0.01, limit=1e6).blocks
+    blocks = map_with(corners, resolution=0.01, limit=1e6).blocks
     assert sorted(blocks.cells.tolist()) == [[x, y] for x in (-(10**8), 10**8) for y in (-(10**8), 10**8)]
 
 
 def test_the_map_grows_beyond_its_first_capacity_and_forgets_nothing():
     points = _grid(120, 0.0)
-    mlsm = MultiLevelSurfaceMap(0.5)
-    for batch in np.array_split(points, 9):
-        mlsm.insert(batch)
-    mean = mlsm.blocks.mean
+    mean = map_with(points, batches=9).blocks.mean
     assert mean[np.lexsort((mean[:, 1], mean[:, 0]))].tolist() == points.tolist()
 
 
 def test_a_cell_holds_thousands_of_blocks():
     column = np.column_stack([np.zeros((3000, 2)), np.arange(3000.0), np.ones(3000)])
-    mlsm = _map_of(column)
+    mlsm = map_with(column)
     column[:, 2] += 0.1
     mlsm.insert(column)
     assert mlsm.blocks.count.tolist() == [2] * 3000
@@ -104,16 +93,14 @@ def test_rows_freed_by_fusing_are_used_again():
 
 
 def test_a_full_map_takes_at_most_120_bytes_per_block():
-    mlsm = MultiLevelSurfaceMap(0.5)
     x, y = np.divmod(np.arange(2**17), 512)
-    for batch in np.array_split(np.column_stack([x, y, np.zeros(2**17), np.ones(2**17)]), 16):
-        mlsm.insert(batch)
+    mlsm = map_with(np.column_stack([x, y, np.zeros(2**17), np.ones(2**17)]), batches=16)
     assert len(mlsm) == 2**17
     assert mlsm.nbytes / len(mlsm) <= 120.0
 
 
 def test_a_snapshot_does_not_change_with_the_map():
-    mlsm = _map_of([[0, 0, 0, 1]])
+    mlsm = map_with([[0, 0, 0, 1]])
     blocks = mlsm.blocks
     mlsm.insert(np.array([[0, 0, 0.1, 1]]))
     assert blocks.count.tolist() == [1]
@@ -142,14 +129,9 @@ def test_no_loop_is_compiled_after_the_map_was_made(dtype, writeable):
 
 
 def test_blocks_that_overlap_among_themselves_become_one():
-    column = np.array([[0.1, 0.1, z, 1.0] for z in (0.0, 0.4, 0.8, 1.2)])
-    surface_map = MultiLevelSurfaceMap(0.5)
-    surface_map.insert(column)
-    tall = surface_map.blocks
-    inner = MultiLevelSurfaceMap(0.5)
-    inner.insert(np.array([[0.1, 0.1, 0.1, 1.0], [0.1, 0.1, 1.0, 1.0]]))
+    tall, inner = (map_with([[0.1, 0.1, z, 1.0] for z in heights]) for heights in ((0.0, 0.4, 0.8, 1.2), (0.1, 1.0)))
     merged = MultiLevelSurfaceMap(0.5)
-    merged.insert_blocks(Blocks(np.concatenate([tall.rows, inner.blocks.rows]), 0.5))
+    merged.insert_blocks(Blocks(np.concatenate([tall.blocks.rows, inner.blocks.rows]), 0.5))
     assert partition(merged.blocks) == [((0, 0), 0.0, 1.2, 6, 1)]
 
 
@@ -194,8 +176,7 @@ def test_a_box_may_be_bounded_in_height():
 
 
 def test_only_tiles_that_changed_are_told_and_only_once():
-    surface_map = MultiLevelSurfaceMap(0.5)
-    surface_map.insert(np.array([[0.1, 0.1, 0, 1], [-0.1, 20.0, 0, 1]]))
+    surface_map = map_with([[0.1, 0.1, 0, 1], [-0.1, 20.0, 0, 1]])
     assert surface_map.take_changed_tiles().tolist() == [[-1, 2], [0, 0]]
     assert surface_map.take_changed_tiles().tolist() == []
     surface_map.insert(np.array([[0.1, 0.1, 9, 1]]))

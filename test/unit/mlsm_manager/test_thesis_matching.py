@@ -5,10 +5,10 @@ import pytest
 from benchmarks.matchers import GicpMatcher
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from made_maps import map_with
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 
 from mlsm_manager.scan_matching.scan import MatchStatus
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.thesis_matching.registration import ClosestBlocks, rigid_motion, translate_segments
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.geometry import composed, transformed
@@ -23,9 +23,7 @@ def match(scan, target, expected, **changes):
 
 
 def column(*heights):
-    surface_map = MultiLevelSurfaceMap(0.5)
-    surface_map.insert(np.array([[0.2, 0.2, z, 1.0] for z in heights]))
-    return surface_map.blocks
+    return map_with([[0.2, 0.2, z, 1.0] for z in heights]).blocks
 
 
 def test_the_closest_block_is_that_of_the_nearest_cell():
