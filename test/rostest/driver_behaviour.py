@@ -1,33 +1,39 @@
-"""What every sonar's driver does with an emulated head in a square basin."""
+#!/usr/bin/env python3
+"""What a driver does with an emulated head in a square basin. The argument is the sonar."""
 
 import math
-from typing import Any, Callable, ClassVar, Dict, List
+import sys
+import unittest
+from typing import Any, Callable, ClassVar, Dict, List, Tuple
 
 import numpy as np
 import rospy
 from driver_listener import ERROR, beams, diagnostics, level, values
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE_ROOT, PATIENCE, ended
+from graph import PACKAGE_ROOT, PATIENCE, ended, run
 from sensor_msgs.msg import JointState
 
 from underwater_map_construction.srv import OrderFault
 
-PACKAGE = "underwater_map_construction"
 # A ping that a change has not reached may be on its way, and one more may be ordered.
 PINGS_BEFORE_A_CHANGE = 2
+WALL = 4.0
+"""m from the head to each of the basin's four walls."""
+GRADIAN = math.radians(0.9)
 
 
 class DriverBehaviour:
     """Tests that a unittest.TestCase of one sonar inherits.
 
-    sonar: the nodes' names are those of this sonar. defaults: set before each test. wall: m from the head to each of
-    the basin's four walls. step: rad from beam to beam with the defaults.
+    sonar: the nodes' names are those of this sonar. defaults: set before each test. step: rad from beam to beam with
+    the defaults. refused: changes that the head cannot do. foreign_fault: what its emulator cannot do, and its answer.
     """
 
     sonar: ClassVar[str]
     defaults: ClassVar[Dict[str, Any]]
-    wall: ClassVar[float]
     step: ClassVar[float]
+    refused: ClassVar[Tuple[Dict[str, Any], ...]]
+    foreign_fault: ClassVar[Tuple[str, str]]
 
     @classmethod
     def setUpClass(cls) -> None:
@@ -83,7 +89,7 @@ class DriverBehaviour:
     def test_every_beam_of_a_turn_sees_its_wall(self) -> None:
         """As its strongest echo."""
         for beam in self.fresh_beams(self.beams_per_turn):
-            wall = self.wall / max(abs(math.cos(beam.angle)), abs(math.sin(beam.angle)))
+            wall = WALL / max(abs(math.cos(beam.angle)), abs(math.sin(beam.angle)))
             strengths = np.frombuffer(beam.intensities, dtype=np.uint8)
             seen = (np.argmax(strengths) + 0.5) * beam.range_resolution
             assert abs(seen - wall) < 2 * beam.range_resolution
@@ -120,10 +126,101 @@ class DriverBehaviour:
         assert gap > absence
         assert health.wait(lambda arrays: values(arrays[-1])["connected"] == "true")
 
-    def start_driver(self, argument: str) -> List[str]:
-        """Run a second driver until it ends with status 1; return the lines it printed."""
-        command = [str(PACKAGE_ROOT / f"nodes/{self.sonar}_driver"), "__name:=second_driver", argument]
-        done = ended(command)
+    def test_refused_changes_leave_everything_as_it_was(self) -> None:
+        """The answer says so, and the next beam is one of the defaults."""
+        for bad in self.refused:
+            before = self.client.get_configuration(timeout=PATIENCE)
+            config = self.client.update_configuration(bad)
+            assert {name: config[name] for name in bad} == {name: before[name] for name in bad}
+        assert self.is_of_defaults(self.fresh_beams(1)[0])
+
+    def test_a_fault_that_the_head_does_not_know_is_refused(self) -> None:
+        """With its name, or those that there are."""
+        name, told = self.foreign_fault
+        answer = self.order_fault(name, 1)
+        assert not answer.success
+        assert told in answer.message
+
+
+class Imagenex852(DriverBehaviour, unittest.TestCase):
+    """With 500 echoes, clockwise."""
+
+    sonar, step = "imagenex_852", math.radians(3.0)
+    defaults: ClassVar[Dict[str, Any]] = {
+        "max_range": 20, "direction": "clockwise", "train_angle_deg": 0, "sector_width_deg": 360, "data_points": 500,
+        "inverted": False,
+    }  # fmt: skip
+    refused = ({"max_range": 25}, {"train_angle_deg": 60}, {"data_points": 300}, {"max_range": 1000})
+    foreign_fault = "explosion", "explosion"
+
+    def is_of_defaults(self, beam):
+        return beam.maxrange_meters == 20.0
+
+    def test_a_beam_says_how_it_was_made(self):
+        beam = self.fresh_beams(1)[0]
+        made = (beam.header.frame_id, beam.maxrange_meters, len(beam.intensities), beam.gain)
+        assert made == ("sonar", 20.0, 500, 20)
+        assert abs(beam.range_resolution - 0.04) < 1e-6
+
+    def test_an_accepted_change_reaches_the_head(self):
+        self.client.update_configuration({"max_range": 10, "data_points": 250})
+        beam = self.wait_for_beam(lambda beam: beam.maxrange_meters == 10.0)
+        assert len(beam.intensities) == 252
+
+    def test_a_reversed_head_turns_counter_clockwise(self):
+        self.client.update_configuration({"direction": "counterclockwise"})
+        self.assert_turns_by(self.step)
+
+    def test_a_second_driver_on_the_port_ends_with_one_line(self):
+        command = [str(PACKAGE_ROOT / "nodes/imagenex_852_driver"), "__name:=second_driver"]
+        done = ended([*command, f"_port:={rospy.get_param('imagenex_852_driver/port')}"])
         rospy.delete_param("second_driver")
-        assert done.returncode == 1, done.stdout
-        return done.stdout.splitlines()
+        (line,) = done.stdout.splitlines()
+        assert done.returncode == 1
+        assert "in use by another program" in line
+
+
+class Ping360(DriverBehaviour, unittest.TestCase):
+    """With 400 samples, scanning by itself."""
+
+    sonar, step = "ping360", 4 * GRADIAN
+    defaults: ClassVar[Dict[str, Any]] = {
+        "max_range": 8.0, "data_points": 400, "gain_setting": 1, "sector_width_deg": 360.0, "step_gradians": 4,
+        "scan_mode": "auto_transmit", "speed_of_sound": 1500.0, "inverted": False,
+    }  # fmt: skip
+    refused = ({"max_range": 0.5}, {"transmit_duration_us": 3}, {"gain_setting": 3})
+    foreign_fault = "overrun", "must be one of none, dropped"
+
+    def is_of_defaults(self, beam):
+        return len(beam.intensities) == 400 and beam.gain == 1 and abs(beam.maxrange_meters - 8.0) < 0.05
+
+    def test_a_beam_says_how_it_was_made(self):
+        beam = self.fresh_beams(1)[0]
+        assert beam.header.frame_id == "sonar"
+        assert abs(beam.range_resolution - beam.maxrange_meters / 400) < 1e-6
+
+    def test_accepted_changes_reach_the_head(self):
+        self.client.update_configuration({"max_range": 2.0, "gain_setting": 2, "sector_width_deg": 18.0})
+        beam = self.wait_for_beam(lambda beam: abs(beam.maxrange_meters - 2.0) < 0.02)
+        assert beam.gain == 2
+        assert all(abs(beam.angle) < 10.5 * GRADIAN for beam in self.fresh_beams(20)[4:])
+
+    def test_a_slower_sound_shortens_the_bins_of_the_same_time(self):
+        self.client.update_configuration({"speed_of_sound": 1400.0})
+        period = self.defaults["max_range"] / 400 / 1500.0
+        self.wait_for_beam(lambda beam: abs(beam.range_resolution / 1400.0 - period * 1500 / 1400) < 1e-8)
+
+    def test_request_mode_scans_too(self):
+        health = diagnostics("ping360_driver")
+        self.client.update_configuration({"scan_mode": "request"})
+        assert health.wait(lambda arrays: bool(arrays) and values(arrays[-1])["scan mode"] == "request")
+        self.beams.wait_for_more(5)
+
+    def test_the_pulse_is_told_as_the_head_made_it(self):
+        told = values(diagnostics("ping360_driver").wait_for_more(2)[-1])
+        assert (told["firmware"], told["samples"], told["transmit duration [us]"]) == ("3.3.1", "400", "67")
+        assert told["sample period [us]"] == "26.675"
+
+
+if __name__ == "__main__":
+    run({"imagenex_852": Imagenex852, "ping360": Ping360}[sys.argv[1]])

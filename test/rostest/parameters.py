@@ -1,17 +1,75 @@
 #!/usr/bin/env python3
-"""Parameters that change while nodes run, and those of an older version."""
+"""Parameters of nodes that run and at their start: good changes, none that is not allowed, and keys of older versions."""
 
 import signal
 import subprocess
+import sys
 import unittest
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import Field
+from enum import Enum
+from typing import Any, Dict, List, Tuple
 
 import rospy
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE, PATIENCE, Diagnostics, run, wait_until
+from graph import PACKAGE, PACKAGE_ROOT, PATIENCE, Diagnostics, ended, run, wait_until
+
+sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
+
+from document import LIVE_NODES
+
+from node_support.node_table import HOSTS
+from node_support.parameters import describe
+
+# Beyond what dynamic_reconfigure itself refuses to send: an integer has 32 bits there.
+INT_LIMIT = 2**31 - 1
+REFUSED = "changes of parameters refused"
+# Node, parameter, and what its last line tells of it.
+BAD_STARTS: List[Tuple[str, str, str]] = [
+    *((node, "no_such_parameter:=1", "no_such_parameter = 1: no such parameter") for node in sorted(LIVE_NODES)),
+    ("sonar_simulator", "seed:=-1", "seed = -1"),
+    ("sonar_simulator", "world:=/nowhere.sdf", "/nowhere.sdf"),
+    ("gazebo_sonar", "head:=TURN", "head = 'TURN'"),
+    ("mapping", "chain:=[none_such]", "none_such"),
+    ("sonar_processing", "chain:=5", "chain"),
+    ("sonar_to_cloud", "mode:=SONARLASER", "mode = 'SONARLASER': must be one of SONAR, LASER, SONARCONT, LASERCONT"),
+    ("thresholder", "otsu_multiplier:=.nan", "otsu_multiplier = nan: must be a number from 0 to 10"),
+    ("imagenex_852_driver", "max_range:=7", "max_range = 7: must be one of 5, 10, 20, 30, 40, 50"),
+    ("ping360_driver", "max_range:=0.5", "max_range = 0.5: must be a number from 0.75 to 50 m"),
+    ("ping360_driver", "port:=udp://nowhere", "must be udp://HOST:PORT"),
+]
+
+
+def bad_values(field: Field) -> List[Any]:
+    """Return values of the field's own type that are not allowed."""
+    if issubclass(field.type, Enum):
+        return ["NONE_SUCH", "", field.default.value.lower() + " "]
+    described = describe(field)
+    if field.type is str:
+        return [] if described.may_be_empty else [""]
+    if field.type is float:
+        bounds = [described.low - 1.0 if described.low is not None else None]
+        bounds.append(described.high * 2.0 + 1.0 if described.high is not None else None)
+        return [float("nan"), float("inf"), -float("inf"), *(bound for bound in bounds if bound is not None)]
+    if field.type is int:
+        low = [described.low - 1, described.low - 1000] if described.low is not None else []
+        has_high = described.high is not None and described.high < INT_LIMIT
+        return [*low, *([described.high + 1, described.high + 1000] if has_high else [])]
+    return []
+
+
+def start(case: Tuple[int, Tuple[str, str, str]]) -> "subprocess.CompletedProcess[str]":
+    """Run a node that must end by itself."""
+    number, (node, parameter, _) = case
+    command = [str(PACKAGE_ROOT / "nodes" / node), f"__name:=bad_start_{number}", f"_{parameter}"]
+    if node in HOSTS:
+        # Else it would take the services of the nodes that it hosts from those that run.
+        command.append("__ns:=elsewhere")
+    return ended(command, 2 * PATIENCE, ROSCONSOLE_FORMAT="${message}")
 
 
 class Parameters(unittest.TestCase):
-    """Keys of older versions, and changes while nodes run."""
+    """Sends what the parameter dataclasses say is not allowed, and a little that is."""
 
     def test_keys_of_an_older_version_are_named_in_one_warning_and_taken(self) -> None:
         """Also those that stand beside `expert` and not under it: the server then holds them where they belong."""
@@ -43,17 +101,48 @@ class Parameters(unittest.TestCase):
         self.assertEqual(rospy.get_param("/thresholder/otsu_multiplier"), 2.0)
         client.close()
 
-    def test_a_bad_change_is_refused_and_the_old_value_stays(self) -> None:
-        """It is counted, and neither bent into the range nor stored."""
-        diagnostics, refused = Diagnostics(), "changes of parameters refused"
-        counted = diagnostics.known("outlier_remover", refused)
+    def test_every_bad_value_of_every_parameter_is_refused_while_running(self) -> None:
+        """The answer holds the value from before, and the diagnostics count every refusal."""
+        diagnostics, accepted, sent = Diagnostics(), [], 0
+        for node in sorted(LIVE_NODES):
+            client = Client(f"/{node}", timeout=PATIENCE)
+            counted = diagnostics.known(node, REFUSED)
+            before = client.get_configuration(timeout=PATIENCE)
+            refused = 0
+            for field in LIVE_NODES[node].parameters.tunable_fields():
+                for value in bad_values(field):
+                    answer: Dict[str, Any] = client.update_configuration({field.name: value})
+                    refused += 1
+                    if answer[field.name] != before[field.name]:
+                        accepted.append(f"{node} {field.name} = {value!r}")
+            client.close()
+            diagnostics.wait_for(node, REFUSED, counted + refused)
+            held = rospy.get_param(f"/{node}")
+            accepted += [
+                f"{node} holds {key} = {held[key]!r}" for key in before.keys() & held if held[key] != before[key]
+            ]
+            sent += refused
+        print(f"{sent} bad values sent")
+        self.assertEqual(accepted, [])
+        self.assertGreater(sent, 300)
+
+    def test_a_change_of_which_one_value_is_bad_is_refused_whole(self) -> None:
+        """The good value is not taken either."""
         client = Client("/outlier_remover", timeout=PATIENCE)
         answer = client.update_configuration({"mode": "RADIUSES", "mean_k": 30})
         self.assertEqual((answer["mode"], answer["mean_k"]), ("STATISTICAL", 20))
-        self.assertEqual(client.update_configuration({"min_radius": -3.0})["min_radius"], 1.0)
-        self.assertEqual(rospy.get_param("/outlier_remover/min_radius"), 1.0)
-        diagnostics.wait_for("outlier_remover", refused, counted + 2)
         client.close()
+
+    def test_every_bad_start_ends_with_one_line(self) -> None:
+        """The line names the parameter, or the file that it names."""
+        with ThreadPoolExecutor(max_workers=2) as pool:
+            ends = list(pool.map(start, enumerate(BAD_STARTS)))
+        for (node, parameter, told), done in zip(BAD_STARTS, ends):
+            with self.subTest(node=node, parameter=parameter):
+                lines = [line for line in done.stdout.splitlines() if line.strip()]
+                self.assertEqual(done.returncode, 1, done.stdout)
+                self.assertEqual(len(lines), 1, done.stdout)
+                self.assertIn(told, lines[0])
 
 
 if __name__ == "__main__":
