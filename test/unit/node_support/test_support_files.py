@@ -63,14 +63,17 @@ def test_other_hidden_files_stay(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("path", "whole"), [("maps", "/robot/.ros/maps"), ("~/maps", "/robot/maps"), ("/maps", "/maps")]
+    ("ros_home", "path", "whole"),
+    [
+        ("", "maps", "/robot/.ros/maps"),
+        ("", "~/maps", "/robot/maps"),
+        ("", "/maps", "/maps"),
+        ("/data/ros", "maps", "/data/ros/maps"),
+    ],
 )
-def test_relative_paths_lie_in_ros_home(monkeypatch, path, whole):
+def test_relative_paths_lie_in_ros_home(monkeypatch, ros_home, path, whole):
     monkeypatch.setenv("HOME", "/robot")
     monkeypatch.delenv("ROS_HOME", raising=False)
+    if ros_home:
+        monkeypatch.setenv("ROS_HOME", ros_home)
     assert str(ros_path(path)) == whole
-
-
-def test_ros_home_can_be_elsewhere(monkeypatch):
-    monkeypatch.setenv("ROS_HOME", "/data/ros")
-    assert str(ros_path("maps")) == "/data/ros/maps"

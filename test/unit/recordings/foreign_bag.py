@@ -42,6 +42,14 @@ def poses():
         yield time, SPEED * (time - START)
 
 
+@contextmanager
+def of_beams(path, **options):
+    """Yield a bag with the beams of a turn."""
+    with written(path) as bag:
+        add_beams(bag, **options)
+        yield bag
+
+
 def add_odometry(bag, topic="/nav/odometry", frame="world", child="hull"):
     for time, x in poses():
         message = stamped(bag, "nav_msgs/Odometry", time, frame)

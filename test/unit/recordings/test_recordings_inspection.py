@@ -19,8 +19,7 @@ BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 
 @pytest.fixture
 def foreign_bag(tmp_path):
-    with foreign.written(tmp_path / "their run.bag") as bag:
-        foreign.add_beams(bag, topic="/sonar360/echo")
+    with foreign.of_beams(tmp_path / "their run.bag", topic="/sonar360/echo") as bag:
         foreign.add_imu(bag, gravity=-9.8)
         foreign.add_odometry(bag)
         foreign.add_poses(bag, "/gps/pose")

@@ -20,6 +20,13 @@ CSV = "time,x,y,yaw\n100,0,0,0\n105,2.5,0,0\n110,5,0,0\n"
 COMPASS = CSV.replace("yaw", "Heading_deg").replace(",0\n", ",90\n")
 
 
+@pytest.fixture
+def sonar_bag(tmp_path):
+    """Path of a bag with beams only."""
+    with foreign.of_beams(tmp_path / "sonar.bag"):
+        return tmp_path / "sonar.bag"
+
+
 def assert_goes_ahead(recording):
     places = np.array([one.T_target_sonar[0, 3] for one in recording.beams])
     assert len(places) == foreign.BEAMS
@@ -28,8 +35,7 @@ def assert_goes_ahead(recording):
 
 @pytest.mark.parametrize("add", [foreign.add_odometry, lambda bag: foreign.add_poses(bag, LOCAL_POSITION)])
 def test_without_tf_the_odometry_comes_from_a_topic(tmp_path, add):
-    with foreign.written(tmp_path / "a.bag") as bag:
-        foreign.add_beams(bag)
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
         add(bag)
     recording = read_recording(tmp_path / "a.bag", Request())
     assert_goes_ahead(recording)
@@ -37,8 +43,7 @@ def test_without_tf_the_odometry_comes_from_a_topic(tmp_path, add):
 
 
 def test_the_mount_is_found_through_the_frame_of_the_odometry(tmp_path):
-    with foreign.written(tmp_path / "a.bag") as bag:
-        foreign.add_beams(bag)
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
         foreign.add_odometry(bag, child="hull")
         foreign.add_fixed(bag, "hull", "head", x=2.0)
     recording = read_recording(tmp_path / "a.bag", Request())
@@ -46,8 +51,7 @@ def test_the_mount_is_found_through_the_frame_of_the_odometry(tmp_path):
 
 
 def test_a_mount_that_tf_does_not_tell_is_that_of_the_parameters(tmp_path):
-    with foreign.written(tmp_path / "a.bag") as bag:
-        foreign.add_beams(bag)
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
         foreign.add_odometry(bag)
     parameters = ReadingParameters(mount_x=1.5, upside_down=True)
     recording = read_recording(tmp_path / "a.bag", Request(parameters=parameters))
@@ -57,8 +61,7 @@ def test_a_mount_that_tf_does_not_tell_is_that_of_the_parameters(tmp_path):
 
 @pytest.mark.parametrize("topic", ["/mavros/setpoint_position/local", "/goal", "/ground_truth/pose"])
 def test_poses_that_are_no_odometry_are_not_taken_for_one(tmp_path, topic):
-    with foreign.written(tmp_path / "a.bag") as bag:
-        foreign.add_beams(bag)
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
         foreign.add_poses(bag, topic)
     with pytest.raises(RecordingError, match="no topic holds odometry"):
         read(tmp_path / "a.bag", Request())
@@ -73,16 +76,13 @@ def test_a_topic_that_is_asked_for_goes_before_tf():
 
 
 def test_with_an_imu_alone_the_heading_is_known(tmp_path):
-    with foreign.written(tmp_path / "a.bag") as bag:
-        foreign.add_beams(bag)
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
         foreign.add_imu(bag)
     assert read(tmp_path / "a.bag", Request()).motion.source is MotionSource.HEADING
 
 
-def test_a_vehicle_that_is_declared_as_standing_needs_nothing(tmp_path):
-    with foreign.written(tmp_path / "a.bag") as bag:
-        foreign.add_beams(bag)
-    recording = read_recording(tmp_path / "a.bag", Request(motion=MotionNames(declared=MotionSource.STANDING)))
+def test_a_vehicle_that_is_declared_as_standing_needs_nothing(sonar_bag):
+    recording = read_recording(sonar_bag, Request(motion=MotionNames(declared=MotionSource.STANDING)))
     assert all(np.array_equal(one.T_target_sonar, np.eye(4)) for one in recording.beams)
 
 
@@ -100,20 +100,16 @@ def test_a_topic_without_beams_is_refused_with_its_type():
         read(BASIN, Request(beams="/odom"))
 
 
-def test_the_motion_comes_from_a_second_bag(tmp_path):
-    with foreign.written(tmp_path / "sonar.bag") as bag:
-        foreign.add_beams(bag)
+def test_the_motion_comes_from_a_second_bag(tmp_path, sonar_bag):
     with foreign.written(tmp_path / "vehicle.bag") as bag:
         foreign.add_odometry(bag)
-    assert_goes_ahead(read_recording(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.bag")))
+    assert_goes_ahead(read_recording(sonar_bag, Request(vehicle=tmp_path / "vehicle.bag")))
 
 
 @pytest.mark.parametrize("text", [CSV, CSV.replace(",", ";"), COMPASS])
-def test_the_motion_comes_from_a_table(tmp_path, text):
+def test_the_motion_comes_from_a_table(tmp_path, sonar_bag, text):
     (tmp_path / "vehicle.csv").write_text(text)
-    with foreign.written(tmp_path / "sonar.bag") as bag:
-        foreign.add_beams(bag)
-    recording = read_recording(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.csv"))
+    recording = read_recording(sonar_bag, Request(vehicle=tmp_path / "vehicle.csv"))
     assert_goes_ahead(recording)
     assert recording.track.poses[:, 2] == pytest.approx(0.0, abs=1e-12)
 
@@ -136,8 +132,8 @@ def test_a_table_that_cannot_be_used_is_refused_with_its_line(tmp_path, text, re
 
 def test_clocks_that_differ_are_told_with_the_offset_that_mends_them(tmp_path):
     (tmp_path / "vehicle.csv").write_text(CSV)
-    with foreign.written(tmp_path / "sonar.bag") as bag:
-        foreign.add_beams(bag, start=5000.0)
+    with foreign.of_beams(tmp_path / "sonar.bag", start=5000.0):
+        pass
     with pytest.raises(RecordingError, match=r"no time in common; .* -4900\.000$"):
         read(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.csv"))
     recording = read_recording(tmp_path / "sonar.bag", Request(vehicle=tmp_path / "vehicle.csv", offset=-4900.0))
