@@ -117,12 +117,8 @@ def test_the_servo_is_in_the_beams_the_joint_and_the_transform(tmp_path, script)
 def test_a_bag_tells_how_it_was_made_and_nothing_of_the_machine(tmp_path, script):
     _, out = _write(tmp_path, script, "out.bag", "--set", "seed=9")
     told = yaml.safe_load(_messages(out, "/sonar_simulator/settings")[0][0].data)
-    assert (told["world"], told["script"], told["seed"], told["sonar"]["ray_rows"]) == (
-        "basin.sdf",
-        "script.yaml",
-        9,
-        5,
-    )
+    found = told["world"], told["script"], told["seed"], told["sonar"]["ray_rows"]
+    assert found == ("basin.sdf", "script.yaml", 9, 5)
     assert str(tmp_path).encode() not in out.read_bytes()
 
 

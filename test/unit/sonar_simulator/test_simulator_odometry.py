@@ -58,11 +58,8 @@ def test_the_heading_drifts_at_the_rate_asked_for_also_while_the_vehicle_rests()
 
 def test_a_drifting_heading_bends_a_straight_way_into_an_arc():
     straight = VehicleScript.from_yaml_data([{"x": 60.0, "seconds": 60.0}], {})
-    odometry = Odometry(
-        OdometryParameters(scale_error=0.0, heading_drift_deg_per_minute=10.0),
-        straight.pose(0.0),
-        np.random.default_rng(0),
-    )
+    parameters = OdometryParameters(scale_error=0.0, heading_drift_deg_per_minute=10.0)
+    odometry = Odometry(parameters, straight.pose(0.0), np.random.default_rng(0))
     x, y = _estimates(odometry, way=straight)[-1].T_odom_base[:2, 3]
     assert math.hypot(x, y) == pytest.approx(60.0, rel=0.01)
     assert math.degrees(math.atan2(y, x)) == pytest.approx(5.0, abs=0.1)

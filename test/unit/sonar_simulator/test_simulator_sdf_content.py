@@ -13,6 +13,7 @@ from sonar_simulator.world.world_file import load_sdf
 
 WORLDS = Path(__file__).resolve().parents[3] / "worlds"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
+LINK = f'<link name="l"><collision name="c">{BOX}</collision></link>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"
 
 
@@ -64,9 +65,8 @@ def test_the_plane_of_a_collision_has_no_end_and_lies_across_its_normal(tmp_path
 
 
 def test_the_plane_of_a_visual_is_as_large_as_it_says(load):
-    (shape,) = load(
-        _link('<visual name="v"><geometry><plane><size>6 4</size></plane></geometry></visual>')
-    ).world.shapes
+    plane = "<geometry><plane><size>6 4</size></plane></geometry>"
+    (shape,) = load(_link(f'<visual name="v">{plane}</visual>')).world.shapes
     assert np.ptp(shape.triangles()[0], axis=0).tolist() == [6.0, 4.0, 0.0]
 
 
@@ -136,11 +136,7 @@ def test_a_mesh_that_cannot_be_given_is_one_line_with_file_and_element_and_the_r
 
 
 def test_an_included_model_stands_where_the_include_says(load, model_file):
-    model_file(
-        "post",
-        '<model name="post"><pose>7 7 7 0 0 0</pose>'
-        f'<link name="l"><collision name="c">{BOX}</collision></link></model>',
-    )
+    model_file("post", f'<model name="post"><pose>7 7 7 0 0 0</pose>{LINK}</model>')
     loaded = load(
         "<include><uri>model://post</uri><name>first</name><pose>1 0 0 0 0 0</pose></include>"
         "<include><uri>model://post</uri></include>"
@@ -150,14 +146,13 @@ def test_an_included_model_stands_where_the_include_says(load, model_file):
 
 
 def test_an_include_takes_the_newest_version_up_to_1_7(load, model_file):
-    link = f'<link name="l"><collision name="c">{BOX}</collision></link>'
     config = '<sdf version="1.4">old.sdf</sdf><sdf version="1.7">new.sdf</sdf><sdf version="1.9">future.sdf</sdf>'
-    model_file("m", f'<model name="m">{link}</model>', config, "new.sdf")
+    model_file("m", f'<model name="m">{LINK}</model>', config, "new.sdf")
     assert len(load("<include><uri>model://m</uri></include>").world.shapes) == 1
 
 
 def test_a_model_may_include_models(load, model_file):
-    model_file("inner", f'<model name="i"><link name="l"><collision name="c">{BOX}</collision></link></model>')
+    model_file("inner", f'<model name="i">{LINK}</model>')
     include = "<include><uri>model://inner</uri><pose>0 2 0 0 0 0</pose></include>"
     model_file("outer", f'<model name="o">{include}</model>')
     (shape,) = load("<include><uri>model://outer</uri><pose>1 0 0 0 0 0</pose></include>").world.shapes
@@ -171,10 +166,7 @@ def test_a_model_that_includes_itself_ends_in_one_warning(load, model_file):
 
 
 def test_a_warning_in_an_included_file_names_that_file(load, model_file):
-    folder = model_file(
-        "m",
-        '<model name="m"><link name="l"><collision name="c"><geometry><image/></geometry></collision></link></model>',
-    )
+    folder = model_file("m", _collision("<geometry><image/></geometry>"))
     (warning,) = load("<include><uri>model://m</uri></include>" + _collision(BOX)).warnings
     assert warning.startswith(f"{folder / 'model.sdf'}: ")
 
@@ -186,27 +178,21 @@ def test_a_material_holds_for_what_is_inside(load):
         f'<collision name="b"><sonar:material>steel</sonar:material>{BOX}</collision></link></model>' + _collision(BOX)
     )
     assert [shape.material.name for shape in loaded.world.shapes] == ["mud", "steel", "concrete"]
-    assert [loaded.world.materials[index].name for index in loaded.world.face_material[::12]] == [
-        "mud",
-        "steel",
-        "concrete",
-    ]
+    names = [loaded.world.materials[index].name for index in loaded.world.face_material[::12]]
+    assert names == ["mud", "steel", "concrete"]
 
 
 def test_a_material_of_ones_own_has_properties_as_attributes(load):
     own = '<sonar:material reflection="0.3" slope="0.02" lambert_db="-30" mirror="0.9">tiles</sonar:material>'
     (shape,) = load(_collision(BOX, own)).world.shapes
-    material = shape.material
-    assert (material.name, material.reflection, material.slope, material.lambert_db, material.mirror) == (
-        "tiles", 0.3, 0.02, -30.0, 0.9,
-    )  # fmt: skip
+    found = [getattr(shape.material, name) for name in ("name", "reflection", "slope", "lambert_db", "mirror")]
+    assert found == ["tiles", 0.3, 0.02, -30.0, 0.9]
 
 
-def test_laser_retro_is_a_reflection(load):
-    (shape,) = load(_collision(BOX, "<laser_retro>0.25</laser_retro>")).world.shapes
-    assert shape.material.reflection == 0.25
-    (shape,) = load(_collision(BOX, "<laser_retro>0</laser_retro>")).world.shapes
-    assert shape.material == MATERIALS["concrete"]
+@pytest.mark.parametrize(("retro", "reflection"), [("0.25", 0.25), ("0", MATERIALS["concrete"].reflection)])
+def test_laser_retro_is_a_reflection(load, retro, reflection):
+    (shape,) = load(_collision(BOX, f"<laser_retro>{retro}</laser_retro>")).world.shapes
+    assert shape.material.reflection == reflection
 
 
 @pytest.mark.parametrize(

@@ -72,13 +72,6 @@ def test_a_sonar_tilted_down_hears_the_floor_ahead_that_a_level_one_does_not(scr
     assert (ahead[0.0], ahead[4.0]) == (False, True)
 
 
-def test_the_same_seed_gives_the_same_beams_and_another_seed_others(script):
-    def beams(**values):
-        return b"".join(m.ping.strengths.tobytes() for m in _moments(script, **values) if m.ping)
-
-    assert beams(seed=3) == beams(seed=3) != beams(seed=4)
-
-
 def test_the_noise_of_the_odometry_leaves_the_beams_alone(script):
     quiet = [m.ping.strengths for m in _moments(script) if m.ping]
     noisy = [m.ping.strengths for m in _moments(script, odometry={"speed_noise": 0.5}) if m.ping]
@@ -116,14 +109,13 @@ def test_bad_settings_are_refused_with_group_key_and_what_is_allowed(values, tex
 
 
 @pytest.mark.parametrize(
-    ("values", "text"),
-    [({"world": "worlds/none.sdf"}, r"none\.sdf"), ({"script": "yaml/none.yaml"}, r"none\.yaml: No such file")],
+    ("values", "robot", "text"),
+    [
+        ({"world": "worlds/none.sdf"}, CHARLE, r"none\.sdf"),
+        ({"script": "yaml/none.yaml"}, CHARLE, r"none\.yaml: No such file"),
+        ({}, RobotDescription("<robot/>"), "no joints lead from base_link to sonar"),
+    ],
 )
-def test_files_that_cannot_be_used_are_named(script, values, text):
+def test_files_and_robots_that_cannot_be_used_are_named(script, values, robot, text):
     with pytest.raises(ParameterError, match=text):
-        make_setup(Settings.from_mapping({"script": script, **values}), ROOT, CHARLE, pytest.fail)
-
-
-def test_a_robot_without_a_sonar_is_refused(script):
-    with pytest.raises(ParameterError, match="no joints lead from base_link to sonar"):
-        make_setup(Settings.from_mapping({"script": script}), ROOT, RobotDescription("<robot/>"), pytest.fail)
+        make_setup(Settings.from_mapping({"script": script, **values}), ROOT, robot, pytest.fail)

@@ -52,16 +52,8 @@ def test_rays_turn_counter_clockwise_with_the_head():
     np.testing.assert_allclose(rays.mean(axis=0)[:2], (0.0, 1.0), atol=0.01)
 
 
-def test_the_head_starts_ahead_and_steps_3_degrees_counter_clockwise():
-    assert [math.degrees(HEAD.angle(beam)) for beam in (0, 1, 119, 120)] == pytest.approx([0, 3, -3, 0])
-
-
-def test_head_angles_are_above_minus_pi_and_up_to_pi():
-    assert TURN.min() > -math.pi
-    assert TURN.max() == TURN[60] == math.pi
-
-
-def test_a_turn_takes_16_s():
+def test_the_head_starts_ahead_and_steps_3_degrees_counter_clockwise_in_16_s():
+    assert [math.degrees(HEAD.angle(beam)) for beam in (0, 1, 60, 119, 120)] == pytest.approx([0, 3, 180, -3, 0])
     assert [HEAD.time(beam) for beam in (0, 1, 120)] == pytest.approx([0.0, 16.0 / 120, 16.0])
 
 
@@ -71,11 +63,6 @@ def test_a_tilted_sonar_looks_along_its_own_plane():
     down = pose_matrix((0, 0, 0), (0.0, math.pi / 2, 0.0))
     assert np.argmax(sonar.ping(down, 0.0) > 0) == pytest.approx(95, abs=1)
     assert not sonar.ping(pose_matrix((0, 0, 0)), 0.0).any()
-
-
-def test_the_same_seed_gives_the_same_bytes():
-    poses = _repeated(pose_matrix((0, 0, -2)))
-    assert _sonar(BASIN, 3).pings(poses, TURN).tobytes() == _sonar(BASIN, 3).pings(poses, TURN).tobytes()
 
 
 def test_a_single_ping_is_a_batch_of_one():
