@@ -163,18 +163,9 @@ def blocks_of(corners, spacing=0.5):
     return np.concatenate([corner + step * side for corner, step, side in zip(corners, steps, sides)])
 
 
-@pytest.fixture(scope="module")
-def loaded():
-    return run_in(blocks_of(HARBOUR))
-
-
-def test_the_vehicle_is_found_where_only_the_loaded_map_was_heard(loaded):
-    session, _ = loaded
+def test_the_vehicle_is_found_where_only_the_loaded_map_was_heard():
+    session, truth = run_in(blocks_of(HARBOUR))
     assert not session.solver.submaps.is_apart
-
-
-def test_it_is_found_at_the_right_place(loaded):
-    session, truth = loaded
     path = session.path(session.solver.log.node_times[-EAST:])
     assert np.hypot(*(path - truth.at(session.solver.log.node_times[-EAST:]))[:, :2].T).max() < 1.0
 

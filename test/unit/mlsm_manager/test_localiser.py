@@ -226,14 +226,6 @@ def test_an_empty_scan_is_rejected_and_nothing_breaks():
     assert estimator.add_scan(empty).result.status is MatchStatus.TOO_FEW_POINTS
 
 
-def test_the_belief_can_follow_the_odometry_without_scans():
-    estimator, _ = mapped([drifting(0)])
-    before = estimator.belief
-    estimator.follow(drifting(1).track, 30.0)
-    assert estimator.belief.time == 30.0
-    assert estimator.belief.covariance[0, 0] > before.covariance[0, 0]
-
-
 def found(scan, estimator):
     """Return what the search in the whole map makes of a scan."""
     matcher = relocaliser(DistributionMatcherParameters())
