@@ -133,13 +133,13 @@ class _Search(NamedTuple):
         left = step - np.outer(by_yaw, step[YAW])
         left[YAW, YAW] = max(left[YAW, YAW], _LEAST_LEFT)
         count = int(np.ceil(REACH * deviation / _TURN_CELL))
-        states, told = [], []
+        states, scores = [], []
         for turn in _TURN_CELL * np.arange(-count, count + 1):
             candidate = state.copy()
             candidate.nodes[-1] += by_yaw * turn
             states.append(candidate)
-            told.append(self.beside(candidate, left, _FEW_POINTS)[0] - 0.5 * (turn / deviation) ** 2)
-        return states[int(np.argmax(told))], left
+            scores.append(self.beside(candidate, left, _FEW_POINTS)[0] - 0.5 * (turn / deviation) ** 2)
+        return states[int(np.argmax(scores))], left
 
 
 def _post_support(solution: Solution, ends: np.ndarray) -> np.ndarray:

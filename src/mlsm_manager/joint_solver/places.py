@@ -64,7 +64,7 @@ class Freedom:
         return np.column_stack([shifts @ self.along.T, shifts])
 
     def cost(self, ends: np.ndarray) -> float:
-        """Return how unlikely moves (4,) of beginning and end are, nats."""
+        """Return the negative log-likelihood of moves (4,) of beginning and end."""
         return 0.5 * float(ends @ self.information @ ends)
 
 

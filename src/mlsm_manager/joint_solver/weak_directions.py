@@ -1,8 +1,8 @@
-"""Takes away what surfaces seem to say along a direction that they do not tell.
+"""Removes the false information that nearly parallel walls seem to give about motion along them.
 
-The walls of a straight canal tell nothing of the way along it, but seem to. Their normals err; and strong echoes, which
-last longer, make a wall bulge where it is square-on, so that the bulge travels with the vehicle. What both say is that
-nothing moves, since every point is compared with its nearest neighbour.
+The walls of a straight canal say nothing about motion along it, but seem to, for two reasons. Their estimated normals
+err; and strong echoes, which last longer, make a wall bulge where the beam is square-on, so that the bulge travels with
+the vehicle. Both pretend that the vehicle stands still, since every point is compared with its nearest neighbour.
 """
 
 from dataclasses import dataclass, replace
@@ -16,24 +16,25 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.surface_points import ramp
 
 _SCANS = 10
-"""Scans before and after a scan, two minutes each, whose surfaces say with its own which direction is weak. The normals
-of one scan err by some degrees together, and forces across a wall would act along it by as much."""
-_TOLD = (8.0, 4.0)
-"""Times normal_deviation^2: share of what is told across above which all counts that is told along a direction, and
-below which nothing does. Normals alone make up 1; walls with bulges that travel made up to 2.5 in simulated canals."""
+"""Scans before and after a scan, two minutes each, whose surfaces together with its own decide which direction is weak.
+The normals of one scan share an error of some degrees, which would turn information across a wall into one along it."""
+_COUNTED = (8.0, 4.0)
+"""Times normal_deviation^2: the information along a direction, as a share of that across it, from which on it counts
+fully, and below which it counts for nothing. Errors of normals make up 1; bulges that travel made up to 2.5 in simulated
+canals."""
 _FACING = (0.2, 0.5)
-"""Length of what is left of a normal: a wall that faces along the weak direction counts for nothing across it below the
-first, one that bulges by up to 60 degrees as any other from the second on."""
+"""Length of what is left of a normal: below the first its wall faces along the weak direction and counts for nothing;
+from the second on, as for a bulge of up to 60 degrees, it counts fully."""
 _NOTHING = 1e-12  # keeps scans without information, and normals along a weak direction, from dividing by zero
 _ALIKE = float(np.cos(0.1))  # cosine of the angle up to which directions are alike: half of what normals err by
 
 
 @dataclass(frozen=True)
 class WeakDirections:
-    """The direction that the surfaces around each scan tell least of.
+    """The direction about which the surfaces around each scan say least.
 
     first: number of the first scan. directions: (s, 2) unit vectors in map of that scan and those after it. lost: (s,)
-    from 0 to 1, how much of what is told along them does not count.
+    from 0 to 1, the share of the information along them that does not count.
     """
 
     first: int
@@ -47,12 +48,13 @@ class WeakDirections:
         if not len(scans) or parameters.normal_deviation == 0.0:
             return cls(0, np.zeros((0, 2)), np.zeros(0))
         first = int(scans.min())
-        told = np.concatenate([_told(points, parameters) for points in sets])
+        information = np.concatenate([_information(points, parameters) for points in sets])
         reach = _SCANS * parameters.parts_per_turn
-        sums = np.stack([_around(np.bincount(scans - first, part), reach) for part in told.T], axis=1).reshape(-1, 2, 2)
+        parts = [_around(np.bincount(scans - first, part), reach) for part in information.T]
+        sums = np.stack(parts, axis=1).reshape(-1, 2, 2)
         values, _ = np.linalg.eigh(sums)
         shares = values[:, 0] / np.maximum(values[:, 1], _NOTHING)
-        all_counts, nothing_counts = (factor * parameters.normal_deviation**2 for factor in _TOLD)
+        all_counts, nothing_counts = (factor * parameters.normal_deviation**2 for factor in _COUNTED)
         lost = ramp(shares, all_counts, nothing_counts)
         directions, heard = np.zeros((len(lost), 2)), np.unique(scans - first)
         directions[heard] = _in_common((sums * lost[:, np.newaxis, np.newaxis])[heard])
@@ -77,9 +79,9 @@ class WeakDirections:
 
 
 def _in_common(sums: np.ndarray) -> np.ndarray:
-    """Return the weak directions (s, 2) of scans that tell `sums` (s, 2, 2); those in a row that are alike have one.
+    """Return the weak directions (s, 2) of scans with information `sums` (s, 2, 2); those in a row that are alike share one.
 
-    Directions that differ by 0.1 degrees would tell the way along a canal to ten metres.
+    Directions that differ by 0.1 degrees would pretend to know the position along a canal to ten metres.
     """
     own = _weakest(sums)
     result, begin, together = own.copy(), 0, np.zeros((2, 2))
@@ -97,8 +99,8 @@ def _weakest(sums: np.ndarray) -> np.ndarray:
     return np.stack([-np.sin(angles), np.cos(angles)], axis=-1)
 
 
-def _told(points: PlacedPoints, parameters: SolverParameters) -> np.ndarray:
-    """Return what each point tells of a translation (n, 4) [1/m^2]: a matrix (2, 2) in one row."""
+def _information(points: PlacedPoints, parameters: SolverParameters) -> np.ndarray:
+    """Return the information of each point on a translation (n, 4) [1/m^2]: a matrix (2, 2) in one row."""
     weight = points.qualities / parameters.variances(points.slants, points.slants) * (points.scans > BEFORE_THE_RUN)
     return np.einsum("n,na,nb->nab", weight, points.normals, points.normals).reshape(-1, 4)
 
@@ -110,22 +112,20 @@ def _around(values: np.ndarray, reach: int) -> np.ndarray:
 
 
 _MOST = 2.0
-"""Times normal_deviation: how far the normals of one scan may err. The told deviation was too small in one simulated
+"""Times normal_deviation: how far the normals of one scan may err. The stated deviation was too small in one simulated
 canal of six with 1.0, in none of twelve with 2.0."""
 
 
 def discounted(
     information: np.ndarray, gradient: np.ndarray, scans: np.ndarray, places: np.ndarray, normal_deviation: float
 ) -> Tuple[np.ndarray, np.ndarray]:
-    """Return `information` (g, c, c) and `gradient` (g, c) of g pairs of scans without what errors of normals say.
+    """Return `information` (g, c, c) and `gradient` (g, c) of g pairs of scans without what errors of normals explain.
 
     scans: (g,) the compared scan of each pair. places: (4, 2) columns of x and y of a pair's nodes, first those of the
     compared scan. normal_deviation: rad, of the surfaces' normals.
 
-    The walls of a straight canal tell nothing of the way along it. Normals that err by some degrees seem to tell it.
-    What they say is that nothing moves, since every point is compared with its nearest neighbour. So the information
-    along the direction that all pairs of a scan tell least of counts only as far as it exceeds (2 normal_deviation)^2
-    of that across it.
+    Along the weakest direction of a scan, information counts only as far as it exceeds (2 normal_deviation)^2 times the
+    information across it.
     """
     if not len(scans):
         return information, gradient

@@ -1,4 +1,4 @@
-"""What surfaces, and comparisons with them, say along a direction that they do not tell."""
+"""Walls that are nearly parallel give no information about motion along them."""
 
 import numpy as np
 import pytest
@@ -37,47 +37,47 @@ def canal(direction, error=0.15, first=0, seed=0):
     return points_with(canal_normals(direction, error, seed), np.repeat(first + np.arange(SCANS), 40))
 
 
-def told_by(points, matching=MATCHING):
+def counted(points, matching=MATCHING):
     return WeakDirections.of([points], matching).without(points, points.scans)
 
 
 @pytest.mark.parametrize("direction", [0.0, 0.6, 2.0])
 def test_straight_walls_say_nothing_of_the_way_along_them(direction):
-    told = told_by(canal(direction))
-    along = told.normals @ normals_at(np.array([direction]))[0]
+    counting = counted(canal(direction))
+    along = counting.normals @ normals_at(np.array([direction]))[0]
     assert np.abs(along).max() < 0.03
 
 
 def test_straight_walls_say_all_of_the_way_across_them():
     points = canal(0.0)
-    told = told_by(points)
-    np.testing.assert_allclose(told.normals[:, 1], np.sign(points.normals[:, 1]), atol=0.01)
-    np.testing.assert_array_equal(told.qualities, points.qualities)
+    counting = counted(points)
+    np.testing.assert_allclose(counting.normals[:, 1], np.sign(points.normals[:, 1]), atol=0.01)
+    np.testing.assert_array_equal(counting.qualities, points.qualities)
 
 
 def test_bulges_that_travel_along_a_wall_say_nothing_of_the_way_along_it():
     points = canal(0.0)
     points.normals[::20] = normals_at(np.full(len(points.normals[::20]), 0.9))
-    assert np.abs(told_by(points).normals[:, 0]).max() < 0.03
+    assert np.abs(counted(points).normals[:, 0]).max() < 0.03
 
 
 def test_a_few_echoes_that_face_along_a_canal_do_not_count():
     points = canal(0.0)
     points.normals[::40] = [1.0, 0.0]
-    told = told_by(points)
-    np.testing.assert_array_equal(told.qualities[::40], 0.0)
+    counting = counted(points)
+    np.testing.assert_array_equal(counting.qualities[::40], 0.0)
 
 
 def test_a_wall_that_closes_a_canal_tells_the_way_along_it():
     points = canal(0.0)
     points.normals[::3] = [1.0, 0.0]
-    np.testing.assert_array_equal(told_by(points).normals, points.normals)
+    np.testing.assert_array_equal(counted(points).normals, points.normals)
 
 
 def test_walls_that_face_all_ways_say_as_much_as_before():
     angles = np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)
     points = points_with(normals_at(angles), np.repeat(np.arange(SCANS), 40))
-    np.testing.assert_array_equal(told_by(points).normals, points.normals)
+    np.testing.assert_array_equal(counted(points).normals, points.normals)
 
 
 def test_scans_around_a_scan_tell_with_it_which_direction_is_weak():
@@ -90,7 +90,7 @@ def test_scans_around_a_scan_tell_with_it_which_direction_is_weak():
 
 
 def test_scans_along_one_canal_have_one_direction():
-    """By so much as two scans differ, what is told across the canal would tell the way along it."""
+    """By so much as two scans differ, what is counting across the canal would tell the way along it."""
     found = WeakDirections.of([canal(0.3)], MATCHING)
     np.testing.assert_allclose(found.directions, found.directions[:1].repeat(SCANS, axis=0), atol=1e-12)
 
@@ -99,25 +99,25 @@ def test_scans_far_from_a_scan_do_not_say_what_it_tells():
     parts = canal(0.0), canal(0.5 * np.pi, first=100)
     found = WeakDirections.of(parts, MATCHING)
     for part, axis in zip(parts, (0, 1)):
-        told = found.without(part, part.scans)
-        assert np.abs(told.normals[:, axis]).max() < 0.03
+        counting = found.without(part, part.scans)
+        assert np.abs(counting.normals[:, axis]).max() < 0.03
 
 
 def test_surfaces_of_a_map_from_before_the_run_are_told_by_the_scans_compared_with_them():
     points = canal(0.0)
     known = points_with(canal(0.0, seed=1).normals, np.full(len(points), BEFORE_THE_RUN))
-    told = WeakDirections.of([points, known], MATCHING).without(known, points.scans)
-    assert np.abs(told.normals[:, 0]).max() < 0.03
+    counting = WeakDirections.of([points, known], MATCHING).without(known, points.scans)
+    assert np.abs(counting.normals[:, 0]).max() < 0.03
 
 
 def test_normals_without_error_stay_as_they_are():
     points = canal(0.3)
-    assert told_by(points, solver_parameters(normal_deviation=0.0)) is points
+    assert counted(points, solver_parameters(normal_deviation=0.0)) is points
 
 
 def test_no_points_have_no_weak_direction():
     nothing = points_with(np.empty((0, 2)), np.empty(0, dtype=np.int64))
-    assert len(told_by(nothing)) == 0
+    assert len(counted(nothing)) == 0
 
 
 PLACES = np.array([[0, 1], [3, 4], [6, 7], [9, 10]])
@@ -143,7 +143,7 @@ def along(direction):
     return change
 
 
-def told(information, direction):
+def counting(information, direction):
     return along(direction) @ information @ along(direction)
 
 
@@ -156,21 +156,21 @@ def discounted_once(information, gradient):
 def test_straight_walls_say_next_to_nothing_of_the_way_along_them(direction):
     information, gradient = compared(canal_normals(direction))
     found, slope = discounted_once(information, gradient)
-    assert told(found, direction) < 0.02 * told(information, direction)
+    assert counting(found, direction) < 0.02 * counting(information, direction)
     assert abs(slope @ along(direction)) < 0.1 * abs(gradient @ along(direction)) + 0.1
 
 
 def test_comparisons_with_straight_walls_say_all_of_the_way_across_them():
     information, gradient = compared(canal_normals(0.0))
     found, _ = discounted_once(information, gradient)
-    assert told(found, 0.5 * np.pi) == pytest.approx(told(information, 0.5 * np.pi), rel=0.01)
+    assert counting(found, 0.5 * np.pi) == pytest.approx(counting(information, 0.5 * np.pi), rel=0.01)
 
 
 def test_walls_that_face_all_ways_say_nearly_as_much_as_before():
     information, gradient = compared(normals_at(np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)))
     found, _ = discounted_once(information, gradient)
     for direction in np.linspace(0.0, np.pi, 7):
-        assert told(found, direction) > 0.85 * told(information, direction)
+        assert counting(found, direction) > 0.85 * counting(information, direction)
 
 
 def test_all_pairs_of_a_scan_together_tell_which_direction_is_weak():
@@ -179,8 +179,8 @@ def test_all_pairs_of_a_scan_together_tell_which_direction_is_weak():
     information, gradient = (np.array(parts) for parts in zip(*pairs))
     of_one_scan, _ = discounted(information, gradient, np.zeros(2, int), PLACES, NORMAL_DEVIATION)
     of_two, _ = discounted(information, gradient, np.arange(2), PLACES, NORMAL_DEVIATION)
-    assert told(of_one_scan.sum(axis=0), 0.0) > 0.8 * told(information.sum(axis=0), 0.0)
-    np.testing.assert_allclose(told(of_two[0], 0.0), told(information[0], 0.0))
+    assert counting(of_one_scan.sum(axis=0), 0.0) > 0.8 * counting(information.sum(axis=0), 0.0)
+    np.testing.assert_allclose(counting(of_two[0], 0.0), counting(information[0], 0.0))
 
 
 def test_what_is_left_is_never_less_than_nothing():
