@@ -20,8 +20,8 @@ _SCANS = 10
 The normals of one scan share an error of some degrees, which would turn information across a wall into one along it."""
 _COUNTED = (8.0, 4.0)
 """Times normal_deviation^2: the information along a direction, as a share of that across it, from which on it counts
-fully, and below which it counts for nothing. Errors of normals make up 1; bulges that travel made up to 2.5 in simulated
-canals."""
+fully, and below which it counts for nothing. Errors of normals make up 1; bulges that travel made up to 2.5 in
+simulated canals."""
 _FACING = (0.2, 0.5)
 """Length of what is left of a normal: below the first its wall faces along the weak direction and counts for nothing;
 from the second on, as for a bulge of up to 60 degrees, it counts fully."""
@@ -79,7 +79,7 @@ class WeakDirections:
 
 
 def _in_common(sums: np.ndarray) -> np.ndarray:
-    """Return the weak directions (s, 2) of scans with information `sums` (s, 2, 2); those in a row that are alike share one.
+    """Return the weak directions (s, 2) of scans from `sums` (s, 2, 2) of information; those in a row that are alike share one.
 
     Directions that differ by 0.1 degrees would pretend to know the position along a canal to ten metres.
     """
