@@ -79,7 +79,7 @@ class WeakDirections:
 
 
 def _in_common(sums: np.ndarray) -> np.ndarray:
-    """Return the weak directions (s, 2) of scans from `sums` (s, 2, 2) of information; those in a row that are alike share one.
+    """Return the weak directions (s, 2) that follow from `sums` (s, 2, 2) of information; like ones in a row share one.
 
     Directions that differ by 0.1 degrees would pretend to know the position along a canal to ten metres.
     """
