@@ -1,8 +1,7 @@
 """The joint solver on the whole marina, whose truth is kept aside: nothing may hang on one bit."""
 
-import os
 from dataclasses import replace
-from pathlib import Path
+from itertools import islice
 
 import numpy as np
 import pytest
@@ -13,21 +12,16 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.suited_parameters import EchoShape, suited
 from recordings.reader import Request
 
-ROOT = Path(__file__).resolve().parents[2]
 # Longer than the solver's window, so that frozen scans take part.
 _SCANS = 80
 
 
 @pytest.fixture(scope="module")
-def recorded():
-    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_whole_blind.bag"
-    if not bag.is_file():
-        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
-    recording = read_recording(bag, Request())
+def recorded(recording):
+    found = read_recording(recording("marina_whole_blind.bag"), Request())
     parameters = suited(ReplayParameters(), EchoShape.PLATEAU, fixed=())
-    found = scans_of(recording, parameters.echoes())
-    scans = [scan for _, (scan, _) in zip(range(_SCANS), found)]
-    return recording, parameters, scans
+    scans = [scan for scan, _ in islice(scans_of(found, parameters.echoes()), _SCANS)]
+    return found, parameters, scans
 
 
 def path_of(recording, parameters, scans):

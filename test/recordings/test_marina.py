@@ -1,7 +1,6 @@
 """map_bag on the recorded marina: the figures that the position fix must keep, from the recording alone."""
 
 import json
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -12,12 +11,9 @@ ROOT = Path(__file__).resolve().parents[2]
 
 
 @pytest.fixture(scope="module")
-def marina(tmp_path_factory):
-    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "marina_first.bag"
-    if not bag.is_file():
-        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
+def marina(recording, tmp_path_factory):
     folder = tmp_path_factory.mktemp("marina")
-    command = [sys.executable, str(ROOT / "nodes/map_bag"), str(bag), "--out", str(folder)]
+    command = [sys.executable, str(ROOT / "nodes/map_bag"), str(recording("marina_first.bag")), "--out", str(folder)]
     subprocess.run([*command, "--truth", "/ground_truth", "--refine"], check=True, stdout=subprocess.DEVNULL)
     return json.loads((folder / "summary.json").read_text())
 

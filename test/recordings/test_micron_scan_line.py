@@ -1,8 +1,5 @@
 """A Micron of another team, in its own message type: nothing but beams, and a bank on one side."""
 
-import os
-from pathlib import Path
-
 import numpy as np
 import pytest
 
@@ -11,15 +8,12 @@ from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import Request
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 
-ROOT = Path(__file__).resolve().parents[2]
 BEAMS, TURNS = 2028, 10
 
 
 @pytest.fixture(scope="module")
-def micron():
-    bag = Path(os.environ.get("UMC_DATA", ROOT.parent / "shared" / "data")) / "micron_scanline.bag"
-    if not bag.is_file():
-        pytest.skip(f"{bag} is not there; set UMC_DATA to the folder of the recordings")
+def micron(recording):
+    bag = recording("micron_scanline.bag")
     return read_recording(bag, Request(motion=MotionNames(declared=MotionSource.STANDING)))
 
 

@@ -8,7 +8,6 @@ import pytest
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
 
-from benchmarks.harness import recorded
 from thesis_results.__main__ import SECTIONS
 from thesis_results.pictures import MOST_BYTES, Pictures
 
@@ -16,10 +15,9 @@ QUICK = ("recorded", "processing", "processing-recorded")
 
 
 @pytest.mark.parametrize("section", [one for one in SECTIONS if one.word in QUICK], ids=lambda one: one.word)
-def test_a_section_is_computed_with_its_pictures(section, tmp_path):
+def test_a_section_is_computed_with_its_pictures(section, recording, tmp_path):
     for name in section.recordings:
-        if not recorded(name).is_file():
-            pytest.skip(f"{recorded(name)} is not there; set UMC_DATA to the folder of the recordings")
+        recording(name)
     text = section.make(Pictures(tmp_path / "pictures", tmp_path / "page.md"))
     shown = re.findall(r"\]\((pictures/\w+\.png)\)", text)
     assert shown

@@ -17,10 +17,9 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import Point
 from graph import PACKAGE_ROOT, PATIENCE, forget_links, run, wait_for_publisher_links, wait_until
+from messages import still_cloud
 
 from mlsm_manager.surface_map.map_file import read_map
-from sonar_processing.cloud import Cloud
-from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion
 
@@ -115,10 +114,7 @@ class KilledNode:
         """Send a block every CLOUD_PERIOD until a moment of the monotonic clock."""
         rate = rospy.Rate(1.0 / CLOUD_PERIOD)
         while time.monotonic() < end:
-            now = rospy.Time.now()
-            points = np.array([[self._sent + 0.1, 0.1, -1.0, 50.0]], dtype=np.float32)
-            cloud = Cloud(points, np.array([-now.to_sec()]), now.to_nsec(), "odom")
-            self._publisher.publish(cloud_to_message(cloud))
+            self._publisher.publish(still_cloud([[self._sent + 0.1, 0.1, -1.0, 50.0]]))
             self._sent += 1
             rate.sleep()
 

@@ -7,8 +7,8 @@ import unittest
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import TransformStamped
-from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links
+from messages import beam, publisher, transform, turn
 from sensor_msgs.msg import PointCloud2
 
 from underwater_map_construction.msg import SonarScanLine
@@ -24,14 +24,9 @@ class BadBeams(unittest.TestCase):
         """Publish the frames once and connect."""
         cls.diagnostics = Diagnostics()
         cls.scans = Inbox("/sonar/scan/cleaned/cloud", PointCloud2)
-        cls.beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
         cls.transforms = tf2_ros.StaticTransformBroadcaster()
-        mount = TransformStamped(child_frame_id="sonar")
-        mount.header.frame_id = "odom"
-        mount.header.stamp = rospy.Time(1)
-        mount.transform.rotation.w = 1.0
-        cls.transforms.sendTransform(mount)
-        wait_for_publisher_links(cls.beams, 1)
+        cls.transforms.sendTransform(transform("odom", "sonar", 1.0))
+        cls.beams = publisher("/sonar/raw", SonarScanLine)
         # The beams wait a few seconds for it and no longer.
         wait_for_links("/tf_static")
         if "many" in sys.argv:
@@ -43,24 +38,16 @@ class BadBeams(unittest.TestCase):
     def send(self, frame: str = "sonar", **fields: object) -> None:
         """Publish one beam 0.1 s after the one before."""
         type(self).time += 0.1
-        message = SonarScanLine(intensities=bytes([100] * 50), maxrange_meters=50.0, range_resolution=1.0)
-        message.header.frame_id = frame
-        message.header.stamp = rospy.Time.from_sec(self.time)
+        message = beam(self.time, strengths=bytes([100] * 50), frame=frame)
         for name, value in fields.items():
             setattr(message, name, value)
         self.beams.publish(message)
 
-    def send_scan(self) -> None:
-        """Publish a full turn with an echo in the middle of each beam."""
-        for step in range(SCAN):
-            strengths = bytes([3] * 20 + [120] * 3 + [3] * 27)
-            self.send(angle=2.0 * math.pi * step / SCAN, intensities=strengths)
-
     def expect_a_scan(self) -> None:
         """Send full turns until the chain delivers a new cloud with the echoes in it."""
         start = rospy.Time.from_sec(self.time)
-        self.send_scan()
-        self.send_scan()
+        for message in 2 * turn(0.0, 0.0, SCAN):
+            self.send(angle=message.angle, intensities=message.intensities)
         self.scans.wait_for(
             lambda cloud: start < cloud.header.stamp <= rospy.Time.from_sec(self.time) and cloud.width > 100
         )
@@ -71,16 +58,16 @@ class BadBeams(unittest.TestCase):
 
     def test_2_beams_that_cannot_be_placed_are_refused_one_by_one(self) -> None:
         """Empty, too long, without range, without direction, without frame."""
-        self.send(intensities=b"")
-        self.send(intensities=bytes(10000))
-        self.send(range_resolution=0.0)
-        self.send(range_resolution=-1.0)
-        self.send(maxrange_meters=0.0)
-        self.send(maxrange_meters=-50.0)
-        self.send(range_resolution=float("nan"))
-        self.send(angle=float("nan"))
-        self.send(angle=float("inf"))
-        self.send(frame="")
+        bad = {
+            "intensities": (b"", bytes(10000)),
+            "range_resolution": (0.0, -1.0, math.nan),
+            "maxrange_meters": (0.0, -50.0),
+            "angle": (math.nan, math.inf),
+            "frame": ("",),
+        }
+        for name, values in bad.items():
+            for value in values:
+                self.send(**{name: value})
         self.diagnostics.wait_for("sonar_to_cloud", "beams refused", 10)
         self.expect_a_scan()
 

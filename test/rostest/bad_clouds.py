@@ -4,12 +4,10 @@
 import unittest
 
 import numpy as np
-import rospy
-from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links
+from messages import publisher, still_cloud
 from sensor_msgs.msg import PointCloud2
 
-from sonar_processing.cloud import Cloud
-from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 
 STAGES = {"thresholder": "/sonar/scan/sonarCloud", "outlier_remover": "/sonar/scan/thresholded",
@@ -21,12 +19,6 @@ def wall(points: int = 400) -> np.ndarray:
     along = np.linspace(0.0, 20.0, points, dtype=np.float32)
     strengths = np.where(np.arange(points) % 2, 120, 5).astype(np.float32)
     return np.column_stack([along, np.full(points, 3.0, np.float32), np.zeros(points, np.float32), strengths])
-
-
-def message(points: np.ndarray, frame: str = "odom") -> StampedIntensityCloud:
-    """Return the points as a message with good stamps."""
-    now = rospy.get_time()
-    return cloud_to_message(Cloud(points, np.full(len(points), -now), int(now * 1e9), frame))
 
 
 def dense(cloud: StampedIntensityCloud) -> StampedIntensityCloud:
@@ -44,9 +36,7 @@ class BadClouds(unittest.TestCase):
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         inputs = {**STAGES, "matching": "/sonar/scan/echoes"}
-        cls.inputs = {s: rospy.Publisher(topic, StampedIntensityCloud, queue_size=100) for s, topic in inputs.items()}
-        for publisher in cls.inputs.values():
-            wait_for_publisher_links(publisher, 1)
+        cls.inputs = {stage: publisher(topic, StampedIntensityCloud) for stage, topic in inputs.items()}
         wait_for_links("/sonar/scan/thresholded", 1)
         wait_for_links("/sonar/scan/cleaned", 1)
 
@@ -62,14 +52,14 @@ class BadClouds(unittest.TestCase):
 
     def test_1_stamps_that_do_not_match_the_points(self) -> None:
         """The cloud is refused."""
-        cloud = message(wall())
+        cloud = still_cloud(wall())
         cloud.timeStamps = cloud.timeStamps[:-3]
         self.send_to_all(cloud)
         self.expect_for_all("clouds refused", 1)
 
     def test_2_data_shorter_than_its_header_says(self) -> None:
         """The cloud is refused."""
-        cloud = message(wall())
+        cloud = still_cloud(wall())
         cloud.cloud.data = cloud.cloud.data[:-7]
         self.send_to_all(cloud)
         self.expect_for_all("clouds refused", 2)
@@ -79,9 +69,9 @@ class BadClouds(unittest.TestCase):
         points = wall()
         points[7, 0] = np.nan
         points[8, 2] = np.inf
-        self.send_to_all(dense(message(points)))
+        self.send_to_all(dense(still_cloud(points)))
         self.expect_for_all("points that are not finite", 2)
-        cloud = message(wall())
+        cloud = still_cloud(wall())
         cloud.timeStamps = np.array(cloud.timeStamps)
         cloud.timeStamps[5] = np.nan
         self.send_to_all(cloud)
@@ -89,30 +79,30 @@ class BadClouds(unittest.TestCase):
 
     def test_4_an_empty_cloud_passes(self) -> None:
         """No echo is no error."""
-        self.send_to_all(message(np.zeros((0, 4), np.float32)))
+        self.send_to_all(still_cloud(np.zeros((0, 4), np.float32)))
         self.diagnostics.wait_for("mlsm_core", "clouds in", 5)
 
     def test_5_a_cloud_far_outside_is_left_out_of_the_map(self) -> None:
         """1000 km away is a broken transform, not a wall."""
-        self.inputs["mlsm_core"].publish(message(wall() + np.float32([1e6, 0, 0, 0])))
+        self.inputs["mlsm_core"].publish(still_cloud(wall() + np.float32([1e6, 0, 0, 0])))
         self.diagnostics.wait_for("mlsm_core", "points outside the map", 400)
 
     def test_5_echoes_at_extreme_coordinates_are_left_out_of_the_match(self) -> None:
         """What no sonar can have heard is counted, and the rest of the scan is used."""
         points = wall()
         points[:3, 0] = 1e30, -1e6, 3e38
-        self.inputs["matching"].publish(message(points))
+        self.inputs["matching"].publish(still_cloud(points))
         self.diagnostics.wait_for("mlsm_core", "echoes outside the map", 3)
 
     def test_6_a_cloud_in_another_frame_is_refused_by_the_map(self) -> None:
         """The map cannot know where the sonar was."""
-        self.inputs["mlsm_core"].publish(message(wall(), frame="sonar"))
+        self.inputs["mlsm_core"].publish(still_cloud(wall(), frame="sonar"))
         self.diagnostics.wait_for("mlsm_core", "clouds refused", 3)
 
     def test_7_a_good_cloud_still_goes_all_the_way(self) -> None:
         """Beams, threshold, outliers, map."""
         self.map.wait_for_link()
-        self.inputs["thresholder"].publish(message(wall() + np.float32([100, 0, 0, 0])))
+        self.inputs["thresholder"].publish(still_cloud(wall() + np.float32([100, 0, 0, 0])))
         self.map.wait_for(lambda cloud: np.any(np.frombuffer(cloud.data, np.float32).reshape(-1, 7)[:, 0] > 99.0))
 
     def test_8_ten_scans_in_a_row_that_lose_every_point_are_noticed(self) -> None:
@@ -120,7 +110,7 @@ class BadClouds(unittest.TestCase):
         points = wall()
         points[:, 3] = np.where(np.arange(len(points)) % 2, 100, 101)
         for _ in range(10):
-            self.inputs["thresholder"].publish(message(points))
+            self.inputs["thresholder"].publish(still_cloud(points))
         self.diagnostics.wait_for("thresholder", "scans in a row lost all points", 10)
 
 

@@ -6,7 +6,8 @@ import unittest
 
 import rospy
 from geometry_msgs.msg import Quaternion
-from graph import Diagnostics, Inbox, run, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run
+from messages import publisher
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
@@ -26,9 +27,9 @@ class DeadReckoning(unittest.TestCase):
         cls.odometry, cls.transforms = Inbox("/odom", Odometry), Inbox("/tf", TFMessage)
         for inbox in (cls.odometry, cls.transforms):
             inbox.wait_for_link()
-        cls.headings = _publisher("/imu", Imu)
-        cls.depths = _publisher("/depth", Float64)
-        cls.velocities = _publisher("/MLSM/odometry", Odometry)
+        cls.headings = publisher("/imu", Imu)
+        cls.depths = publisher("/depth", Float64)
+        cls.velocities = publisher("/MLSM/odometry", Odometry)
         cls.now = rospy.Time.now()
 
     def _go(self, seconds: float, yaw: float) -> Odometry:
@@ -96,7 +97,7 @@ class DeadReckoning(unittest.TestCase):
 
     def test_5_a_compass_that_publishes_degrees_counts_clockwise_from_north(self) -> None:
         """East is 90 degrees; what is no heading is counted, and the next one is taken."""
-        odometry, headings = Inbox("/level/odom", Odometry), _publisher("/level/compass", Float64)
+        odometry, headings = Inbox("/level/odom", Odometry), publisher("/level/compass", Float64)
         odometry.wait_for_link()
         for heading in (math.nan, 90.0):
             headings.publish(Float64(data=heading))
@@ -105,12 +106,6 @@ class DeadReckoning(unittest.TestCase):
         headings.publish(Float64(data=135.0))
         south_east = odometry.wait_for(lambda message: message.header.stamp > east.header.stamp)
         self.assertAlmostEqual(_yaw(south_east.pose.pose.orientation), -math.pi / 4.0, places=6)
-
-
-def _publisher(topic: str, kind: type) -> rospy.Publisher:
-    made = rospy.Publisher(topic, kind, queue_size=1000)
-    wait_for_publisher_links(made, 1)
-    return made
 
 
 def _heading(stamp: rospy.Time, yaw: float) -> Imu:

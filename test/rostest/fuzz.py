@@ -4,7 +4,6 @@
 Arguments: one or many processes, the number of messages and the seed.
 """
 
-import math
 import os
 import subprocess
 import sys
@@ -21,8 +20,8 @@ import rosgraph
 import rospy
 import tf2_ros
 from diagnostic_msgs.msg import DiagnosticArray
-from geometry_msgs.msg import TransformStamped
-from graph import PATIENCE, Inbox, run, wait_for_publisher_links, wait_until
+from graph import PATIENCE, Inbox, run, wait_until
+from messages import publisher, transform, turn
 from random_messages import RandomMessages
 from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
@@ -83,16 +82,11 @@ class Fuzz(unittest.TestCase):
 
     def _publish(self) -> None:
         source = RandomMessages(self.seed)
-        publishers = [
-            (kind, rospy.Publisher(topic, get_message_class(kind), queue_size=1000))
-            for topic, kind in sorted(self.topics.items())
-        ]
-        for _, publisher in publishers:
-            wait_for_publisher_links(publisher, 1)
+        publishers = [(kind, publisher(topic, get_message_class(kind))) for topic, kind in sorted(self.topics.items())]
         start = time.monotonic()
         for number in range(self.messages):
-            kind, publisher = publishers[number % len(publishers)]
-            publisher.publish(source.message(kind))
+            kind, made = publishers[number % len(publishers)]
+            made.publish(source.message(kind))
             if number % BATCH == 0:
                 time.sleep(max(start + number / PER_SECOND - time.monotonic(), 0.0))
             if number % 1000 == 0:
@@ -116,13 +110,12 @@ class Fuzz(unittest.TestCase):
         rospy.wait_for_service("/mlsm_core/reset_map", timeout=PATIENCE)
         rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)()
         transforms = tf2_ros.StaticTransformBroadcaster()
-        transforms.sendTransform(_mount())
-        beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
-        wait_for_publisher_links(beams, 1)
+        transforms.sendTransform(transform("odom", SANE_FRAME, x=FAR))
+        beams = publisher("/sonar/raw", SonarScanLine)
         end = time.monotonic() + PATIENCE
         while not any(_reaches_far(cloud) for cloud in self.map.messages):
             self.assertLess(time.monotonic(), end, f"no sane scan in the map; {self.statuses}")
-            for message in _scan():
+            for message in turn(time.time(), 1e-4, BEAMS, SANE_FRAME):
                 beams.publish(message)
                 time.sleep(0.002)
             time.sleep(1.0)
@@ -152,27 +145,6 @@ def _publish_time() -> None:
         while not rospy.is_shutdown():
             publisher.publish(Clock(rospy.Time.from_sec(time.time())))
             time.sleep(CLOCK_PERIOD)
-
-
-def _mount() -> TransformStamped:
-    mount = TransformStamped(child_frame_id=SANE_FRAME)
-    mount.header.frame_id = "odom"
-    mount.transform.translation.x = FAR
-    mount.transform.rotation.w = 1.0
-    return mount
-
-
-def _scan() -> List[SonarScanLine]:
-    """Return a full turn with a wall around the sonar, stamped with the present time."""
-    messages = []
-    for step in range(BEAMS):
-        strengths = bytes([3] * 20 + [120] * 3 + [3] * 27)
-        message = SonarScanLine(intensities=strengths, maxrange_meters=50.0, range_resolution=1.0)
-        message.angle = 2.0 * math.pi * step / BEAMS
-        message.header.frame_id = SANE_FRAME
-        message.header.stamp = rospy.Time.from_sec(time.time() + 1e-4 * step)
-        messages.append(message)
-    return messages
 
 
 def _reaches_far(cloud: PointCloud2) -> bool:

@@ -10,21 +10,15 @@ import tf2_ros
 from gazebo_scans import FULL_CIRCLE, block_laser, cloud2, header, laser_scan
 from geometry_msgs.msg import TransformStamped
 from graph import Diagnostics, Inbox, end_publishing, run, wait_for_publisher_links
+from messages import publisher
 from sensor_msgs.msg import JointState, LaserScan, PointCloud, PointCloud2
 from std_msgs.msg import String
 
 from underwater_map_construction.msg import SonarScanLine
 
-PACKAGE = "underwater_map_construction"
 WALL = 12.0
 BEAM = math.radians(2.5)
 MOST_SCANS = 1200  # ten turns
-
-
-def _publisher(topic: str, kind: type) -> rospy.Publisher:
-    made = rospy.Publisher(topic, kind, queue_size=10)
-    wait_for_publisher_links(made, 1)
-    return made
 
 
 def _strongest(beam: SonarScanLine) -> float:
@@ -50,7 +44,7 @@ class GazeboSonar(unittest.TestCase):
 
     def _sweep_until_the_joint_is_known(self) -> None:
         """Send scans until a beam straight ahead is tilted: the joint state may come after some scans."""
-        rays = _publisher("/sonar/rays", LaserScan)
+        rays = publisher("/sonar/rays", LaserScan)
         for number in range(MOST_SCANS):
             beam = self._beam_of(rays, laser_scan(header(1.0 + 0.01 * number, "sonar"), FULL_CIRCLE, 721, WALL))
             if beam.sensorAngle != 0.0 and abs(beam.angle) < BEAM / 2:
@@ -60,12 +54,12 @@ class GazeboSonar(unittest.TestCase):
 
     def test_a_full_circle_of_each_type_gives_one_beam_after_the_other(self) -> None:
         """The head steps by one beam with every scan, whatever its type."""
-        joints = _publisher("/joint_states", JointState)
+        joints = publisher("/joint_states", JointState)
         joints.publish(JointState(name=["sonar_servo_joint"], position=[0.25]))
         self._sweep_until_the_joint_is_known()
         kinds = ((LaserScan, laser_scan), (PointCloud, block_laser), (PointCloud2, cloud2))
         for number, (kind, make) in enumerate(kinds, 1):
-            rays = _publisher("/sonar/rays", kind)
+            rays = publisher("/sonar/rays", kind)
             message = make(header(100.0 + number, "sonar"), FULL_CIRCLE, 721, WALL)
             beam = self._beam_of(rays, message)
             self.assertAlmostEqual(beam.angle, math.radians(3.0 * number), places=6)
@@ -77,7 +71,7 @@ class GazeboSonar(unittest.TestCase):
     def test_a_sensor_on_a_joint_gives_beams_where_tf_says_it_looks(self) -> None:
         """Also when tf comes after the scan."""
         start = float(round(rospy.get_time()))
-        rays, transforms = _publisher("/turning/sonar/rays", PointCloud), tf2_ros.StaticTransformBroadcaster()
+        rays, transforms = publisher("/turning/sonar/rays", PointCloud), tf2_ros.StaticTransformBroadcaster()
         # The scan waits a few seconds for its transform, and a new connection may take as long on a busy machine.
         wait_for_publisher_links(transforms.pub_tf, 1)
         rays.publish(block_laser(header(start, "sonar_head"), BEAM, 5, WALL))
@@ -103,11 +97,11 @@ class GazeboSonar(unittest.TestCase):
         bad = [(String, String("rays")), (LaserScan, nothing[0]), (PointCloud, nothing[1]), (PointCloud2, cut),
                (PointCloud, nan), (LaserScan, away)]  # fmt: skip
         for number, (kind, message) in enumerate(bad, 1):
-            rays = _publisher("/sonar/rays", kind)
+            rays = publisher("/sonar/rays", kind)
             rays.publish(message)
             self.diagnostics.wait_for("gazebo_sonar", "scans refused", number)
             end_publishing(rays)
-        self._beam_of(_publisher("/sonar/rays", LaserScan), scan)
+        self._beam_of(publisher("/sonar/rays", LaserScan), scan)
 
 
 if __name__ == "__main__":

@@ -9,15 +9,14 @@ from typing import List
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point
-from graph import Inbox, run, wait_for_publisher_links
+from graph import Inbox, run
+from messages import publisher, still_cloud
 from nav_msgs.msg import OccupancyGrid
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.surface_map.ply_file import read_ply
-from sonar_processing.cloud import Cloud
-from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion, LoadMap, SaveMap
 
@@ -30,11 +29,8 @@ class MapServices(unittest.TestCase):
         """Insert the points and wait until the map shows them."""
         cls.folder = Path(rospy.get_param("~folder"))
         points = np.array([[0.1, 0.1, z, 100] for z in np.arange(0, 3, 0.2)] + [[5.1, 5.1, 0, 90]], np.float32)
-        now = rospy.Time.now()
-        cloud = Cloud(points, np.full(len(points), -now.to_sec()), now.to_nsec(), "odom")
-        cls.publisher = rospy.Publisher("/sonar/scan/cleaned", StampedIntensityCloud, queue_size=1)
-        wait_for_publisher_links(cls.publisher, 1)
-        cls.publisher.publish(cloud_to_message(cloud))
+        cls.publisher = publisher("/sonar/scan/cleaned", StampedIntensityCloud)
+        cls.publisher.publish(still_cloud(points))
         inbox = Inbox("/MLSM/Markers", MarkerArray)
         inbox.wait_for(lambda array: sum(len(marker.points) > 0 for marker in array.markers) > 1)
         inbox.close()

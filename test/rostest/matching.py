@@ -6,8 +6,9 @@ from contextlib import ExitStack
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped
+from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import LONG_PATIENCE, PACKAGE_ROOT, Diagnostics, Inbox, launched, run, wait_for_publisher_links
+from messages import stamps_and_places, true_places, variance
 from nav_msgs.msg import Odometry, Path
 from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
@@ -46,12 +47,8 @@ class Matching(unittest.TestCase):
 
     def errors(self) -> np.ndarray:
         """Return the distance of each fix of the tour from the truth at its stamp, m."""
-        truth, fixes = self.truth.messages, self.fixes.messages[:SCANS]
-        stamps = [message.header.stamp.to_sec() for message in truth]
-        places = np.array([place(message) for message in truth])
-        times = [fix.header.stamp.to_sec() for fix in fixes]
-        true = np.column_stack([np.interp(times, stamps, places[:, axis]) for axis in range(2)])
-        return np.linalg.norm(np.array([place(fix) for fix in fixes]) - true, axis=1)
+        fixes = self.fixes.messages[:SCANS]
+        return np.linalg.norm(stamps_and_places(fixes)[1] - true_places(self.truth.messages, fixes), axis=1)
 
     def test_every_fix_is_close_to_the_truth(self) -> None:
         """Published for these moves: 0.15, 0.37 and 0.28 m."""
@@ -62,8 +59,7 @@ class Matching(unittest.TestCase):
 
     def test_the_fix_says_honestly_how_sure_it_is(self) -> None:
         """No fix is off by more than four of its own standard deviations, and none is vague."""
-        fixes = self.fixes.messages[:SCANS]
-        variances = np.array([fix.pose.covariance[0] + fix.pose.covariance[7] for fix in fixes])
+        variances = np.array([variance(fix) for fix in self.fixes.messages[:SCANS]])
         self.assertLess((self.errors() / np.sqrt(variances)).max(), 4.0)
         self.assertLess(variances.max(), 0.5**2)
 
@@ -80,9 +76,8 @@ class Matching(unittest.TestCase):
         """Three shapes of one fix."""
         path = Inbox("/MLSM/path", Path).wait_for(lambda way: len(way.poses) >= SCANS)
         poses = self.poses.wait_for_number(SCANS)[:SCANS]
-        fixes = np.array([place(message) for message in self.fixes.messages[:SCANS]])
-        np.testing.assert_array_equal(np.array([place(pose) for pose in path.poses[:SCANS]]), fixes)
-        np.testing.assert_array_equal(np.array([place(pose) for pose in poses]), fixes)
+        shapes = [stamps_and_places(found[:SCANS])[1] for found in (self.fixes.messages, path.poses, poses)]
+        np.testing.assert_array_equal(shapes[1:], [shapes[0]] * 2)
 
     def test_the_diagnostics_count_the_matches(self) -> None:
         """The first scan makes the map, the others are matched."""
@@ -98,12 +93,6 @@ def is_corrected(message: TFMessage) -> bool:
     """Return whether a message of tf holds the map -> odom of the tour's end, within 0.2 m."""
     places = [t.transform.translation for t in message.transforms if t.header.frame_id == "map"]
     return any(max(abs(place.x + 1.2), abs(place.y - 0.9)) < 0.2 for place in places)
-
-
-def place(message: object) -> np.ndarray:
-    """Return x and y of a message with a pose."""
-    pose = message.pose if isinstance(message, PoseStamped) else message.pose.pose
-    return np.array([pose.position.x, pose.position.y])
 
 
 if __name__ == "__main__":

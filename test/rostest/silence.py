@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import LONG_PATIENCE, Diagnostics, Inbox, run, wait_for_publisher_links
+from graph import LONG_PATIENCE, Diagnostics, Inbox, run
+from messages import place, publisher, true_places, variance
 from nav_msgs.msg import Odometry
 
 from underwater_map_construction.msg import SonarScanLine
@@ -24,15 +25,14 @@ class Silence(unittest.TestCase):
         """The first fix that claims to be good is near the truth, and the node tells that it found the vehicle."""
         truth, fixes = Inbox("/ground_truth", Odometry), Inbox("/MLSM/pose", PoseWithCovarianceStamped)
         diagnostics = Diagnostics()
-        self.heard = rospy.Publisher("/heard", SonarScanLine, queue_size=1000)
-        wait_for_publisher_links(self.heard, 1)
+        self.heard = publisher("/heard", SonarScanLine)
         self.first = np.nan
         rospy.Subscriber("/sonar/raw", SonarScanLine, self._hand_on, queue_size=1000)
         diagnostics.wait_for("mlsm_core", "times found again after a silence", 1, LONG_PATIENCE)
-        found = fixes.wait_for(lambda fix: self._seconds(fix) > SILENCE[1] and _told(fix) < KNOWN, LONG_PATIENCE)
+        found = fixes.wait_for(lambda fix: self._seconds(fix) > SILENCE[1] and variance(fix) < KNOWN**2, LONG_PATIENCE)
         truth.wait_for(lambda message: message.header.stamp >= found.header.stamp)
         before = next(fix for fix in fixes.messages if self._seconds(fix) > SILENCE[0] / 2.0)
-        moved, true = (_place(found) - _place(before), _at(truth, found) - _at(truth, before))
+        moved, true = place(found) - place(before), np.subtract(*true_places(truth.messages, [found, before]))
         self.assertGreater(np.hypot(*true), FARTHEST)
         self.assertLess(np.hypot(*(moved - true)), FARTHEST)
 
@@ -43,20 +43,6 @@ class Silence(unittest.TestCase):
 
     def _seconds(self, message: Any) -> float:
         return message.header.stamp.to_sec() - self.first
-
-
-def _told(fix: PoseWithCovarianceStamped) -> float:
-    return float(np.sqrt(fix.pose.covariance[0] + fix.pose.covariance[7]))
-
-
-def _place(message: Any) -> np.ndarray:
-    return np.array([message.pose.pose.position.x, message.pose.pose.position.y])
-
-
-def _at(truth: Inbox, fix: PoseWithCovarianceStamped) -> np.ndarray:
-    """Return where the vehicle truly was at a fix, (2,) m."""
-    known = [message for message in truth.messages if message.header.stamp <= fix.header.stamp]
-    return _place(known[-1])
 
 
 if __name__ == "__main__":

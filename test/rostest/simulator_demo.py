@@ -5,18 +5,13 @@ import unittest
 
 import numpy as np
 from graph import LONG_PATIENCE, PACKAGE_ROOT, Diagnostics, Inbox, launched, run
+from messages import stamps_and_places
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Float32
 from visualization_msgs.msg import Marker, MarkerArray
 
 TOUR = 110.0  # s of the script's 112 that truth and odometry tell of
 TRUE_STOPS = np.array([(5.2, 0.0), (5.2, 3.9), (-5.2, 3.9)])
-
-
-def _positions(inbox: Inbox) -> np.ndarray:
-    """Return stamps and positions as (n, 3): s, m, m."""
-    poses = [(m.header.stamp.to_sec(), m.pose.pose.position.x, m.pose.pose.position.y) for m in inbox.messages]
-    return np.array(poses)
 
 
 class SimulatorDemo(unittest.TestCase):
@@ -34,12 +29,12 @@ class SimulatorDemo(unittest.TestCase):
             self.assertTrue(markers.wait_for(lambda array: any(marker.points for marker in array.markers)))
             diagnostics.wait_for("sonar_to_cloud", "scans", 6)
             diagnostics.wait_for("sonar_simulator", "beams out", 800)
-        true, believed = _positions(truth), _positions(odometry)
-        stamps, where, there = np.intersect1d(true[:, 0], believed[:, 0], return_indices=True)
+        (stamps, true), (times, believed) = (stamps_and_places(inbox.messages) for inbox in (truth, odometry))
+        stamps, where, there = np.intersect1d(stamps, times, return_indices=True)
         self.assertGreater(np.ptp(stamps), TOUR)
-        np.testing.assert_allclose(true[where, 1:], 1.3 * believed[there, 1:], atol=1e-6)
+        np.testing.assert_allclose(true[where], 1.3 * believed[there], atol=1e-6)
         for stop in TRUE_STOPS:
-            self.assertLess(np.linalg.norm(true[:, 1:] - stop, axis=1).min(), 1e-6)
+            self.assertLess(np.linalg.norm(true - stop, axis=1).min(), 1e-6)
 
 
 if __name__ == "__main__":

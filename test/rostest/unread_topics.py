@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
 """What nobody reads is not made: no cloud, scan or image is serialised, and no echo is looked for."""
 
-import math
 import unittest
 from typing import Callable, Iterable
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import TransformStamped
-from graph import Inbox, run, wait_for_publisher_links, wait_until
+from graph import Inbox, run, wait_until
+from messages import publisher, transform, turn
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
@@ -66,26 +65,17 @@ class UnreadTopics(unittest.TestCase):
         rospy.set_param("sonar_to_cloud", {"velocity_topic": "odom", "velocity_type": "ODOMETRY", "mode": "LASER"})
         cls.host = Pipeline()
         publish_diagnostics(cls.host.healths)
-        cls.beams = rospy.Publisher("/sonar/raw", SonarScanLine, queue_size=1000)
-        cls.odometry = rospy.Publisher("/odom", Odometry, queue_size=10)
         cls.transforms = tf2_ros.StaticTransformBroadcaster()
-        mount = TransformStamped(child_frame_id="sonar")
-        mount.header.frame_id = "odom"
-        mount.transform.rotation.w = 1.0
-        cls.transforms.sendTransform(mount)
-        wait_for_publisher_links(cls.beams, 1)
-        wait_for_publisher_links(cls.odometry, 1)
+        cls.transforms.sendTransform(transform("odom", "sonar"))
+        cls.beams, cls.odometry = publisher("/sonar/raw", SonarScanLine), publisher("/odom", Odometry)
         cls.time = rospy.get_time()
 
     def send_turn(self) -> None:
         """Publish a full turn with an echo in every beam."""
-        for step in range(BEAMS):
-            type(self).time += 0.1
-            message = SonarScanLine(intensities=bytes([3] * (20 + step % 7) + [120] * 3 + [3] * (27 - step % 7)))
-            message.header.frame_id, message.header.stamp = "sonar", rospy.Time.from_sec(self.time)
-            message.angle = 2.0 * math.pi * step / BEAMS
-            message.maxrange_meters, message.range_resolution = 50.0, 1.0
+        for step, message in enumerate(turn(self.time, 0.1, BEAMS)):
+            message.intensities = bytes([3] * (20 + step % 7) + [120] * 3 + [3] * (27 - step % 7))
             self.beams.publish(message)
+        type(self).time += 0.1 * BEAMS
 
     def comes_by_a_turn(self, inboxes: Iterable[Inbox]) -> bool:
         """Publish a turn, and tell shortly after whether every inbox has a message."""

@@ -13,6 +13,7 @@ import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import LONG_PATIENCE, Inbox, launched, run
+from messages import stamps_and_places, true_places, variance
 from nav_msgs.msg import Odometry
 
 TOLD = 3.0  # stated deviations within which an error is expected
@@ -29,11 +30,9 @@ class VehicleFollowed(unittest.TestCase):
         with launched(given("launch_file"), *given("arguments").split()):
             found = fixes.wait_for_number(count, LONG_PATIENCE)[:count]
             truth.wait_for(lambda message: message.header.stamp >= found[-1].header.stamp)
-        stamps, true = stamps_and_places(truth.messages)
-        times, fixed = stamps_and_places(found)
-        there = np.column_stack([np.interp(times, stamps, true[:, axis]) for axis in (0, 1)])
+        fixed, there = stamps_and_places(found)[1], true_places(truth.messages, found)
         errors = np.hypot(*((fixed - fixed[0]) - (there - there[0])).T)[1:]
-        variances = np.array([fix.pose.covariance[0] + fix.pose.covariance[7] for fix in found])
+        variances = np.array([variance(fix) for fix in found])
         told = np.sqrt(variances[1:] + variances[0])
         self.assertLess(np.median(errors), given("farthest"), f"errors {errors}, told {told}")
         self.assertGreaterEqual(np.mean(errors <= TOLD * told), LEAST_SHARE, f"errors {errors}, told {told}")
@@ -46,13 +45,6 @@ class VehicleFollowed(unittest.TestCase):
 def given(name: str) -> Any:
     """Return a parameter of the test."""
     return rospy.get_param(f"~{name}")
-
-
-def stamps_and_places(messages: list) -> tuple:
-    """Return stamps (n,) s and positions (n, 2) m."""
-    rows = [(m.header.stamp.to_sec(), m.pose.pose.position.x, m.pose.pose.position.y) for m in messages]
-    values = np.array(rows)
-    return values[:, 0], values[:, 1:]
 
 
 if __name__ == "__main__":

@@ -27,15 +27,11 @@ def folder(tmp_path):
     return tmp_path
 
 
-def test_the_named_python_is_taken(no_python, tmp_path, monkeypatch):
-    monkeypatch.setenv("PYTHON38", _program(tmp_path / "named", "echo 3 8"))
-    assert find_python38() == str(tmp_path / "named")
-
-
-@pytest.mark.parametrize("text", ["echo 3 9", "exit 127"])
-def test_a_python_that_does_not_run_or_is_another_is_passed_over(no_python, tmp_path, monkeypatch, text):
-    monkeypatch.setenv("PYTHON38", _program(tmp_path / "named", text))
-    assert find_python38() is None
+@pytest.mark.parametrize(("text", "taken"), [("echo 3 8", True), ("echo 3 9", False), ("exit 127", False)])
+def test_the_named_python_is_taken_if_it_runs_and_is_the_right_one(no_python, tmp_path, monkeypatch, text, taken):
+    named = _program(tmp_path / "named", text)
+    monkeypatch.setenv("PYTHON38", named)
+    assert find_python38() == (named if taken else None)
 
 
 def test_one_of_pyenv_is_found(no_python, tmp_path):
@@ -46,14 +42,11 @@ def test_one_of_pyenv_is_found(no_python, tmp_path):
     assert find_python38() == python
 
 
-def test_a_pure_module_is_lent(folder):
+def test_a_pure_module_is_lent_and_what_no_folder_has_stays_missing(folder):
     assert RosModules([str(folder)]).find_spec("pure").origin == str(folder / "pure/__init__.py")
+    assert RosModules([str(folder)]).find_spec("absent") is None
 
 
 def test_a_compiled_module_is_refused_by_its_name(folder):
     with pytest.raises(CompiledModuleError, match="compiled is compiled for another Python"):
         RosModules([str(folder)]).find_spec("compiled")
-
-
-def test_what_no_folder_has_stays_missing(folder):
-    assert RosModules([str(folder)]).find_spec("absent") is None
