@@ -67,29 +67,6 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
     assert np.hypot(*(found.belief.theta[:2] - SCANS[6].reference_pose[:2])) < 0.5
 
 
-def test_a_jump_in_time_keeps_the_map_and_begins_at_the_odometry():
-    localiser, _ = localiser_after(6)
-    count = localiser.block_count
-    assert localiser.notice_time(0.0) > 0.0
-    assert (localiser.block_count, localiser.believed_until, localiser.estimator.solver) == (count, None, None)
-    np.testing.assert_array_equal(localiser.estimator.correction, np.zeros(3))
-
-
-def test_clear_forgets_everything():
-    localiser, _ = localiser_after(3)
-    localiser.clear()
-    assert (localiser.block_count, localiser.believed_until, localiser.verdicts()) == (0, None, [])
-    assert localiser.take_scan(SCANS[3]).scan.result is None
-
-
-def test_a_cloud_waits_for_the_scan_of_its_time():
-    localiser, _ = localiser_after(2, map_input=MapInput.CLEANED)
-    cloud = MapCloud.of_scan(SCANS[2])
-    assert localiser.take_cloud(cloud).waiting
-    (waited,) = localiser.take_scan(SCANS[2]).clouds
-    assert waited.report.inserted == len(cloud)
-
-
 def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
     localiser = PARAMETERS.changed({"map_input": MapInput.CLEANED}).build_localiser(SONAR_IN_BASE)
     localiser.take_scan(SCANS[5])

@@ -164,17 +164,6 @@ def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, stored
     assert beside < 0.2 * killed.block_count
 
 
-@pytest.mark.newest_only("dear; test_localiser relocalises with every version")
-def test_a_loaded_map_is_not_written_into_before_the_vehicle_is_found(stored):
-    localiser = resumed(stored, same_odometry=False)
-    rng, last = np.random.RandomState(0), HARBOUR.scans[-1]
-    places = np.column_stack([rng.uniform(-25.0, 25.0, (len(last), 2)), last.points[:, 2:]])
-    before = localiser.blocks.rows.copy()
-    nowhere = Scan(places, last.times, last.moving, last.track, last.reference_time)
-    assert not localiser.take_scan(nowhere).scan.accepted
-    np.testing.assert_array_equal(localiser.blocks.rows, before)
-
-
 def test_a_jump_in_time_after_the_start_makes_the_place_unknown(stored):
     localiser = resumed(stored)
     localiser.notice_time(0.0)

@@ -21,6 +21,7 @@ from mlsm_manager.scan_matching.scan import MatchStatus, Scan
 from node_support.errors import RefusedInput
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
+with_every_estimator = pytest.mark.parametrize("estimator", list(EstimatorName))
 
 
 def localiser_after(turns, **changes):
@@ -43,8 +44,9 @@ def test_the_correction_moves_to_a_fix_within_the_blend_time():
     np.testing.assert_allclose(correction, taken[-1].scan.result.correction(taken[-1].scan.scan), atol=0.05)
 
 
-def test_where_cleaned_clouds_make_the_map_they_wait_for_the_scan_of_their_time():
-    localiser = MlsmCoreParameters(start_matching=True).build_localiser()
+@with_every_estimator
+def test_where_cleaned_clouds_make_the_map_they_wait_for_the_scan_of_their_time(estimator):
+    localiser = MlsmCoreParameters(start_matching=True, estimator=estimator).build_localiser()
     localiser.take_scan(drifting(0))
     assert localiser.take_cloud(MapCloud.of_scan(drifting(1))).waiting
     assert localiser.block_count == 0
@@ -58,21 +60,23 @@ def test_points_in_map_are_inserted_as_they_are():
     np.testing.assert_array_equal(localiser.blocks.mean, [[1.0, 2.0, 0.0, 9.0]])
 
 
+@with_every_estimator
 @pytest.mark.parametrize("take", ["take_scan", "take_cloud"])
-def test_a_jump_back_in_time_keeps_the_map_and_forgets_the_place(take):
-    localiser, _ = localiser_after(8)
+def test_a_jump_back_in_time_keeps_the_map_and_forgets_the_place(take, estimator):
+    localiser, _ = localiser_after(4, estimator=estimator)
     count = localiser.block_count
-    assert localiser.notice_time(SECONDS) == 7 * SECONDS
+    assert localiser.notice_time(SECONDS) == 3 * SECONDS
     assert (localiser.believed_until, localiser.block_count) == (None, count)
+    np.testing.assert_array_equal(localiser.estimator.correction, np.zeros(3))
     early = drifting(0)
     assert getattr(localiser, take)(early if take == "take_scan" else MapCloud.of_scan(early)) is not None
 
 
 def test_a_scan_that_is_late_by_more_than_half_a_minute_is_refused():
-    localiser, _ = localiser_after(8)
-    localiser.check_time(8 * SECONDS - 25.0)
+    localiser, _ = localiser_after(3)
+    localiser.check_time(3 * SECONDS - 25.0)
     with pytest.raises(RefusedInput, match=r"by 35\.0 s"):
-        localiser.check_time(8 * SECONDS - 35.0)
+        localiser.check_time(3 * SECONDS - 35.0)
 
 
 def test_stamps_that_overtake_each_other_by_seconds_are_no_jump():
@@ -100,15 +104,19 @@ def test_relocalisation_without_a_scan_finds_nothing():
     assert localiser_after(0)[0].relocalise() is None
 
 
-def test_clear_forgets_map_and_scan():
-    localiser, _ = localiser_after(2)
+@with_every_estimator
+def test_clear_forgets_map_and_scans(estimator):
+    localiser, _ = localiser_after(2, estimator=estimator)
     count = localiser.block_count
     assert localiser.clear() == count
     assert (localiser.block_count, localiser.believed_until, localiser.relocalise()) == (0, None, None)
+    assert localiser.verdicts() == []
+    assert localiser.take_scan(drifting(2)).scan.result is None
 
 
-def test_matching_is_turned_on_and_off():
-    localiser, _ = localiser_after(1)
+@with_every_estimator
+def test_matching_is_turned_on_and_off(estimator):
+    localiser, _ = localiser_after(1, estimator=estimator)
     assert localiser.match(False)
     assert not localiser.match(False)
     assert localiser.take_scan(drifting(1)).scan.result is None
