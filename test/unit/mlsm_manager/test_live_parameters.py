@@ -198,20 +198,18 @@ def test_the_default_reserves_the_thesis_basin():
     assert MlsmCoreParameters().expected_blocks == 240 * 100
 
 
-def test_an_extent_that_no_memory_holds_is_refused():
-    with pytest.raises(ParameterError, match=r"size_x_meters = 90000\.0.*at most 16000000 cells"):
-        MlsmCoreParameters(size_x_meters=90000.0, size_y_meters=90000.0)
+@pytest.mark.parametrize(
+    ("values", "reason"),
+    [
+        ({"size_x_meters": 9e4, "size_y_meters": 9e4}, r"size_x_meters = 90000\.0.*at most 16000000 cells"),
+        ({"map_frame": "odom"}, "map_frame = 'odom': must differ from odom_frame"),
+        ({"odometry": "NONE", "parts_per_turn": 3}, "parts_per_turn = 3: must be 1 with odometry = NONE"),
+    ],
+)
+def test_values_that_contradict_each_other_or_that_no_memory_holds_are_refused(values, reason):
+    with pytest.raises(ParameterError, match=reason):
+        MlsmCoreParameters(**values)
 
 
 def test_an_extent_may_be_zero():
     assert MlsmCoreParameters(size_x_meters=0, size_y_meters=0).expected_blocks == 0
-
-
-def test_map_and_odom_must_be_two_frames():
-    with pytest.raises(ParameterError, match=r"map_frame = 'odom': must differ from odom_frame"):
-        MlsmCoreParameters(map_frame="odom")
-
-
-def test_parts_of_turns_without_any_heading_are_refused():
-    with pytest.raises(ParameterError, match=r"parts_per_turn = 3: must be 1 with odometry = NONE"):
-        MlsmCoreParameters(odometry="NONE", parts_per_turn=3)

@@ -98,14 +98,6 @@ def test_a_class_of_boxes_that_vanished_is_deleted_once():
     assert [m.action for m in _read(markers.whole(blocks_of([(0.0, 4.0)]), HEADER))] == [Marker.ADD]
 
 
-def test_an_emptied_map_deletes_all_that_was_shown():
-    markers = BlockMarkers()
-    shown = {(m.ns, m.id) for m in _read(markers.whole(blocks_of(MIXED), HEADER))}
-    left = _read(markers.whole(blocks_of([]), HEADER))
-    assert {(m.ns, m.id) for m in left} == shown
-    assert {m.action for m in left} == {Marker.DELETE}
-
-
 def test_blocks_are_coloured_one_by_one_when_asked():
     blocks = blocks_of(MIXED)
     read = _read(BlockMarkers(ColorBy.HEIGHT).whole(blocks, HEADER))

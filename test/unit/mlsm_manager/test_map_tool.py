@@ -13,7 +13,7 @@ from programs import ROOT
 
 from mlsm_manager.map_tool import run_map_tool
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map, write_map
-from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged, merged_blocks
+from mlsm_manager.surface_map.operations import LevelTransform, difference, merged, merged_blocks
 from mlsm_manager.surface_map.ply_file import write_ply
 
 
@@ -73,6 +73,7 @@ def test_crop_keeps_what_lies_in_the_box(run, tmp_path):
     blocks = read_map(tmp_path / "c.mlsm").shown
     assert told == f"c.mlsm: {len(blocks)} blocks\n"
     assert 0 < len(blocks) < len(read_map(tmp_path / "a.mlsm").shown)
+    assert (blocks.mean[:, :2] >= 0.0).all()
 
 
 def test_merge_says_whether_it_is_exact(run, tmp_path):
@@ -167,20 +168,6 @@ def test_merged_maps_have_the_layers_of_both():
     assert (both.frame, both.calibration) == ("map", {"range_scale": 0.9})
     assert len(both.shown) == len(shown) + len(other)
     assert both.layers[Layer.FREE].mean[:, 0].min() > 80.0
-
-
-def test_a_cropped_map_holds_what_lies_in_the_box():
-    blocks = map_with(random_points(0, 500)).blocks
-    stored = cropped(StoredMap("map", {Layer.SHOWN: blocks}), np.array([0.0, -5.0]), np.array([5.0, 5.0]))
-    assert 0 < len(stored.shown) < len(blocks)
-    assert (stored.shown.mean[:, 0] >= 0.0).all()
-
-
-def test_a_map_does_not_differ_from_itself():
-    blocks = map_with(random_points(0, 500)).blocks
-    result = difference(blocks, blocks)
-    assert (len(result.only_first), len(result.only_second), len(result.both)) == (0, 0, len(blocks))
-    assert result.shift.tolist() == [0.0] * len(blocks)
 
 
 def test_a_difference_is_told_by_place_and_height():
