@@ -141,7 +141,6 @@ class AutosaveKills(unittest.TestCase):
         self.assertTrue(all(saved), saved)
 
     def test_a_node_that_another_process_starts_begins_a_new_map(self) -> None:
-        """Under the same master; the saved map is kept under another name."""
         folder = Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, str(folder))
         node = self._node(folder / "0", "/vehicle_of_two")

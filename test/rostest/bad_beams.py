@@ -21,7 +21,6 @@ class BadBeams(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Publish the frames once and connect."""
         cls.diagnostics = Diagnostics()
         cls.scans = Inbox("/sonar/scan/cleaned/cloud", PointCloud2)
         cls.transforms = tf2_ros.StaticTransformBroadcaster()
@@ -53,11 +52,9 @@ class BadBeams(unittest.TestCase):
         )
 
     def test_1_a_good_scan_passes(self) -> None:
-        """The graph works before anything bad is sent."""
         self.expect_a_scan()
 
     def test_2_beams_that_cannot_be_placed_are_refused_one_by_one(self) -> None:
-        """Empty, too long, without range, without direction, without frame."""
         bad = {
             "intensities": (b"", bytes(10000)),
             "range_resolution": (0.0, -1.0, math.nan),
@@ -88,7 +85,6 @@ class BadBeams(unittest.TestCase):
         self.expect_a_scan()
 
     def test_5_time_that_jumps_back_starts_a_new_scan(self) -> None:
-        """As when a bag loops."""
         type(self).time -= 100.0
         self.send()
         self.diagnostics.wait_for("sonar_to_cloud", "jumps back in time", 1)

@@ -32,7 +32,6 @@ class BadClouds(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Connect to every stage."""
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         inputs = {**STAGES, "matching": "/sonar/scan/echoes"}
@@ -51,21 +50,18 @@ class BadClouds(unittest.TestCase):
             self.diagnostics.wait_for(stage, counter, number)
 
     def test_1_stamps_that_do_not_match_the_points(self) -> None:
-        """The cloud is refused."""
         cloud = still_cloud(wall())
         cloud.timeStamps = cloud.timeStamps[:-3]
         self.send_to_all(cloud)
         self.expect_for_all("clouds refused", 1)
 
     def test_2_data_shorter_than_its_header_says(self) -> None:
-        """The cloud is refused."""
         cloud = still_cloud(wall())
         cloud.cloud.data = cloud.cloud.data[:-7]
         self.send_to_all(cloud)
         self.expect_for_all("clouds refused", 2)
 
     def test_3_points_and_stamps_that_are_not_finite_are_left_out(self) -> None:
-        """One bad point costs one point."""
         points = wall()
         points[7, 0] = np.nan
         points[8, 2] = np.inf
@@ -78,7 +74,6 @@ class BadClouds(unittest.TestCase):
         self.expect_for_all("points that are not finite", 3)
 
     def test_4_an_empty_cloud_passes(self) -> None:
-        """No echo is no error."""
         self.send_to_all(still_cloud(np.zeros((0, 4), np.float32)))
         self.diagnostics.wait_for("mlsm_core", "clouds in", 5)
 
@@ -100,7 +95,6 @@ class BadClouds(unittest.TestCase):
         self.diagnostics.wait_for("mlsm_core", "clouds refused", 3)
 
     def test_7_a_good_cloud_still_goes_all_the_way(self) -> None:
-        """Beams, threshold, outliers, map."""
         self.map.wait_for_link()
         self.inputs["thresholder"].publish(still_cloud(wall() + np.float32([100, 0, 0, 0])))
         self.map.wait_for(lambda cloud: np.any(np.frombuffer(cloud.data, np.float32).reshape(-1, 7)[:, 0] > 99.0))

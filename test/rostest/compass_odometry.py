@@ -22,7 +22,6 @@ class DeadReckoning(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Connect before the tests begin."""
         cls.diagnostics = Diagnostics()
         cls.odometry, cls.transforms = Inbox("/odom", Odometry), Inbox("/tf", TFMessage)
         for inbox in (cls.odometry, cls.transforms):
@@ -61,7 +60,6 @@ class DeadReckoning(unittest.TestCase):
         self.assertAlmostEqual(_yaw(end.pose.pose.orientation), math.pi / 2.0, places=6)
 
     def test_2_tf_says_the_same_as_the_odometry(self) -> None:
-        """Both frames, stamp and position."""
         end = self._go(1.0, 0.3)
         newest = self.transforms.wait_for(lambda message: message.transforms[0].header.stamp == end.header.stamp)
         transform = newest.transforms[0]
@@ -69,7 +67,6 @@ class DeadReckoning(unittest.TestCase):
         self.assertAlmostEqual(transform.transform.translation.x, end.pose.pose.position.x, places=6)
 
     def test_3_headings_that_nobody_can_use_are_counted_and_the_next_one_is_taken(self) -> None:
-        """A quaternion of zeros, NaN, no orientation, and a stamp beyond what tf2 takes."""
         stamp = self.now + rospy.Duration(61.0)
         empty = Imu(orientation=Quaternion(0.0, 0.0, 0.0, 0.0))
         absent = _heading(stamp, 0.0)
@@ -86,7 +83,6 @@ class DeadReckoning(unittest.TestCase):
         self._go(1.0, 0.0)
 
     def test_4_a_compass_that_tf_does_not_know_is_taken_as_aligned_and_said(self) -> None:
-        """The yaw of the message is the yaw of the vehicle."""
         stamp = self.now + rospy.Duration(120.0)
         message = _heading(stamp, 0.0)
         message.header.frame_id = "unknown_compass"

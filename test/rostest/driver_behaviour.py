@@ -37,13 +37,11 @@ class DriverBehaviour:
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Connect with the driver and the emulated head."""
         cls.client = Client(f"{cls.sonar}_driver", timeout=PATIENCE)
         rospy.wait_for_service(f"{cls.sonar}_emulator/order_fault", PATIENCE)
         cls.order_fault = rospy.ServiceProxy(f"{cls.sonar}_emulator/order_fault", OrderFault)
 
     def setUp(self) -> None:
-        """Begin with the defaults."""
         self.client.update_configuration(self.defaults)
         self.beams = beams()
         assert self.is_of_defaults(self.fresh_beams(1)[0])
@@ -82,12 +80,10 @@ class DriverBehaviour:
         np.testing.assert_allclose(np.diff(angles), step, atol=1e-5)
 
     def test_a_full_turn_has_a_beam_at_every_step_clockwise(self) -> None:
-        """And none is left out."""
         angles = np.unwrap([beam.angle for beam in self.fresh_beams(self.beams_per_turn + 1)])
         np.testing.assert_allclose(np.diff(angles), -self.step, atol=1e-5)
 
     def test_every_beam_of_a_turn_sees_its_wall(self) -> None:
-        """As its strongest echo."""
         for beam in self.fresh_beams(self.beams_per_turn):
             wall = WALL / max(abs(math.cos(beam.angle)), abs(math.sin(beam.angle)))
             strengths = np.frombuffer(beam.intensities, dtype=np.uint8)
@@ -95,7 +91,6 @@ class DriverBehaviour:
             assert abs(seen - wall) < 2 * beam.range_resolution
 
     def test_stamps_grow_and_are_of_now(self) -> None:
-        """They are the times of the pings."""
         start = rospy.get_time()
         stamps = [beam.header.stamp.to_sec() for beam in self.fresh_beams(20)]
         assert np.all(np.diff(stamps) > 0)
@@ -103,12 +98,10 @@ class DriverBehaviour:
         assert stamps[-1] < rospy.get_time()
 
     def test_an_inverted_head_is_mirrored(self) -> None:
-        """It turns the other way."""
         self.client.update_configuration({"inverted": True})
         self.assert_turns_by(self.step)
 
     def test_the_tilt_of_the_head_is_that_of_its_joint(self) -> None:
-        """Among others of the joint state."""
         joints = rospy.Publisher("joint_states", JointState, queue_size=1, latch=True)
         joints.publish(JointState(name=["rudder", "sonar_tilt"], position=[1.0, 0.3]))
         assert abs(self.wait_for_beam(lambda beam: beam.sensorAngle != 0.0).sensorAngle - 0.3) < 1e-6
@@ -127,7 +120,6 @@ class DriverBehaviour:
         assert health.wait(lambda arrays: values(arrays[-1])["connected"] == "true")
 
     def test_refused_changes_leave_everything_as_it_was(self) -> None:
-        """The answer says so, and the next beam is one of the defaults."""
         for bad in self.refused:
             before = self.client.get_configuration(timeout=PATIENCE)
             config = self.client.update_configuration(bad)
@@ -135,7 +127,6 @@ class DriverBehaviour:
         assert self.is_of_defaults(self.fresh_beams(1)[0])
 
     def test_a_fault_that_the_head_does_not_know_is_refused(self) -> None:
-        """With its name, or those that there are."""
         name, told = self.foreign_fault
         answer = self.order_fault(name, 1)
         assert not answer.success

@@ -25,7 +25,6 @@ class DriverFaults(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Serve the head until it has met all commands."""
         sonar, published, out_of_commands = SONARS[NAME], beams(), threading.Event()
         published.wait_for_link()
         rates = fault_rates(sonar, rospy.get_param("~rate"), rospy.get_param(f"{NAME}_driver/reply_margin"))
@@ -43,7 +42,6 @@ class DriverFaults(unittest.TestCase):
         print(f"{len(cls.expected)} good replies sent, {len(cls.delivered)} published")
 
     def test_each_good_reply_is_published_once_and_in_order(self) -> None:
-        """Whatever comes between them."""
         assert self.expected == self.delivered
 
     def test_each_bad_reply_is_counted(self) -> None:
@@ -59,7 +57,6 @@ class DriverFaults(unittest.TestCase):
             assert self.counted("refusals") == self.count(Fault.REFUSED)
 
     def test_the_driver_is_connected_at_the_end(self) -> None:
-        """It has found the head again after the last disappearance."""
         assert self.health["connected"] == "true"
 
     def count(self, *faults: Fault) -> int:

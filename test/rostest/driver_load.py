@@ -2,20 +2,24 @@
 """How much of a processor a driver needs, and whether it loses beams. The argument is the sonar."""
 
 import os
-import socket
 import sys
 import time
 import unittest
 import xmlrpc.client
+from contextlib import ExitStack
 from dataclasses import dataclass
-from typing import Callable, Dict, List, Sequence
+from typing import Dict, List
 
 import rosgraph
 import rospy
 from driver_listener import beams, diagnostics, values
-from graph import launched, run
+from graph import PACKAGE_ROOT, launched, run
 
 from underwater_map_construction.msg import SonarScanLine
+
+sys.path.insert(0, str(PACKAGE_ROOT / "test/unit/sonar_driver"))
+
+from emulated_drivers import free_udp_port
 
 # Another program may take the processor during one attempt.
 ATTEMPTS = 4
@@ -25,6 +29,12 @@ STEPS, SECONDS = 1000000, 0.06
 FASTEST_RATE = 1.0 / (2 * 5.0 / 1500.0 + (27 + 513) * 10 / 115200)
 # A turn of a real Ping360 at 2 m takes 9 s (manufacturer's specification).
 REAL_RATE = 400 / 9.0
+
+
+SONAR = sys.argv[1]
+# Counters that must not grow.
+LOSSES = ("timeouts", "bad frames", "unexpected replies")
+OWN_LOSS = {"imagenex_852": "early replies", "ping360": "missing beams"}
 
 
 @dataclass(frozen=True)
@@ -49,52 +59,33 @@ class DriverLoad:
         return not any(self.lost.values()) and numbers == list(range(numbers[0], numbers[0] + len(numbers)))
 
 
-class Imagenex852(unittest.TestCase):
-    """At its fastest rate."""
+class Load(unittest.TestCase):
+    """An 852 at its fastest rate, or a Ping360 that is faster than a real head."""
 
     def test_the_driver_is_quick_and_loses_nothing(self) -> None:
-        """It pings as fast as the line allows."""
-        losses = ("timeouts", "bad frames", "unexpected replies", "early replies")
-        self.assertTrue(is_once(self.is_quick, "imagenex_852_driver", losses))
-
-    def is_quick(self, load: DriverLoad) -> bool:
-        """Return whether a load is as it must be."""
-        print(f"{load.rate:.1f} pings/s (the line allows {FASTEST_RATE:.1f}), {load}")
-        return load.share <= 5.0 and load.rate > 0.9 * FASTEST_RATE and load.has_every_beam
+        with ExitStack() as running:
+            if SONAR == "ping360":
+                running.enter_context(launched("ping360_load.launch", f"port:={free_udp_port()}"))
+            self.assertTrue(any(IS_QUICK[SONAR](_load_of(rospy.get_param("~seconds"))) for _ in range(ATTEMPTS)))
 
 
-class Ping360(unittest.TestCase):
-    """Faster than a real head."""
-
-    def test_the_driver_is_quick_and_loses_nothing(self) -> None:
-        """It follows the head."""
-        losses = ("timeouts", "bad frames", "missing beams", "unexpected replies")
-        with launched("ping360_load.launch", f"port:=udp://127.0.0.1:{_free_port()}"):
-            self.assertTrue(is_once(self.is_quick, "ping360_driver", losses))
-
-    def is_quick(self, load: DriverLoad) -> bool:
-        """Return whether a load is as it must be."""
-        print(f"{load.rate:.1f} beams/s, {10 * load.share / load.rate:.2f} ms per beam, {load}")
-        is_whole = load.has_every_beam and len(load.received[-1].intensities) == 1200
-        return load.rate > REAL_RATE and load.share * REAL_RATE / load.rate <= 5.0 and is_whole
+def _is_quick_852(load: DriverLoad) -> bool:
+    print(f"{load.rate:.1f} pings/s (the line allows {FASTEST_RATE:.1f}), {load}")
+    return load.share <= 5.0 and load.rate > 0.9 * FASTEST_RATE and load.has_every_beam
 
 
-def is_once(is_quick: Callable[[DriverLoad], bool], driver: str, losses: Sequence[str]) -> bool:
-    """Return whether a driver is quick in one of some attempts of ~seconds, by the stamps of its beams.
-
-    losses: counters of the driver that must not grow. Raises AssertionError where no beams come.
-    """
-    return any(is_quick(_load_of(driver, rospy.get_param("~seconds"), losses)) for _ in range(ATTEMPTS))
+def _is_quick_360(load: DriverLoad) -> bool:
+    print(f"{load.rate:.1f} beams/s, {10 * load.share / load.rate:.2f} ms per beam, {load}")
+    is_whole = load.has_every_beam and len(load.received[-1].intensities) == 1200
+    return load.rate > REAL_RATE and load.share * REAL_RATE / load.rate <= 5.0 and is_whole
 
 
-def _free_port() -> int:
-    """Return a UDP port of this computer that nobody uses."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+IS_QUICK = {"imagenex_852": _is_quick_852, "ping360": _is_quick_360}
 
 
-def _load_of(driver: str, seconds: float, losses: Sequence[str]) -> DriverLoad:
+def _load_of(seconds: float) -> DriverLoad:
+    """Return the load of so many seconds, by the stamps of the beams."""
+    driver = f"{SONAR}_driver"
     health, listener = diagnostics(driver), beams()
     before = values(health.wait_for_more()[0])
     start = len(listener.messages)
@@ -107,7 +98,7 @@ def _load_of(driver: str, seconds: float, losses: Sequence[str]) -> DriverLoad:
     for one in (health, listener):
         one.close()
     span = (last.stamp - first.stamp).to_sec()
-    lost = {key: int(after[key]) - int(before[key]) for key in losses}
+    lost = {key: int(after[key]) - int(before[key]) for key in (*LOSSES, OWN_LOSS[SONAR])}
     return DriverLoad((last.seq - first.seq) / span, 100 * cpu / span / _slowness(), listener.messages[start:], lost)
 
 
@@ -132,4 +123,4 @@ def _cpu_seconds(pid: int) -> float:
 
 
 if __name__ == "__main__":
-    run({"imagenex_852": Imagenex852, "ping360": Ping360}[sys.argv[1]])
+    run(Load)

@@ -26,7 +26,6 @@ class ForeignBeams(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Listen to all that the node makes of turns."""
         cls.published = 0
         cls.diagnostics, cls.log = Diagnostics(), Inbox("/rosout", Log)
         cls.turns = Inbox("/sonar/scan/turn", PointCloud2)
@@ -70,7 +69,6 @@ class ForeignBeams(unittest.TestCase):
         self.wait_for_log("it is mounted in odom at 1 2 3 m")
 
     def test_2_a_mount_by_parameters_places_the_scans(self) -> None:
-        """They lie around the mounted sonar."""
         cloud = rows(self.scans.wait_for(lambda _: True))
         wall = cloud[cloud[:, 3] == 120]
         np.testing.assert_allclose(wall[:, :3].mean(axis=0), [1.0, 2.0, 3.0], atol=0.3)
@@ -80,7 +78,6 @@ class ForeignBeams(unittest.TestCase):
         self.wait_for_a_turn(MICRON)
 
     def test_4_a_laser_scan_is_taken_with_a_warning_that_names_a_better_topic(self) -> None:
-        """The driver publishes its beams, too."""
         kind = message_classes(ECHO)[ECHO]
         other = rospy.Publisher("/ping360/data", kind, queue_size=1)
         scan = LaserScan(angle_min=-3.14, angle_increment=6.28 / RAYS, range_max=50.0, ranges=[WALL] * RAYS)
@@ -93,14 +90,12 @@ class ForeignBeams(unittest.TestCase):
         other.unregister()
 
     def test_5_what_is_no_beam_is_counted(self) -> None:
-        """The node lives."""
         self.publish(String, [String("hello")] * 3)
         self.diagnostics.wait_for("sonar_to_cloud", "messages of unknown types", 3)
         self.wait_for_a_turn(MICRON)
         self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
 
     def test_6_damaged_messages_end_nothing(self) -> None:
-        """Each is counted, and the node goes on."""
         fuzzer, sent = Fuzzer(seed=3), message_classes(ECHO)[ECHO]
 
         class Damaged(sent):

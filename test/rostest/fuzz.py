@@ -48,7 +48,6 @@ class Fuzz(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Find the nodes, their processes and what they subscribe to."""
         cls.nodes = _launched(sys.argv[1])
         cls.messages, cls.seed = int(sys.argv[2]), int(sys.argv[3])
         cls.statuses: Dict[str, Dict[str, str]] = {}
@@ -71,7 +70,6 @@ class Fuzz(unittest.TestCase):
                 cls.statuses[status.name] = {item.key: item.value for item in status.values}
 
     def test_nothing_that_comes_ends_a_node(self) -> None:
-        """Every process lives, nothing is an internal error, and a good scan arrives in the map."""
         print(f"{self.messages} messages, seed {self.seed}, {len(self.processes)} nodes, topics {sorted(self.topics)}")
         self._publish()
         self._expect_all_alive()

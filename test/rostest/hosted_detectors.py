@@ -23,7 +23,6 @@ class HostedDetectors(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Play the bag and wait for the shapes of all scans."""
         cls.diagnostics = Diagnostics()
         cls.clouds = Inbox("/sonar/scan/cleaned", StampedIntensityCloud)
         cls.walls = Inbox("/sonar/scan/line/coefficients", Walls)
@@ -51,12 +50,10 @@ class HostedDetectors(unittest.TestCase):
         self.assertEqual(max(found.values()), N_WALLS)
 
     def test_every_scan_is_searched_for_circles(self) -> None:
-        """The empty messages say that there are none."""
         stamps = [cloud.header.stamp for cloud in self.clouds.messages]
         self.assertEqual([circles.header.stamp for circles in self.circles.messages], stamps)
 
     def test_the_detectors_take_no_process_and_report_on_their_own(self) -> None:
-        """Their counters stand beside those of the stages."""
         nodes = {node for _, users in rosgraph.Master("/graph_test").getSystemState()[0] for node in users}
         for name in ("line_detector", "circle_detector"):
             self.assertNotIn(f"/{name}", nodes)

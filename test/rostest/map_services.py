@@ -26,7 +26,6 @@ class MapServices(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Insert the points and wait until the map shows them."""
         cls.folder = Path(rospy.get_param("~folder"))
         points = np.array([[0.1, 0.1, z, 100] for z in np.arange(0, 3, 0.2)] + [[5.1, 5.1, 0, 90]], np.float32)
         cls.publisher = publisher("/sonar/scan/cleaned", StampedIntensityCloud)
@@ -37,7 +36,6 @@ class MapServices(unittest.TestCase):
 
     @classmethod
     def tearDownClass(cls) -> None:
-        """Leave nothing behind."""
         shutil.rmtree(str(cls.folder), ignore_errors=True)
 
     def test_a_late_subscriber_sees_the_whole_map(self) -> None:
@@ -65,13 +63,11 @@ class MapServices(unittest.TestCase):
         self.assertEqual(len(set(stamps)), len(stamps))
 
     def test_a_map_is_saved_in_the_folder_that_was_named(self) -> None:
-        """The file holds the blocks."""
         answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar.ply", False)
         self.assertTrue(answer.success, answer.message)
         self.assertEqual(sorted(read_ply(self.folder / "pillar.ply").count), [1, 15])
 
     def test_a_saved_map_can_be_loaded_and_a_damaged_one_changes_nothing(self) -> None:
-        """Load what was saved into an empty map."""
         load = rospy.ServiceProxy("/mlsm_core/load_map", LoadMap)
         answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("kept", False)
         self.assertTrue(answer.success, answer.message)
@@ -92,7 +88,6 @@ class MapServices(unittest.TestCase):
         return region(Point(place - 1, place - 1, -5), Point(place + 1, place + 1, 5)).cloud.width
 
     def test_a_saved_map_is_kept_when_another_takes_its_name(self) -> None:
-        """And an empty one takes nobody's."""
         save = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)
         for _ in range(2):
             self.assertTrue(save("twice", False).success)
@@ -110,13 +105,11 @@ class MapServices(unittest.TestCase):
         self.assertEqual([value for value in grid.data if value != -1], [100, 100])
 
     def test_a_name_that_leaves_the_folder_is_refused(self) -> None:
-        """With the name in the answer."""
         answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar", False)
         self.assertFalse(answer.success)
         self.assertIn("'../pillar'", answer.message)
 
     def test_reset_forgets_the_map_and_clears_the_display(self) -> None:
-        """Runs on the same map as the others and puts it back."""
         inbox = Inbox("/MLSM/Markers", MarkerArray)
         shown = inbox.wait_for(lambda array: any(marker.points for marker in array.markers))
         self.assertTrue(rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)().success)

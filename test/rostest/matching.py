@@ -73,7 +73,6 @@ class Matching(unittest.TestCase):
         self.assertEqual(len({t.header.stamp for t in transforms}), len(transforms))
 
     def test_pose_and_path_say_the_same_as_the_odometry_message(self) -> None:
-        """Three shapes of one fix."""
         path = Inbox("/MLSM/path", Path).wait_for(lambda way: len(way.poses) >= SCANS)
         poses = self.poses.wait_for_number(SCANS)[:SCANS]
         shapes = [stamps_and_places(found[:SCANS])[1] for found in (self.fixes.messages, path.poses, poses)]

@@ -20,7 +20,6 @@ class MicronScanLine(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Wait until all beams are placed."""
         bag = recording("micron_scanline.bag")
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
@@ -31,13 +30,11 @@ class MicronScanLine(unittest.TestCase):
         cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", BEAMS, LONG_PATIENCE)
 
     def test_no_beam_is_lost(self) -> None:
-        """All are read, placed by the mounting, and none is refused."""
         values = self.diagnostics.values("sonar_to_cloud")
         self.assertEqual((values["beams in"], values["beams placed"]), (str(BEAMS), str(BEAMS)))
         self.assertFalse({"beams refused", "beams without transform", "internal errors"} & set(values))
 
     def test_every_turn_is_a_scan(self) -> None:
-        """The head turned ten times."""
         self.diagnostics.wait_for("sonar_to_cloud", "turns", TURNS)
         self.assertEqual({cloud.height for cloud in self.turns.wait_for_number(TURNS - 1)[1:]}, {200})
 

@@ -25,7 +25,6 @@ class MicronTank(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Play the recording and wait for the map of its two whole turns."""
         bag = recording("micron_static.bag")
         maps = Inbox("/MLSM/cloud", PointCloud2)
         scans = Inbox("/sonar/scan/cleaned/cloud", PointCloud2)

@@ -39,18 +39,15 @@ class OneAndManyProcesses(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Keep the maps and what is made beside them."""
         with TemporaryDirectory() as maps:
             made = {processes: _made(processes, Path(maps) / processes) for processes in LISTENERS}
         cls.blocks = {processes: rows(messages["map"]) for processes, messages in made.items()}
         cls.beside = made
 
     def test_both_layouts_make_the_same_blocks(self) -> None:
-        """Not one bit differs."""
         np.testing.assert_array_equal(self.blocks["one"], self.blocks["many"])
 
     def test_both_layouts_make_the_same_echoes_laser_scans_thresholds_and_images(self) -> None:
-        """What is made beside the map, by the newest turn or beam."""
         one, many = self.beside["one"], self.beside["many"]
         np.testing.assert_array_equal(rows(one["echoes"].cloud), rows(many["echoes"].cloud))
         np.testing.assert_array_equal(one["laserScan"].ranges, many["laserScan"].ranges)
@@ -67,7 +64,6 @@ class OneAndManyProcesses(unittest.TestCase):
         self.assertGreater(np.mean(off[of_walls] < CELL), 0.85)
 
     def test_a_laser_scan_has_a_ray_for_every_direction_of_the_head(self) -> None:
-        """And stands for the moment of its newest beam."""
         scan = self.beside["one"]["laserScan"]
         self.assertEqual((len(scan.ranges), scan.header.frame_id), (120, "sonar"))
         self.assertEqual(scan.header.stamp, self.beside["one"]["echoes"].header.stamp)

@@ -87,7 +87,6 @@ class Parameters(unittest.TestCase):
         self.assertNotIn("min_points", held)
 
     def test_a_change_of_what_is_for_experts_is_held_where_the_node_reads_it(self) -> None:
-        """Of parameters that have a key of their own."""
         client = Client("/mlsm_core", timeout=PATIENCE)
         client.update_configuration({"min_points": 21})
         self.assertEqual(rospy.get_param("/mlsm_core/expert/min_points"), 21)
@@ -95,14 +94,12 @@ class Parameters(unittest.TestCase):
         client.close()
 
     def test_a_good_change_is_taken_while_running(self) -> None:
-        """As dynparam or rqt_reconfigure send it."""
         client = Client("/thresholder", timeout=PATIENCE)
         self.assertEqual(client.update_configuration({"otsu_multiplier": 2.0})["otsu_multiplier"], 2.0)
         self.assertEqual(rospy.get_param("/thresholder/otsu_multiplier"), 2.0)
         client.close()
 
     def test_every_bad_value_of_every_parameter_is_refused_while_running(self) -> None:
-        """The answer holds the value from before, and the diagnostics count every refusal."""
         diagnostics, accepted, sent = Diagnostics(), [], 0
         for node in sorted(LIVE_NODES):
             client = Client(f"/{node}", timeout=PATIENCE)
@@ -127,14 +124,12 @@ class Parameters(unittest.TestCase):
         self.assertGreater(sent, 300)
 
     def test_a_change_of_which_one_value_is_bad_is_refused_whole(self) -> None:
-        """The good value is not taken either."""
         client = Client("/outlier_remover", timeout=PATIENCE)
         answer = client.update_configuration({"mode": "RADIUSES", "mean_k": 30})
         self.assertEqual((answer["mode"], answer["mean_k"]), ("STATISTICAL", 20))
         client.close()
 
     def test_every_bad_start_ends_with_one_line(self) -> None:
-        """The line names the parameter, or the file that it names."""
         with ThreadPoolExecutor(max_workers=2) as pool:
             ends = list(pool.map(start, enumerate(BAD_STARTS)))
         wrong = []

@@ -24,7 +24,6 @@ class PlayBag(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Listen before the launch file is started."""
         cls.maps, cls.clocks = Inbox("/MLSM/cloud", PointCloud2), Inbox("/clock", Clock)
         cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
         playback = ExitStack()
@@ -38,12 +37,10 @@ class PlayBag(unittest.TestCase):
             stop("/mapping")
 
     def test_a_map_grows_and_scans_are_matched(self) -> None:
-        """Without anybody to start the player."""
         self.fixes.wait_for_number(2)
         self.maps.wait_for(lambda cloud: cloud.width > 300)
 
     def test_every_beam_is_placed_though_the_mapping_stands_still_for_two_seconds(self) -> None:
-        """At the beginning, in the middle and before the last beam."""
         self.diagnostics.wait_for("sonar_to_cloud", "beams placed", self.beams)
 
     def test_the_clock_never_stands_still(self) -> None:

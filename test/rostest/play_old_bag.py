@@ -15,7 +15,6 @@ class PlayOldBag(unittest.TestCase):
     """A recording of today under the names of 2015."""
 
     def setUp(self) -> None:
-        """Write the bag into a folder of the test's own."""
         folder = tempfile.TemporaryDirectory()
         self.addCleanup(folder.cleanup)
         self.folder = Path(folder.name)
@@ -30,7 +29,6 @@ class PlayOldBag(unittest.TestCase):
         self.assertEqual(found.header.frame_id, "map")
 
     def test_map_bag_maps_it(self) -> None:
-        """Without a master."""
         command = ["rosrun", PACKAGE, "map_bag", str(self.bag), "--out", str(self.folder / "map"), "--no-calibrate"]
         done = subprocess.run(command, stdout=subprocess.PIPE, text=True, timeout=LONG_PATIENCE, check=True)
         self.assertRegex(done.stdout, r"^10 scans, [1-9]\d* matched, 0 rejected")

@@ -42,7 +42,6 @@ class ResumeKills(unittest.TestCase):
     """Vehicles are killed `~kills` times altogether, in harbours that are made or in the recording `~bag`."""
 
     def test_no_kill_loses_the_map_or_puts_the_vehicle_elsewhere(self) -> None:
-        """Of all kills; what became of them is printed."""
         folder = Path(tempfile.mkdtemp())
         self.addCleanup(shutil.rmtree, str(folder))
         numbers = range(rospy.get_param("~kills") // KILLS_PER_MISSION)
@@ -54,7 +53,6 @@ class ResumeKills(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Map the recording without kills."""
         bag = rospy.get_param("~bag")
         cls.recorded = recorded_mission(Path(bag)) if bag else None
 

@@ -40,7 +40,6 @@ class Shapes(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Connect to both detectors."""
         cls.diagnostics = Diagnostics()
         cls.walls = Inbox("/sonar/scan/line/coefficients", Walls)
         cls.circles = Inbox("/sonar/scan/circle/coefficients", Circles)
@@ -58,7 +57,6 @@ class Shapes(unittest.TestCase):
             self.diagnostics.wait_for(name, counter, number)
 
     def test_1_empty_clouds_and_two_points_hold_no_shape(self) -> None:
-        """They are answered with empty messages."""
         self.clouds.publish(message(np.zeros((0, 4), np.float32)))
         self.clouds.publish(message(scan()[[0, 20]]))
         self.expect_for_both("clouds in", 2)
@@ -66,7 +64,6 @@ class Shapes(unittest.TestCase):
         self.assertEqual(self.circles.wait_for().circles, [])
 
     def test_2_stamps_that_do_not_match_the_points_are_refused(self) -> None:
-        """They are counted."""
         cloud = message(scan())
         cloud.timeStamps = cloud.timeStamps[:-1]
         self.clouds.publish(cloud)
@@ -89,7 +86,6 @@ class Shapes(unittest.TestCase):
         self.assertTrue(math.isnan(wall.sonar_distance))
 
     def test_5_the_wall_is_where_it_is_and_as_long(self) -> None:
-        """Coefficients, inliers and marker agree."""
         self.clouds.publish(message(scan()))
         walls = self.walls.wait_for(lambda m: m.header.frame_id == "odom" and m.walls and m.walls[0].inliers == 41)
         (wall,) = walls.walls
@@ -104,7 +100,6 @@ class Shapes(unittest.TestCase):
         self.assertEqual(line.points, [wall.start, wall.end])
 
     def test_6_the_buoy_is_where_it_is(self) -> None:
-        """Its centre lies behind what the sonar sees."""
         circles = self.circles.wait_for(lambda m: m.header.frame_id == "odom" and len(m.circles) == 1)
         (circle,) = circles.circles
         self.assertLess(math.hypot(circle.center.x - BUOY[0], circle.center.y - BUOY[1]), 0.15)

@@ -32,7 +32,6 @@ class SimulatorCommands(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Connect before the tests begin."""
         cls.truth, cls.diagnostics = Inbox("/ground_truth", Odometry), Diagnostics()
         cls.commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
         wait_for_publisher_links(cls.commands, 1)
@@ -58,7 +57,6 @@ class SimulatorCommands(unittest.TestCase):
         self.assertLess(still.pose.pose.position.x - last.pose.pose.position.x, 1.0)
 
     def test_bad_commands_are_counted_and_change_nothing(self) -> None:
-        """Neither NaN nor infinity reaches the pose."""
         still = self.truth.wait_for(lambda m: m.twist.twist.linear.x == 0.0)
         for bad in (math.nan, math.inf):
             self.commands.publish(_command(bad))
@@ -68,7 +66,6 @@ class SimulatorCommands(unittest.TestCase):
         self.assertEqual(later.pose.pose.position, still.pose.pose.position)
 
     def test_commands_beyond_its_powers_are_limited_and_counted(self) -> None:
-        """The greatest speed is a parameter."""
         fast = self._drive(_command(-9.0), lambda m: m.twist.twist.linear.x < -0.9)
         self.assertGreaterEqual(fast.twist.twist.linear.x, -1.0)
         self.diagnostics.wait_for("sonar_simulator", "velocity commands limited", 1)

@@ -24,7 +24,6 @@ class Standing(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        """Publish the scans and wait until all but the first, which makes the map, are matched."""
         cls.fixes, cls.transforms = Inbox("/MLSM/odometry", Odometry), Inbox("/tf", TFMessage)
         cls.diagnostics = Diagnostics()
         publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
@@ -44,12 +43,10 @@ class Standing(unittest.TestCase):
         np.testing.assert_allclose(places, 0.5, atol=0.1)
 
     def test_map_to_odom_comes_to_the_fix_and_stays(self) -> None:
-        """Within the blend time."""
         found = self.transforms.wait_for(lambda message: message.transforms[0].transform.translation.x > 0.4)
         self.assertAlmostEqual(found.transforms[0].transform.translation.x, 0.5, delta=0.1)
 
     def test_the_place_can_be_searched_for(self) -> None:
-        """The newest scan is not forgotten."""
         answer = rospy.ServiceProxy("/mlsm_core/relocalise", Trigger)()
         self.assertTrue(answer.success, answer.message)
 

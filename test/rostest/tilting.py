@@ -64,14 +64,12 @@ class SonarControl(unittest.TestCase):
         cloud.wait_for(lambda message: points_on_floor(message) > 50)
 
     def test_2_a_mode_that_does_not_exist_is_refused(self) -> None:
-        """The answer says which there are."""
         rospy.wait_for_service("/sonar_control/set_mode", PATIENCE)
         answer = rospy.ServiceProxy("/sonar_control/set_mode", SetScanMode)("VERTICAL")
         self.assertFalse(answer.success)
         self.assertIn("must be one of STATIC_MAPPING, HORIZONTAL", answer.message)
 
     def test_3_horizontal_puts_the_sonar_back_and_keeps_it_there(self) -> None:
-        """The beams say so."""
         beams = Inbox("/sonar/raw", SonarScanLine)
         self.assertTrue(rospy.ServiceProxy("/sonar_control/set_mode", SetScanMode)("HORIZONTAL").success)
         self.assertEqual(rospy.get_param("/sonar_control/mode"), "HORIZONTAL")

@@ -88,7 +88,6 @@ class UnreadTopics(unittest.TestCase):
         return int(health.report().values.get(counter, 0))
 
     def test_1_nothing_is_serialised_while_nobody_reads(self) -> None:
-        """The chain works all the same; the stage beside it and the image rest."""
         self.send_turn()
         wait_until(lambda: self.number("outlier_remover", "clouds out") == 1)
         wait_until(lambda: self.number("sonar_to_cloud", "turns") == 1)
@@ -97,7 +96,6 @@ class UnreadTopics(unittest.TestCase):
         self.assertEqual(self.number("sonar_image", "beams in"), 0)
 
     def test_2_every_topic_comes_when_it_is_read(self) -> None:
-        """And the odometry tells that the vehicle moves."""
         moving = Odometry()
         moving.twist.twist.linear.x = 0.5
         self.odometry.publish(moving)
