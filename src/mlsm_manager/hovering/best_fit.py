@@ -13,16 +13,14 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_path, solved
 from mlsm_manager.joint_solver.estimate import misfit_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
-from mlsm_manager.joint_solver.placement import NodePath
 
 _FILTERS = 3  # besides the live one: one of three or four loses a simulated tour now and then
 _ALL_TURNS = 200  # that particles reach back: all of a run of 50 minutes
 _LIKELY = 20.0  # of log likelihood, by which a fit must be worse to count e times less, since neighbours share errors
 _LONGEST_SHIFTED = 60  # turns, about 15 minutes: the time that shifts take grows with their square
 _CLEARLY = 3.0  # of log likelihood, by which shifted paths must be better than the best fit before, or it is kept
-_STRAFES = (
-    1.05  # times the likelihood: 1.01 on tours ahead, where the wider profile fits noise; 1.25 and more on others
-)
+# Times the likelihood: 1.01 on tours ahead, where the wider profile fits noise; 1.25 and more on others.
+_STRAFES = 1.05
 
 
 def solved_best(live: LiveSolver) -> BatchResult:
@@ -43,7 +41,7 @@ def strafes(ahead: LiveSolver, strafing: LiveSolver) -> bool:
     """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans."""
     times = strafing.log.node_times
     echoes = Echoes.of_run(strafing.log, strafing.parameters)
-    one, other = (log_likelihood(echoes, _path_at(solver, times)) for solver in (ahead, strafing))
+    one, other = (log_likelihood(echoes, run.solution.path(times)[:, :2]) for run in (ahead, strafing))
     return other > _STRAFES * one
 
 
@@ -54,13 +52,11 @@ def _found(live: LiveSolver, seed: int) -> State:
 
 
 def _shift_search(live: LiveSolver) -> ShiftSearch:
-    log, parameters = live.log, live.parameters
-    echoes = Echoes.of_run(log, parameters)
-
     def refit(path: np.ndarray) -> np.ndarray:
         return _path(live, fit_path(live, _on_path(live, path)))
 
-    return ShiftSearch(echoes, log.node_times.copy(), parameters.parts_per_turn, refit)
+    echoes = Echoes.of_run(live.log, live.parameters)
+    return ShiftSearch(echoes, live.log.node_times.copy(), live.parameters.parts_per_turn, refit)
 
 
 def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], least: float) -> List[BatchResult]:
@@ -85,12 +81,7 @@ def _on_path(live: LiveSolver, path: np.ndarray) -> State:
 
 def _path(live: LiveSolver, state: State) -> np.ndarray:
     """Return where the nodes are (n, 2) [m] in map."""
-    return live.log.node_poses(np.arange(len(state.nodes)))[:, :2] + state.nodes[:, :2]
-
-
-def _path_at(live: LiveSolver, times: np.ndarray) -> np.ndarray:
-    """Return where the vehicle was (n, 2) [m] in map at `times` (n,) [s]."""
-    return NodePath(live.odometry, live.log.odometry, live.log.node_times, live.state.nodes).at(times)[:, :2]
+    return live.solution.with_state(state).node_places(np.arange(len(state.nodes)))
 
 
 def _best(live: LiveSolver, fits: List[BatchResult], likelihoods: np.ndarray) -> BatchResult:

@@ -1,6 +1,6 @@
 """How likely the echoes of a whole run are on a path and on shifted ones, and which posts are missed there."""
 
-from typing import NamedTuple
+from typing import NamedTuple, Union
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -22,6 +22,9 @@ class _Pairs(NamedTuple):
     targets: np.ndarray
     offsets: np.ndarray
     normals: np.ndarray
+
+    def chosen(self, rows: Union[np.ndarray, slice]) -> "_Pairs":
+        return _Pairs(*(array[rows] for array in self))
 
 
 def log_likelihood(echoes: Echoes, path: np.ndarray) -> float:
@@ -46,7 +49,8 @@ def shift_gains(echoes: Echoes, path: np.ndarray, axis: np.ndarray, shifts: np.n
     axis: (2,) unit vector along which it is shifted. A shift changes the path at once, so that the scans within which
     the vehicle goes that far count a little wrong.
     """
-    pairs = _in_order(_pairs_within(echoes, echoes.places(path, 0), axis, float(np.abs(shifts).max())))
+    pairs = _pairs_within(echoes, echoes.places(path, 0), axis, float(np.abs(shifts).max()))
+    pairs = pairs.chosen(np.argsort(pairs.offsets[:, 0]))
     scans = len(path) - 1
     present = _by_scan(echoes, pairs, 0.0, scans)
     after = np.maximum.accumulate(present[:, ::-1], axis=1)[:, ::-1]
@@ -62,7 +66,7 @@ def shift_gains(echoes: Echoes, path: np.ndarray, axis: np.ndarray, shifts: np.n
 def _by_scan(echoes: Echoes, pairs: _Pairs, shift: float, scans: int) -> np.ndarray:
     """Return how near (n, scans) each echo, shifted [m] along the axis, is to the nearest one of each earlier scan."""
     first, last = np.searchsorted(pairs.offsets[:, 0], [-shift - _FARTHEST_ALONG, -shift + _FARTHEST_ALONG])
-    some = _Pairs(*(array[first:last] for array in pairs))
+    some = pairs.chosen(slice(first, last))
     nearness, result = _nearness(echoes, some, shift), np.zeros(len(echoes) * scans)
     near = np.flatnonzero(nearness)
     np.maximum.at(result, some.sources[near] * scans + echoes.nodes[some.targets[near]], nearness[near])
@@ -102,12 +106,6 @@ def _comparable(
     sources, targets = sources[kept], targets[kept]
     to_axis = np.array([[axis[0], -axis[1]], [axis[1], axis[0]]])
     return _Pairs(sources, targets, (places[sources] - places[targets]) @ to_axis, echoes.normals[targets] @ to_axis)
-
-
-def _in_order(pairs: _Pairs) -> _Pairs:
-    """Return the pairs in the order of their offset along the axis."""
-    order = np.argsort(pairs.offsets[:, 0])
-    return _Pairs(*(array[order] for array in pairs))
 
 
 class MissedPosts:

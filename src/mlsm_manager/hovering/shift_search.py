@@ -113,23 +113,21 @@ class ShiftSearch:
 
 def _chosen(gains: np.ndarray, lengths: np.ndarray, allowed: tuple, count: int, options: List[tuple]) -> List[tuple]:
     """Return `options` with `count` more: scan and row of `lengths` of the best gains (s, m) that differ from these."""
-    options, wanted = list(options), len(options) + count
-    sizes = np.abs(lengths)
+    sizes, wanted = np.abs(lengths), len(options) + count
     masked = np.where((sizes >= allowed[0]) & (sizes <= allowed[1]), gains, -np.inf)
     masked[0] = -np.inf
-    for scan, number in options:
-        _forget(masked, lengths, scan, number)
+
+    def forget(scan: int, number: int) -> None:
+        alike = np.abs(lengths - lengths[number]) < _ALIKE_SHIFT
+        masked[max(0, scan - _ALIKE_SCANS) : scan + _ALIKE_SCANS + 1, alike] = -np.inf
+
+    options = list(options)
+    for option in options:
+        forget(*option)
     while len(options) < wanted and np.isfinite(masked.max()):
-        scan, number = (int(part) for part in np.unravel_index(np.argmax(masked), masked.shape))
-        options.append((scan, number))
-        _forget(masked, lengths, scan, number)
+        options.append(tuple(int(part) for part in np.unravel_index(np.argmax(masked), masked.shape)))
+        forget(*options[-1])
     return options
-
-
-def _forget(gains: np.ndarray, lengths: np.ndarray, scan: int, number: int) -> None:
-    """Take out of `gains` what is much like the shift of row `number` from `scan` on."""
-    alike = np.abs(lengths - lengths[number]) < _ALIKE_SHIFT
-    gains[max(0, scan - _ALIKE_SCANS) : scan + _ALIKE_SCANS + 1, alike] = -np.inf
 
 
 def _distinct(paths: List[JudgedPath]) -> List[JudgedPath]:
@@ -160,14 +158,11 @@ def stretched_mean(search: ShiftSearch, path: np.ndarray) -> JudgedPath:
     """
     axis = search.least_known_axis()
     along = np.outer((path - path[0]) @ axis, axis)
-    fits = [_refitted(search, path + stretch * along) for stretch in _STRETCHES]
+    stretched = [path + stretch * along for stretch in _STRETCHES]
+    for _ in range(_REFITS):
+        stretched = [search.refit(one) for one in stretched]
+    fits = [search.judged(one) for one in stretched]
     likelihoods = np.array([fit.log_likelihood for fit in fits])
     shares = np.exp(likelihoods - likelihoods.max())
     mean = np.einsum("n,nka->ka", shares / shares.sum(), np.array([fit.path for fit in fits]))
     return max(search.judged(path), search.judged(mean), key=lambda one: one.log_likelihood)
-
-
-def _refitted(search: ShiftSearch, path: np.ndarray) -> JudgedPath:
-    for _ in range(_REFITS):
-        path = search.refit(path)
-    return search.judged(path)

@@ -93,7 +93,8 @@ class BlockMarkers:
         ends = list(zip(starts[:-1], starts[1:]))
         if self._color_by is ColorBy.TYPE:
             return (_list(points, _POINT_BYTES, *end) + _NO_COLORS for end in ends)
-        colors = _rgba(block_colors(blocks, self._color_by, self._limits))[boxes.owners].tobytes()
+        colors = block_colors(blocks, self._color_by, self._limits)[boxes.owners]
+        colors = np.column_stack([colors, np.ones(len(colors))]).astype("<f4").tobytes()
         return (_list(points, _POINT_BYTES, *end) + _list(colors, _COLOR_BYTES, *end) for end in ends)
 
     def _deletion(self, tile: Tile, kind: int, header: Header) -> bytes:
@@ -127,10 +128,6 @@ def _array(packed: List[bytes]) -> PackedMarkerArray:
 def _list(elements: bytes, size: int, start: int, end: int) -> bytes:
     """Return elements from `start` to `end`, of `size` bytes each, as a list of a message."""
     return struct.pack("<I", end - start) + elements[size * start : size * end]
-
-
-def _rgba(colors: np.ndarray) -> np.ndarray:
-    return np.column_stack([colors, np.ones(len(colors))]).astype("<f4")
 
 
 def _marker(power: int, number: int, header: Header, action: int) -> Marker:

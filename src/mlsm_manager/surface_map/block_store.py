@@ -36,9 +36,9 @@ class BlockStore:
     def __init__(self, expected_blocks: int) -> None:
         """`expected_blocks`: room is reserved for so many."""
         reserved = max(expected_blocks, _MIN_ROWS)
-        self._row_array = LargeArray(reserved, (ROW_WIDTH,), np.float64)
-        self._next_array = LargeArray(reserved, (), np.int32)
-        self._crossed_array = LargeArray(reserved, (), np.uint16)
+        self._rows = LargeArray(reserved, (ROW_WIDTH,), np.float64)
+        self._following = LargeArray(reserved, (), np.int32)
+        self._crossed = LargeArray(reserved, (), np.uint16)
         self._index = CellIndex(expected_blocks)
         self._used = 0
         self._free = np.empty(0, dtype=np.int64)
@@ -48,38 +48,30 @@ class BlockStore:
         return self._used - len(self._free)
 
     @property
-    def _rows(self) -> np.ndarray:
-        return self._row_array.values
-
-    @property
-    def _crossed(self) -> np.ndarray:
-        return self._crossed_array.values
-
-    @property
     def nbytes(self) -> int:
         """Memory in use, bytes; rows beyond those are reserved but never touched, so that they cost nothing yet."""
-        per_block = self._rows.itemsize * ROW_WIDTH + self._next_array.values.itemsize + self._crossed.itemsize
-        return self._used * per_block + self._index.nbytes
+        arrays = self._rows.values, self._following.values, self._crossed.values
+        return self._used * sum(array[0].nbytes for array in arrays) + self._index.nbytes
 
     @property
     def rows_in_use(self) -> np.ndarray:
         """(n,) numbers of all rows that hold a block, increasing."""
-        return np.flatnonzero(self._rows[: self._used, COUNT])
+        return np.flatnonzero(self._rows.values[: self._used, COUNT])
 
     def blocks(self, rows: np.ndarray, resolution: float) -> Blocks:
         """Return a copy of the blocks in `rows` (n,)."""
-        return Blocks(self._rows[rows], resolution, self._crossed[rows])
+        return Blocks(self._rows.values[rows], resolution, self._crossed.values[rows])
 
     def begin_copy(self, resolution: float) -> "RunningCopy":
         """Return a copy of all blocks as they are now, which is still to be made."""
-        copy = RunningCopy(self._row_array, self._crossed_array, self._used, resolution)
+        copy = RunningCopy(self._rows, self._crossed, self._used, resolution)
         self._copies.add(copy)
         return copy
 
     @property
     def arrays(self) -> StoreArrays:
         """All arrays, good until the store grows."""
-        return StoreArrays(self._rows, self._next_array.values, self._crossed, self._index.heads)
+        return StoreArrays(self._rows.values, self._following.values, self._crossed.values, self._index.heads)
 
     def announce(self, rows: np.ndarray) -> None:
         """Learn that `rows` (n,) will be written to."""
@@ -99,7 +91,7 @@ class BlockStore:
             row, owners = row[present], owners[present]
             found_rows.append(row)
             found_owners.append(owners)
-            row = self._next_array.values[row]
+            row = self._following.values[row]
         if not found_rows:
             return np.empty(0, dtype=np.int64), owners
         return np.concatenate(found_rows).astype(np.int64), np.concatenate(found_owners)
@@ -107,7 +99,7 @@ class BlockStore:
     def release(self, rows: np.ndarray) -> None:
         """Give back rows (n,), to which no cell may lead afterwards."""
         self.announce(rows)
-        self._rows[rows, COUNT] = 0.0
+        self._rows.values[rows, COUNT] = 0.0
         self._free = np.concatenate([self._free, rows])
 
     def remove(self, rows: np.ndarray, cells: np.ndarray) -> None:
@@ -119,14 +111,14 @@ class BlockStore:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
         reused, self._free = self._free[:number], self._free[number:]
         first, self._used = self._used, self._used + number - len(reused)
-        for array in (self._row_array, self._next_array, self._crossed_array):
+        for array in (self._rows, self._following, self._crossed):
             array.reserve(self._used)
         return np.concatenate([reused, np.arange(first, self._used)])
 
     def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks at `rows` (n,), none twice."""
         self.announce(rows)
-        self._crossed[rows] = np.minimum(self._crossed[rows] + beams, MOST_CROSSINGS)
+        self._crossed.values[rows] = np.minimum(self._crossed.values[rows] + beams, MOST_CROSSINGS)
 
 
 @compiled()

@@ -266,9 +266,7 @@ def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:
 def _known(noted: Blocks, free: MultiLevelSurfaceMap) -> np.ndarray:
     """Return (n,) which of the blocks, one per cell, are known for free at their height well enough."""
     there, _, owners = free.find(noted.cells)
-    joins = (there.bottom - noted.height[owners] < free.resolution) & (
-        noted.bottom[owners] - there.height < free.resolution
-    )
+    gap = np.maximum(there.bottom - noted.height[owners], noted.bottom[owners] - there.height)
     known = np.zeros(len(noted), dtype=bool)
-    known[owners[joins & (there.count >= _ENOUGH)]] = True
+    known[owners[(gap < free.resolution) & (there.count >= _ENOUGH)]] = True
     return known

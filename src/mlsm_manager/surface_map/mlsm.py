@@ -49,9 +49,8 @@ class MultiLevelSurfaceMap:
         The blocks come in the order in which `blocks` has them. The cost is that of the cells in the box.
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
-        return self._in_cells(*cells_of(np.clip([low, high], -self.limit, self.limit), self.resolution)).in_box(
-            low, high
-        )
+        first, last = cells_of(np.clip([low, high], -self.limit, self.limit), self.resolution)
+        return self._in_cells(first, last).in_box(low, high)
 
     def in_tiles(self, tiles: np.ndarray) -> Blocks:
         """Return a copy of the blocks of tiles (n, 2), none twice, as `take_changed_tiles` names them."""

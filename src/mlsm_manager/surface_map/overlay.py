@@ -62,5 +62,5 @@ class Overlay:
         new = np.setdiff1d(cell_keys(cells), self._cells)
         held, _, _ = self._map.find(cells_of_keys(new))
         self._cells = np.union1d(self._cells, new)
-        rows, crossed = ((self._held.rows, held.rows), (self._held.crossed, held.crossed))
-        self._held = Blocks(np.concatenate(rows), held.resolution, np.concatenate(crossed))
+        rows, crossed = np.append(self._held.rows, held.rows, axis=0), np.append(self._held.crossed, held.crossed)
+        self._held = Blocks(rows, held.resolution, crossed)

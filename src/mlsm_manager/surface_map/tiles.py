@@ -79,14 +79,8 @@ def box_lists(blocks: Blocks) -> BoxLists:
     power, tile = power[order], tile[order]
     is_start = np.append(True, (tile[1:] != tile[:-1]) | (power[1:] != power[:-1]))[: len(tile)]
     starts = np.flatnonzero(is_start)
-    return BoxLists(
-        cells_of_keys(tile[starts]),
-        power[starts],
-        np.append(starts, len(tile)),
-        centers[order],
-        owners[order],
-        blocks.resolution,
-    )
+    tiles, ends = cells_of_keys(tile[starts]), np.append(starts, len(tile))
+    return BoxLists(tiles, power[starts], ends, centers[order], owners[order], blocks.resolution)
 
 
 def _boxes(blocks: Blocks) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -4,7 +4,6 @@ import os
 from contextlib import suppress
 from itertools import count
 from pathlib import Path
-from typing import Optional
 
 from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
 from mlsm_manager.surface_map.map_file import ENDING, MapFileError, StoredMap, read_map
@@ -41,7 +40,7 @@ class MapFolder:
             if not len(stored):
                 raise MapFileError(f"{path}: not replaced, the map has no blocks")
             if not overwrite:
-                _kept(path)
+                _keep(path)
         export(stored, path, ExportOptions())
         return path
 
@@ -63,13 +62,9 @@ class MapFolder:
             raise MapFileError(f"{path}: {error.strerror or error}") from None
 
 
-def _kept(path: Path) -> Optional[Path]:
-    """Give the file a second name, the first that is free of NAME.1.mlsm, NAME.2.mlsm and so on, and return it."""
+def _keep(path: Path) -> None:
+    """Give the file a second name, the first that is free of NAME.1.mlsm, NAME.2.mlsm and so on."""
     for number in count(1):
-        kept = path.with_name(f"{path.stem}.{number}{path.suffix}")
-        try:
-            os.link(str(path), str(kept))
-        except FileExistsError:
-            continue
-        return kept
-    return None
+        with suppress(FileExistsError):
+            os.link(str(path), str(path.with_name(f"{path.stem}.{number}{path.suffix}")))
+            return

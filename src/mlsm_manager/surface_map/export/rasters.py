@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any
+from typing import Any, Tuple
 
 import numpy as np
 import yaml
@@ -43,11 +43,11 @@ def occupancy(occupied: Blocks, free: Blocks, low: float, high: float) -> Raster
     Blocks count that reach into the slice with any part. Raises ExportError for a raster that is too large.
     """
     layers = [blocks.take((blocks.height >= low) & (blocks.bottom <= high)) for blocks in (free, occupied)]
-    box = _Box.around(np.concatenate([blocks.cells for blocks in layers]))
-    values = np.full(box.shape, UNKNOWN, dtype=np.int8)
+    low_cell, shape = _box_around(np.concatenate([blocks.cells for blocks in layers]))
+    values = np.full(shape, UNKNOWN, dtype=np.int8)
     for blocks, value in zip(layers, (FREE, OCCUPIED)):
-        values[box.places(blocks)] = value
-    return Raster(values, box.low * occupied.resolution, occupied.resolution)
+        values[tuple((blocks.cells - low_cell).T[::-1])] = value
+    return Raster(values, low_cell * occupied.resolution, occupied.resolution)
 
 
 def elevation(blocks: Blocks) -> Raster:
@@ -55,32 +55,21 @@ def elevation(blocks: Blocks) -> Raster:
 
     Raises ExportError for a raster that is too large.
     """
-    box = _Box.around(blocks.cells)
-    values = np.full(box.shape, -np.inf)
-    np.maximum.at(values, box.places(blocks), blocks.height)
-    return Raster(np.where(np.isinf(values), np.nan, values), box.low * blocks.resolution, blocks.resolution)
+    low_cell, shape = _box_around(blocks.cells)
+    values = np.full(shape, -np.inf)
+    np.maximum.at(values, tuple((blocks.cells - low_cell).T[::-1]), blocks.height)
+    return Raster(np.where(np.isinf(values), np.nan, values), low_cell * blocks.resolution, blocks.resolution)
 
 
-@dataclass(frozen=True)
-class _Box:
-    """low: (2,) int64 the first cell. shape: rows and columns."""
-
-    low: np.ndarray
-    shape: tuple
-
-    @staticmethod
-    def around(cells: np.ndarray) -> "_Box":
-        if not len(cells):
-            return _Box(np.zeros(2, dtype=np.int64), (0, 0))
-        low, high = cells.min(axis=0), cells.max(axis=0)
-        columns, rows = (int(width) for width in high - low + 1)
-        if rows * columns > _MOST_CELLS:
-            raise ExportError(f"{columns} x {rows} cells, must be at most {_MOST_CELLS}; crop the map first")
-        return _Box(low, (rows, columns))
-
-    def places(self, blocks: Blocks) -> tuple:
-        cells = blocks.cells - self.low
-        return cells[:, 1], cells[:, 0]
+def _box_around(cells: np.ndarray) -> Tuple[np.ndarray, Tuple[int, int]]:
+    """Return the first cell (2,) int64 of the box around cells (n, 2), and its rows and columns."""
+    if not len(cells):
+        return np.zeros(2, dtype=np.int64), (0, 0)
+    low, high = cells.min(axis=0), cells.max(axis=0)
+    columns, rows = (int(width) for width in high - low + 1)
+    if rows * columns > _MOST_CELLS:
+        raise ExportError(f"{columns} x {rows} cells, must be at most {_MOST_CELLS}; crop the map first")
+    return low, (rows, columns)
 
 
 def write_map_server(path: Path, grid: Raster) -> None:
