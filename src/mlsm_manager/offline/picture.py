@@ -8,9 +8,8 @@ from typing import Optional, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.collections import PatchCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import Ellipse, PathPatch
+from matplotlib.patches import PathPatch
 from matplotlib.path import Path as Outline
 
 from mlsm_manager.report.mission import Path as Trajectory
@@ -20,8 +19,7 @@ from node_support.files import write_whole
 
 _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
 _DOUBT_COLOR = "#cc3377"
-_ELLIPSE_DEVIATIONS = 2.0
-_MOST_ELLIPSES = 40  # more would hide the path
+_MOST_ELLIPSES = 40
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
 _LINE_STYLES = ("-", "--", ":", "-.")
 
@@ -59,20 +57,11 @@ def draw_map(
 
 
 def _draw_uncertainty(axes: Axes, path: Trajectory, uncertainty: Uncertainty) -> None:
-    shown, ellipses = slice(None, None, max(1, len(uncertainty.times) // _MOST_ELLIPSES)), []
-    times = uncertainty.times[shown]
-    centers = np.column_stack([np.interp(times, path.times, path.poses[:, axis]) for axis in (0, 1)])
-    for center, covariance in zip(centers, uncertainty.covariances[shown]):
-        values, vectors = np.linalg.eigh(covariance)
-        width, height = 2.0 * _ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0))
-        angle = np.degrees(np.arctan2(vectors[1, 0], vectors[0, 0]))
-        ellipses.append(Ellipse(tuple(center), width, height, angle=angle))
-    axes.add_collection(PatchCollection(ellipses, facecolor="none", edgecolor=_DOUBT_COLOR, linewidth=0.8, zorder=6))
+    axes.plot(*uncertainty.ellipses(path, _MOST_ELLIPSES).T, color=_DOUBT_COLOR, linewidth=0.8, zorder=6)
     axes.plot([], [], "o", markerfacecolor="none", color=_DOUBT_COLOR, label="two standard deviations")
-    for number, (start, end) in enumerate(uncertainty.doubtful):
-        label = "doubtful" if number == 0 else None
-        stretch = path.poses[(path.times >= start) & (path.times <= end), :2]
-        axes.plot(*stretch.T, color=_DOUBT_COLOR, linewidth=6.0, alpha=0.35, label=label, zorder=4)
+    doubtful = uncertainty.doubtful_parts(path)
+    if len(doubtful):
+        axes.plot(*doubtful.T, color=_DOUBT_COLOR, linewidth=6.0, alpha=0.35, label="doubtful", zorder=4)
 
 
 def _draw_blocks(axes: Axes, blocks: Blocks) -> None:

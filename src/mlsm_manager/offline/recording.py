@@ -12,7 +12,6 @@ from node_support.geometry import composed, inverse, matrices, transformed
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
-from recordings.motion.pose_track import PoseTrack
 from recordings.reader import Request, read
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
@@ -22,8 +21,7 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
 # s of odometry around the end of a scan: the slowest turn of a head, and the largest sonar_delay.
-_BEFORE = 60.0
-_AFTER = 10.0
+_BEFORE, _AFTER = 60.0, 10.0
 
 
 @dataclass(frozen=True)
@@ -117,7 +115,8 @@ def read_recording(path: Path, request: Request) -> Recording:
         stamps = np.unique(recorded.stamps_ns)
     track = _track(tree, stamps, path, request)
     placed, unplaced = _placed(recorded, tree, path, request)
-    truth = None if content.truth is None else _truth(content.truth)
+    known = content.truth
+    truth = None if known is None else Truth(known.stamps_ns * 1e-9, known.translations[:, :2])
     return Recording(placed, recorded.refused + unplaced, track, truth, content.notes)
 
 
@@ -149,7 +148,3 @@ def _placed(recorded: RecordedBeams, tree: FrameTree, path: Path, request: Reque
         raise RecordingError(f"{path}: none of {len(stamps)} beams could be placed in {odom}: {reason}")
     order = sorted(placed, key=lambda index: (stamps[index], index))
     return [placed[index] for index in order], len(stamps) - len(placed)
-
-
-def _truth(track: PoseTrack) -> Truth:
-    return Truth(track.stamps_ns * 1e-9, track.translations[:, :2])

@@ -2,7 +2,7 @@
 
 import base64
 from io import BytesIO
-from typing import List, Tuple
+from typing import Tuple
 
 import numpy as np
 import plotly.graph_objects as go
@@ -13,15 +13,13 @@ from mlsm_manager.surface_map.blocks import Blocks
 
 SCAN_TRACE = "scan at the chosen time"
 VEHICLE_TRACE = "vehicle at the chosen time"
-_MOST_ELLIPSES = 60  # more would hide the path
+_MOST_ELLIPSES = 60
 _MOST_BLOCKS = 100_000  # in 3-D: with more, computers without a graphics card can hardly turn the view
 _MOST_PATH_POINTS = 5000  # of a path: more cannot be told apart on a screen
-_ELLIPSE_DEVIATIONS = 2.0
 _DOUBT = "#cc3377"
 _SCAN = "#e07b00"
 _LEAST_EXTENT = 0.08  # of the longest side: keeps a flat map from being a line
 _FULL_VIEW = 2.0  # plotly's unit of length: the longest side then fills the view
-_ELLIPSE_ANGLES = np.linspace(0.0, 2.0 * np.pi, 25)
 _MOST_PIXELS = 4000  # of a side: more makes browsers slow; beyond it several cells share a pixel
 _COLOR = (150, 40, 30)
 _FAINTEST = 0.35  # opacity of a cell with one point: still seen on white
@@ -94,8 +92,7 @@ def correction_over_time(mission: Mission) -> go.Figure:
     odometry = mission.paths[0]
     for path in mission.paths[1:]:
         shown = thinned(path)
-        columns = [np.interp(shown.times, odometry.times, odometry.poses[:, axis]) for axis in (0, 1)]
-        distance = np.hypot(shown.poses[:, 0] - columns[0], shown.poses[:, 1] - columns[1])
+        distance = np.hypot(*(shown.poses[:, :2] - odometry.at(shown.times)).T)
         _add_line(figure, shown.times - mission.start, distance, f"{path.name} from {odometry.name}", path.color)
     if mission.uncertainty is not None:
         uncertainty = mission.uncertainty
@@ -129,28 +126,11 @@ def thinned(path: Path) -> Path:
 
 
 def _add_uncertainty(figure: go.Figure, best: Path, uncertainty: Uncertainty) -> None:
-    shown = slice(None, None, max(1, len(uncertainty.times) // _MOST_ELLIPSES))
-    centers = np.column_stack([np.interp(uncertainty.times[shown], best.times, best.poses[:, axis]) for axis in (0, 1)])
-    x, y = _ellipses(centers, uncertainty.covariances[shown])
+    x, y = uncertainty.ellipses(best, _MOST_ELLIPSES).astype(np.float32).T
     _add_line(figure, x, y, "two standard deviations", _DOUBT, width=1)
-    gap = np.array([[np.nan, np.nan]])
-    stretches: List[np.ndarray] = []
-    for begin, end in uncertainty.doubtful:
-        inside = (best.times >= begin) & (best.times <= end)
-        stretches += [best.poses[inside, :2], gap]
-    if stretches:
-        places = np.concatenate(stretches)
-        _add_line(figure, places[:, 0], places[:, 1], "doubtful", "rgba(204,51,119,0.35)", width=9)
-
-
-def _ellipses(centers: np.ndarray, covariances: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return x and y of ellipses at centers (k, 2), with gaps between them."""
-    values, vectors = np.linalg.eigh(covariances)
-    axes = vectors * (_ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0)))[:, np.newaxis, :]
-    circle = np.stack([np.cos(_ELLIPSE_ANGLES), np.sin(_ELLIPSE_ANGLES)])
-    outline = centers[:, :, np.newaxis] + axes @ circle
-    closed = np.concatenate([outline, np.full((len(centers), 2, 1), np.nan)], axis=2).astype(np.float32)
-    return closed[:, 0].ravel(), closed[:, 1].ravel()
+    x, y = uncertainty.doubtful_parts(best).T
+    if len(x):
+        _add_line(figure, x, y, "doubtful", "rgba(204,51,119,0.35)", width=9)
 
 
 def _add_line(

@@ -8,6 +8,9 @@ import numpy as np
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 
+_ELLIPSE_DEVIATIONS = 2.0
+_ANGLES = np.append(np.linspace(0.0, 2.0 * np.pi, 25), np.nan)
+
 
 @dataclass(frozen=True)
 class ScanRecord:
@@ -33,6 +36,10 @@ class Path:
     times: np.ndarray
     poses: np.ndarray
 
+    def at(self, times: np.ndarray) -> np.ndarray:
+        """Return x y (..., 2) m in map at `times` (...) s."""
+        return np.stack([np.interp(times, self.times, self.poses[:, axis]) for axis in (0, 1)], axis=-1)
+
 
 @dataclass(frozen=True)
 class Uncertainty:
@@ -43,6 +50,23 @@ class Uncertainty:
     times: np.ndarray
     covariances: np.ndarray
     doubtful: np.ndarray
+
+    def ellipses(self, path: Path, most: int) -> np.ndarray:
+        """Return outlines (k, 2) m in map of two standard deviations at about `most` places of a path, NaN after each.
+
+        More would hide the path.
+        """
+        shown = slice(None, None, max(1, len(self.times) // most))
+        values, vectors = np.linalg.eigh(self.covariances[shown])
+        axes = vectors * (_ELLIPSE_DEVIATIONS * np.sqrt(np.maximum(values, 0.0)))[:, np.newaxis, :]
+        outlines = path.at(self.times[shown])[:, :, np.newaxis] + axes @ [np.cos(_ANGLES), np.sin(_ANGLES)]
+        return outlines.transpose(0, 2, 1).reshape(-1, 2)
+
+    def doubtful_parts(self, path: Path) -> np.ndarray:
+        """Return the places (k, 2) m in map of a path in the doubtful stretches, NaN after each stretch."""
+        inside = [(path.times >= begin) & (path.times <= end) for begin, end in self.doubtful]
+        parts = [np.append(path.poses[some, :2], [[np.nan, np.nan]], axis=0) for some in inside]
+        return np.concatenate([np.empty((0, 2)), *parts])
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from enum import Enum
 from html import escape
 from pathlib import Path
 from string import Template
-from typing import Dict, Iterable, List, Mapping, Sequence
+from typing import Dict, Iterable, List, Mapping, Sequence, Tuple
 
 import numpy as np
 from plotly.graph_objects import Figure
@@ -64,7 +64,7 @@ def report_page(mission: Mission) -> str:
         title=escape(mission.title),
         plotly=get_plotlyjs(),
         summary=f"{_lamp(of_run)} {_RUN_WORDS[of_run]}",
-        facts=_table(("", ""), [(escape(name), escape(value)) for name, value in mission.facts.items()]),
+        facts=_table(("", ""), _words(mission.facts)),
         checks=_table(("", "question", "what was found", ""), checks) if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
         above=_figure(map_from_above(mission), "above"),
@@ -73,7 +73,7 @@ def report_page(mission: Mission) -> str:
         health=_figure(sensor_health(mission), "health"),
         calibration=_calibration(mission),
         rejected=_rejected(mission),
-        parameters=_mapping(("parameter", "value"), mission.parameters),
+        parameters=_table(("parameter", "value"), _words(mission.parameters)),
         last_scan=len(mission.scans) - 1,
         scan_trace=SCAN_TRACE,
         vehicle_trace=VEHICLE_TRACE,
@@ -114,8 +114,8 @@ def _rejected(mission: Mission) -> str:
     return _table(("time [s]", "why"), rows) if rows else "<p>No scan was rejected.</p>"
 
 
-def _mapping(head: Sequence[str], values: Mapping[str, object]) -> str:
-    return _table(head, [(escape(name), escape(str(value))) for name, value in values.items()])
+def _words(values: Mapping[str, object]) -> List[Tuple[str, str]]:
+    return [(escape(name), escape(str(value))) for name, value in values.items()]
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
@@ -135,7 +135,7 @@ def light_of(verdict: Verdict) -> Light:
     return Light.AMBER if worse > _NEAR else Light.GREEN
 
 
-def light_of_run(lights: "list[Light]") -> Light:
+def light_of_run(lights: List[Light]) -> Light:
     """Return the light of the whole run: that of its worst check."""
     for light in (Light.RED, Light.AMBER, Light.GREEN):
         if light in lights:
@@ -154,14 +154,13 @@ def slider_json(mission: Mission) -> str:
 
     Points are little-endian int16 x y in hundredths of a metre from the vehicle, in base64.
     """
-    best = mission.best
     scans: List[Dict[str, object]] = []
     for scan in mission.scans:
-        vehicle = [float(np.interp(scan.time, best.times, best.poses[:, axis])) for axis in (0, 1)]
+        vehicle = mission.best.at(scan.time)
         scans.append(
             {
                 "time": round(scan.time - mission.start, 1),
-                "vehicle": [round(value, 2) for value in vehicle],
+                "vehicle": [round(value, 2) for value in vehicle.tolist()],
                 "echoes": len(scan.points),
                 "rejection": scan.rejection,
                 "points": _packed(scan.points[:, :2] - vehicle),
