@@ -22,14 +22,11 @@ def in_submaps(times: np.ndarray, apart: np.ndarray) -> Tuple[Verdict, ...]:
     if not apart.any():
         return ()
     step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
-    text = (
-        "the place of some scans in the map is unknown since a silence of the sonar: they fit nowhere, or at several "
-    )
-    text += f"places ({np.count_nonzero(apart)} of {len(apart)} scans in submaps of their own)"
+    text = "the place of some scans in the map is unknown since a silence of the sonar: they fit nowhere, or at "
+    text += f"several places ({np.count_nonzero(apart)} of {len(apart)} scans in submaps of their own)"
     question = "Is the place in the map of all scans known, also after the sonar heard nothing for a while?"
-    return (
-        Verdict("submaps", float(1.0 - apart.mean()), 1.0, text, True, merged(times[apart] - step, step), question),
-    )
+    doubtful = merged(times[apart] - step, step)
+    return (Verdict("submaps", float(1.0 - apart.mean()), 1.0, text, True, doubtful, question),)
 
 
 def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> Verdict:
@@ -60,9 +57,7 @@ def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> V
     return Verdict(name, lowest, limit, text, True, doubtful, question)
 
 
-def recent_agreement(
-    times: np.ndarray, agreements: np.ndarray, scans: int = 20, limit: float = 0.5, agrees: float = _AGREES
-) -> Verdict:
+def recent_agreement(times: np.ndarray, agreements: np.ndarray, scans: int = 20, limit: float = 0.5) -> Verdict:
     """Return the share of the last `scans` scans that agree with the map.
 
     times: (n,) s of the ends of scans that heard something. agreements: (n,) share of each scan's points that lie on
@@ -71,11 +66,10 @@ def recent_agreement(
     name, question = "scans on the map", "Do the newest scans lie on the map that earlier scans made?"
     if len(agreements) < scans:
         return Verdict(name, np.nan, limit, f"fewer than {scans} scans that heard something", True, question=question)
-    total = np.cumsum(np.concatenate([[0.0], np.asarray(agreements) >= agrees]))
+    total = np.cumsum(np.concatenate([[0.0], np.asarray(agreements) >= _AGREES]))
     share = (total[scans:] - total[:-scans]) / scans
-    newest, doubtful = float(share[-1]), merged(
-        np.asarray(times)[: len(share)][share < limit], float(np.median(np.diff(times))) * (scans - 1)
-    )  # fmt: skip
+    newest, starts = float(share[-1]), np.asarray(times)[: len(share)][share < limit]
+    doubtful = merged(starts, float(np.median(np.diff(times))) * (scans - 1))
     figures = f"{percent(newest)} of the last {scans} scans, at least {percent(limit)} needed"
     text = f"the newest scans lie on the map ({figures})"
     if newest < limit:
@@ -110,16 +104,12 @@ def surfaces_tell(
     figures = f"weakest direction {percent(share, 1)} of the strongest, at least {percent(limit)} needed"
     text = f"walls tell the position in all directions ({figures})"
     if len(starts) and values[worst, 1] > 0.0:
+        x, y = vectors[worst, :, 0]
+        angle = round(float(np.degrees(np.arctan2(y, x)))) % 180
         text = (
-            f"position along {_degrees(vectors[worst, :, 0])} deg unknown since {moment(starts[0], begin)}: all walls "
+            f"position along {angle} deg unknown since {moment(starts[0], begin)}: all walls are parallel ({figures})"
         )
-        text += f"are parallel ({figures})"
     elif len(starts):
         text = f"position unknown since {moment(starts[0], begin)}: no walls were heard"
     doubtful = merged(starts, float(np.median(np.diff(times))) * (_SCANS - 1))
     return (Verdict(name, share, limit, text, True, doubtful, question),)
-
-
-def _degrees(direction: np.ndarray) -> int:
-    """Return the angle of a direction (2,) in map, from 0 to 179 degrees."""
-    return round(float(np.degrees(np.arctan2(direction[1], direction[0])))) % 180

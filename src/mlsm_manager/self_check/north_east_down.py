@@ -65,10 +65,8 @@ class ZDownSigns:
         figures = f"{percent(share)} of {self._pairs} pairs of scans fit better the other way, limit {percent(_SHARE)}"
         text = f"echoes turn as the odometry does ({figures})"
         if share > _SHARE:
-            text = (
-                "echoes turn against the odometry: it counts z down, or the head turns the other way than its driver "
-            )
-            text += f"says ({figures})"
+            text = "echoes turn against the odometry: it counts z down, or the head turns the other way than its "
+            text += f"driver says ({figures})"
         return Verdict(name, share, _SHARE, text, question=question)
 
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from mlsm_manager.self_check.verdict import Verdict, merged, percent
 
-_STEP = 14.0  # s between windows: about one turn of a head
+_WINDOW, _STEP = 350.0, 14.0  # s: about 25 scans, and between windows about one turn of a head
+_LIMIT = 4.0  # standard deviations of the odometry
+_SPREAD_LIMIT, _APART_LIMIT = 2.0, 3.0  # standard deviations of the path, and of a calibration
 _SHORTEST = 15.0  # m that the vehicle must have gone in a window, so that a ratio means something
 _HEADING_SPREAD = 0.05  # rad by which the direction of motion may differ along a run: compass and mounting
 _NOWHERE = np.empty((0, 2))
@@ -16,103 +18,94 @@ def against_odometry(
     times: np.ndarray,
     odometry: np.ndarray,
     corrected: np.ndarray,
-    window: float = 350.0,
     scale_deviation: float = 0.01,
     position_walk: float = 0.12,
-    limit: float = 4.0,
 ) -> Tuple[Verdict, Verdict]:
     """Return verdicts on the distances along and across the odometry's, in standard deviations of the odometry.
 
     A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step. The
     odometry's scale is known far better than that.
 
-    times: (m,) s. odometry, corrected: (m, >= 2) positions. window: s, about 25 scans. scale_deviation and
-    position_walk [m/sqrt(s)]: of the odometry.
+    times: (m,) s. odometry, corrected: (m, >= 2) positions. scale_deviation and position_walk [m/sqrt(s)]: of the
+    odometry.
     """
-    starts, by_odometry, ratio = _ratios(times, odometry, corrected, window)
-    walk = position_walk**2 * window / np.abs(by_odometry) ** 2
+    starts, by_odometry, ratio = _ratios(times, odometry, corrected)
+    walk = position_walk**2 * _WINDOW / np.abs(by_odometry) ** 2
     longer = np.abs(ratio) - 1.0
     turned = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
     along, across = longer / np.sqrt(scale_deviation**2 + walk), turned / np.sqrt(_HEADING_SPREAD**2 + walk)
     distance = "the corrected path is as long as the odometry says"
-    if _worst(along) > limit:
+    if _worst(along) > _LIMIT:
         worst = longer[np.argmax(np.abs(along))]
         side = "longer" if worst > 0.0 else "shorter"
         distance = f"the corrected path is {percent(abs(worst))} {side} than the odometry says"
     direction = "the corrected path turns as the odometry does"
-    if _worst(across) > limit:
+    if _worst(across) > _LIMIT:
         angle = np.degrees(np.abs(turned[np.argmax(np.abs(across))]))
         direction = f"the corrected path is turned by {angle:.0f} deg against the odometry"
     return (
         _against_limit(
-            "distance against odometry", distance, along, starts, window, limit,
+            "distance against odometry", distance, along, starts,
             "Is the corrected path as long as the odometry says, within what the odometry may err?",
         ),
         _against_limit(
-            "direction against odometry", direction, across, starts, window, limit,
+            "direction against odometry", direction, across, starts,
             "Does the corrected path turn as the odometry does, all along the run?",
         ),
     )  # fmt: skip
 
 
-def _against_limit(
-    name: str, text: str, deviations: np.ndarray, starts: np.ndarray, window: float, limit: float, question: str
-) -> Verdict:
+def _against_limit(name: str, text: str, deviations: np.ndarray, starts: np.ndarray, question: str) -> Verdict:
     """Return a verdict on deviations (n,) of windows from `starts` (n,) s on."""
     if not len(deviations):
-        text = f"the vehicle went less than {_SHORTEST:g} m in any {window:g} s"
-        return Verdict(name, np.nan, limit, text, question=question)
-    worst, doubtful = _worst(deviations), merged(starts[np.abs(deviations) > limit], window)
-    return Verdict(
-        name, worst, limit, f"{text} ({worst:.1f} standard deviations of the odometry, limit {limit:g})",
-        doubtful=doubtful, question=question,
-    )  # fmt: skip
+        text = f"the vehicle went less than {_SHORTEST:g} m in any {_WINDOW:g} s"
+        return Verdict(name, np.nan, _LIMIT, text, question=question)
+    worst, doubtful = _worst(deviations), merged(starts[np.abs(deviations) > _LIMIT], _WINDOW)
+    text += f" ({worst:.1f} standard deviations of the odometry, limit {_LIMIT:g})"
+    return Verdict(name, worst, _LIMIT, text, doubtful=doubtful, question=question)
 
 
 def _ratios(
-    times: np.ndarray, odometry: np.ndarray, corrected: np.ndarray, window: float
+    times: np.ndarray, odometry: np.ndarray, corrected: np.ndarray
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return of windows (n,) in which the vehicle goes far enough: starts [s], moves by the odometry as complex
     numbers [m], and the corrected moves over these.
     """
-    starts = np.arange(times[0], times[-1] - window, _STEP)
-    by_odometry, by_map = (_moves(times, path, starts, window) for path in (odometry, corrected))
+    starts = np.arange(times[0], times[-1] - _WINDOW, _STEP)
+    by_odometry, by_map = (_moves(times, path, starts) for path in (odometry, corrected))
     far = np.abs(by_odometry) > _SHORTEST
     return starts[far], by_odometry[far], by_map[far] / by_odometry[far]
 
 
-def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray, window: float) -> np.ndarray:
+def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray) -> np.ndarray:
     """Return moves (n,) as complex numbers [m] in windows from `starts` on."""
-    x, y = (
-        np.interp(starts + window, times, path[:, axis]) - np.interp(starts, times, path[:, axis]) for axis in (0, 1)
+    before, after = (
+        np.interp(when, times, path[:, 0]) + 1j * np.interp(when, times, path[:, 1])
+        for when in (starts, starts + _WINDOW)
     )
-    return x + 1j * y
+    return after - before
 
 
 def _worst(deviations: np.ndarray) -> float:
     return float(np.abs(deviations).max()) if len(deviations) else np.nan
 
 
-def settings_agree(times: np.ndarray, paths: np.ndarray, deviations: np.ndarray, limit: float = 2.0) -> Verdict:
+def settings_agree(times: np.ndarray, paths: np.ndarray, deviations: np.ndarray) -> Verdict:
     """Return how far paths of other settings or starts lie from the first one, in its stated standard deviations.
 
     times: (m,) s. paths: (k, m, >= 2), the first is the one that is told. deviations: (m,) m, 2-D standard deviations.
     The value is the root mean square over the run of the farthest path.
     """
-    name, question = (
-        "spread over settings",
-        "Does the path stay where it is when the solver's settings change a little?",
-    )
+    name, limit = "spread over settings", _SPREAD_LIMIT
+    question = "Does the path stay where it is when the solver's settings change a little?"
     if len(paths) < 2:
         return Verdict(name, np.nan, limit, "no path of other settings", question=question)
     distance = np.hypot(*np.moveaxis(paths[1:, :, :2] - paths[0, :, :2], 2, 0)) / deviations
     far = merged(times[(distance > limit).any(axis=0)], float(np.median(np.diff(times))))
     value = float(np.sqrt((distance**2).mean(axis=1)).max())
-    text = (
-        "the path depends on the solver's settings"
-        if value > limit
-        else "the solver's other settings find the same path"
-    )
+    text = "the solver's other settings find the same path"
+    if value > limit:
+        text = "the path depends on the solver's settings"
     text += f" ({value:.1f} of its standard deviations away, limit {limit:g})"
     return Verdict(name, value, limit, text, doubtful=far, question=question)
 
@@ -150,38 +143,33 @@ def per_minute(times: np.ndarray, deviations: np.ndarray) -> np.ndarray:
 
 
 def halves_agree(
-    names: Sequence[str],
-    first: np.ndarray,
-    first_deviations: np.ndarray,
-    second: np.ndarray,
+    names: Sequence[str], first: np.ndarray, first_deviations: np.ndarray, second: np.ndarray,
     second_deviations: np.ndarray,
-    limit: float = 3.0,
-) -> Verdict:
+) -> Verdict:  # fmt: skip
     """Return by how many deviations the halves' calibrations (n,) differ at most; `names` (n,) are what they are."""
     worst, distance = _most_apart(first, second, np.hypot(first_deviations, second_deviations))
-    found = f"{first[worst]:.3g} and {second[worst]:.3g}, {distance:.1f} standard deviations apart, limit {limit:g}"
+    found = f"{first[worst]:.3g} and {second[worst]:.3g}, {distance:.1f} standard deviations apart, "
+    found += f"limit {_APART_LIMIT:g}"
     text = f"both halves of the run find the same calibration ({names[worst]} {found})"
-    if distance > limit:
+    if distance > _APART_LIMIT:
         text = f"the halves of the run disagree on {names[worst]} ({found})"
     question = "Do the first and the second half of the run find the same errors of sonar and odometry?"
-    return Verdict("calibration of the halves", distance, limit, text, question=question)
+    return Verdict("calibration of the halves", distance, _APART_LIMIT, text, question=question)
 
 
-def as_expected(
-    names: Sequence[str], expected: np.ndarray, deviations: np.ndarray, found: np.ndarray, limit: float = 3.0
-) -> Verdict:
+def as_expected(names: Sequence[str], expected: np.ndarray, deviations: np.ndarray, found: np.ndarray) -> Verdict:
     """Return by how many deviations what a run `found` (n,) is from what was `expected` (n,) before it, at most.
 
     `names` (n,) are what they are; n > 0. deviations: (n,) standard ones of what was expected.
     """
     worst, distance = _most_apart(expected, found, deviations)
     before = f"expected {expected[worst]:.3g} +- {deviations[worst]:.3g}"
-    before += f", {distance:.1f} standard deviations away, limit {limit:g}"
+    before += f", {distance:.1f} standard deviations away, limit {_APART_LIMIT:g}"
     text = f"calibration as expected ({names[worst]} {found[worst]:.3g}, {before})"
-    if distance > limit:
+    if distance > _APART_LIMIT:
         text = f"{names[worst]} {found[worst]:.3g} is unlikely for such a device and mounting ({before})"
     question = "Are the errors of sonar and odometry as large as those of such devices, mounted as described?"
-    return Verdict("calibration as expected", distance, limit, text, question=question)
+    return Verdict("calibration as expected", distance, _APART_LIMIT, text, question=question)
 
 
 def _most_apart(first: np.ndarray, second: np.ndarray, deviations: np.ndarray) -> Tuple[int, float]:
