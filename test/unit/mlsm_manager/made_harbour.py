@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import inverse, rotated, transformed
+from node_support.geometry import rotated, transformed
 
 TURN = 14.0  # s per turn of the head
 BEAMS = 120
@@ -99,8 +99,3 @@ def _ranges(places: np.ndarray, angles: np.ndarray, corners: np.ndarray) -> np.n
     ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
     share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross
     return np.where((ranges > 0.0) & (share >= 0.0) & (share <= 1.0), ranges, np.inf).min(axis=1)
-
-
-def relative(path: np.ndarray) -> np.ndarray:
-    """Return positions (n, 2) of poses (n, 3) as seen from the first one."""
-    return transformed(inverse(path[0]), path[:, :2])

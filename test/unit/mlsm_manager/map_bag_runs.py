@@ -1,12 +1,10 @@
 """map_bag as it is run: with a command line, and what it leaves and says."""
 
 import json
-import sys
 
 from programs import ROOT, run_program
 
 BASIN = ROOT / "test/data/basin.bag"
-COMMAND = [sys.executable, str(ROOT / "nodes/map_bag")]
 
 
 def run(*arguments):

@@ -177,10 +177,13 @@ def test_a_jump_in_time_after_the_start_makes_the_place_unknown(stored):
         ("run.solver.nodes", np.zeros((3, 5))),
         ("run.scan_lengths", np.array([4])),
         ("run.solver.estimate.time", np.zeros(2)),
+        ("run.solver.estimate.node", None),
     ],
 )
 def test_a_run_that_does_not_fit_leaves_the_map_alone(stored, name, array):
-    localiser = resumed(replace(stored, arrays={**stored.arrays, name: array}))
+    assert name in stored.arrays
+    arrays = {key: value for key, value in {**stored.arrays, name: array}.items() if value is not None}
+    localiser = resumed(replace(stored, arrays=arrays))
     assert localiser.estimator.solver is None
     assert localiser.block_count == len(stored.shown)
     assert taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 1])[0].accepted

@@ -1,6 +1,6 @@
-"""Parts of the joint solver: parts of a turn, points, weights that fade out, the bounded frozen map, what is stored."""
+"""Parts of the joint solver: parts of a turn, points, weights that fade out, the bounded frozen map."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,18 +11,12 @@ from made_models import DVL, solution_of, solver_parameters
 from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
-from mlsm_manager.joint_solver.estimate import stacked, unstacked
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, SparseSolution, State
-from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
+from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 from mlsm_manager.scan_matching.scan import Scan, Track
-
-STEP = 1e-6
-TIMES = np.array([0.0, 14.0, 28.0])
-POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
-MOTION = Motion(TIMES, POSES, np.column_stack([TIMES, 0.3 * TIMES]))
 
 
 @pytest.fixture(scope="module")
@@ -211,39 +205,3 @@ def test_a_turn_without_echoes_has_as_many_parts():
         parts = parts_of(empty, 3, newest)
         assert len(parts) == 3
         assert np.all(np.diff([part.reference_time for part in parts]) > 0.0)
-
-
-@dataclass(frozen=True)
-class Drift:
-    values: np.ndarray
-
-
-@dataclass(frozen=True)
-class Estimate:
-    time: float
-    count: int
-    place: np.ndarray
-    drift: Drift
-
-
-ESTIMATES = [Estimate(0.5 * number, number, np.arange(3.0) + number, Drift(np.eye(2) * number)) for number in range(4)]
-
-
-def test_what_was_stacked_comes_back():
-    again = unstacked(Estimate, stacked(ESTIMATES, "a."), "a.")
-    assert [(one.time, one.count) for one in again] == [(one.time, one.count) for one in ESTIMATES]
-    for one, other in zip(again, ESTIMATES):
-        np.testing.assert_array_equal(one.place, other.place)
-        np.testing.assert_array_equal(one.drift.values, other.drift.values)
-
-
-def test_nothing_comes_back_as_nothing():
-    assert unstacked(Estimate, stacked([], "a."), "a.") == []
-
-
-def test_a_field_that_is_missing_or_of_another_length_is_refused():
-    arrays = stacked(ESTIMATES)
-    with pytest.raises(ValueError, match="elements"):
-        unstacked(Estimate, {**arrays, "time": arrays["time"][:2]})
-    with pytest.raises(KeyError, match="place"):
-        unstacked(Estimate, {name: array for name, array in arrays.items() if name != "place"})

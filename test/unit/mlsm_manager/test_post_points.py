@@ -6,7 +6,7 @@ from made_models import HEADING, followed, solver_parameters
 from made_posts import SPEED, cluttered, heard, true_path
 
 from mlsm_manager.joint_solver.batch_solver import solved
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, crowds, post_points
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = pytest.mark.long
@@ -56,11 +56,6 @@ def test_a_scan_without_echoes_has_none():
 def test_the_ray_to_the_echo_stands_for_its_normal():
     found = found_in(wall_and([6.0, -7.0], STRONG), np.array([1.0, 0.0]))
     np.testing.assert_allclose(found.normals, [[5.0, -7.0] / np.hypot(5.0, 7.0)])
-
-
-def test_points_are_counted_within_reach_themselves_included():
-    places = np.array([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0], [50.0, 0.0]])
-    np.testing.assert_allclose(crowds(places, np.full(4, 3.0)), [3.0, 3.0, 3.0, 1.0])
 
 
 def test_two_posts_side_by_side_are_found():
