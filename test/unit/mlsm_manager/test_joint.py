@@ -8,7 +8,6 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
-from node_support.errors import RefusedInput
 
 SCANS = tour(12).scans
 PARAMETERS = MlsmCoreParameters(
@@ -84,13 +83,6 @@ def test_a_long_silence_is_followed_by_the_odometry():
     assert localiser.believed_until == later
     update = localiser.take_scan(SCANS[9]).scan
     assert np.hypot(*(update.belief.theta[:2] - SCANS[9].reference_pose[:2])) < 0.5
-
-
-def test_a_scan_that_comes_twice_is_refused_and_the_run_goes_on():
-    localiser, _ = localiser_after(3)
-    with pytest.raises(RefusedInput, match="the one before at"):
-        localiser.take_scan(SCANS[2])
-    assert localiser.take_scan(SCANS[3]).scan.accepted
 
 
 def test_a_run_says_whether_it_can_be_trusted(run):

@@ -178,7 +178,7 @@ def gicp_match(scan, target, expected):
     return GicpMatcher().match(scan, target, prior_of_pose(scan, expected))
 
 
-@settings(max_examples=25)
+@settings(max_examples=10)
 @given(
     st.floats(-0.6, 0.6), st.floats(-0.6, 0.6), st.floats(-0.05, 0.05),
     st.tuples(st.floats(-500.0, 500.0), st.floats(-500.0, 500.0), st.floats(-3.0, 3.0)),
