@@ -62,7 +62,9 @@ class ShiftSearch:
         tried: List[JudgedPath] = []
         idle = 0
         for _ in range(_ROUNDS):
-            new = [one for one in found if not any(_as_good(other, one) for other in tried)]
+            new = [
+                one for one in found if not any(_alike(one, known) and _hardly_better(one, known) for known in tried)
+            ]
             tried += new
             better = _distinct(found + [other for one in new for other in self._neighbours(one)])
             idle = 0 if better[0].log_likelihood > found[0].log_likelihood + _GAIN else idle + 1
@@ -145,9 +147,8 @@ def _alike(one: JudgedPath, other: JudgedPath) -> bool:
     return float(np.hypot(*(one.path - other.path).T).mean()) < _OTHER
 
 
-def _as_good(known: JudgedPath, one: JudgedPath) -> bool:
-    """Return whether `one` is about the same path as a `known` one, and hardly better."""
-    return _alike(known, one) and one.log_likelihood < known.log_likelihood + _GAIN
+def _hardly_better(one: JudgedPath, known: JudgedPath) -> bool:
+    return one.log_likelihood < known.log_likelihood + _GAIN
 
 
 def stretched_mean(search: ShiftSearch, path: np.ndarray) -> JudgedPath:

@@ -59,7 +59,8 @@ class BlockMarkers:
         packed, now = self._packed(blocks, header)
         for tile in tiles:
             gone = self._shown.pop(tile, 0) & ~now.get(tile, 0)
-            packed += [self._deletion(tile, kind, header) for kind in range(gone.bit_length()) if gone >> kind & 1]
+            for kind in (kind for kind in range(gone.bit_length()) if gone >> kind & 1):
+                packed.append(_serialized(_marker(kind + THINNEST, self._id(tile, kind), header, Marker.DELETE)))
         self._shown.update(now)
         return _array(packed)
 
@@ -96,9 +97,6 @@ class BlockMarkers:
         colors = block_colors(blocks, self._color_by, self._limits)[boxes.owners]
         colors = np.column_stack([colors, np.ones(len(colors))]).astype("<f4").tobytes()
         return (_list(points, _POINT_BYTES, *end) + _list(colors, _COLOR_BYTES, *end) for end in ends)
-
-    def _deletion(self, tile: Tile, kind: int, header: Header) -> bytes:
-        return _serialized(_marker(kind + THINNEST, self._id(tile, kind), header, Marker.DELETE))
 
     def _id(self, tile: Tile, kind: int) -> int:
         """Return a number of 31 bits that no other tile and class of boxes have."""

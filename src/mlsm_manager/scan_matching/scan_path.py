@@ -70,7 +70,8 @@ class PlanarMotion:
         turn, by_odometry, by_rate = self._steps(theta)
         middle = (self._tau[1:] + self._tau[:-1]) / 2.0
         steps = rotated(by_odometry + by_rate, turn)
-        along = self._seconds[:, np.newaxis] * _unit(turn + self._middle_heading())
+        heading = turn + self._middle_heading()
+        along = self._seconds[:, np.newaxis] * np.column_stack([np.cos(heading), np.sin(heading)])
         scaled = rotated(self._step, turn + theta[DIRECTION])
         columns = {
             YAW: steps,
@@ -147,10 +148,6 @@ def _sum_to_end(steps: np.ndarray) -> np.ndarray:
     result = np.zeros((len(steps) + 1, 2))
     result[:-1] = -np.cumsum(steps[::-1], axis=0)[::-1]
     return result
-
-
-def _unit(angle: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def _quarter_turn(vectors: np.ndarray) -> np.ndarray:

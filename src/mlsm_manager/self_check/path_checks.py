@@ -72,18 +72,11 @@ def _ratios(
     numbers [m], and the corrected moves over these.
     """
     starts = np.arange(times[0], times[-1] - _WINDOW, _STEP)
-    by_odometry, by_map = (_moves(times, path, starts) for path in (odometry, corrected))
+    ends = starts + _WINDOW
+    paths = (path[:, 0] + 1j * path[:, 1] for path in (odometry, corrected))
+    by_odometry, by_map = (np.interp(ends, times, path) - np.interp(starts, times, path) for path in paths)
     far = np.abs(by_odometry) > _SHORTEST
     return starts[far], by_odometry[far], by_map[far] / by_odometry[far]
-
-
-def _moves(times: np.ndarray, path: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    """Return moves (n,) as complex numbers [m] in windows from `starts` on."""
-    before, after = (
-        np.interp(when, times, path[:, 0]) + 1j * np.interp(when, times, path[:, 1])
-        for when in (starts, starts + _WINDOW)
-    )
-    return after - before
 
 
 def _worst(deviations: np.ndarray) -> float:

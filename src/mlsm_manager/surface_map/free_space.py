@@ -246,8 +246,12 @@ class Carver:
 
 
 def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> None:
-    """Put into `free` which of the blocks, one per cell, are not known well enough to be free."""
-    free.insert_blocks(noted.take(~_known(noted, free)))
+    """Put into `free` which of the blocks, one per cell, are not known well enough to be free at their height."""
+    there, _, owners = free.find(noted.cells)
+    gap = np.maximum(there.bottom - noted.height[owners], noted.bottom[owners] - there.height)
+    known = np.zeros(len(noted), dtype=bool)
+    known[owners[(gap < free.resolution) & (there.count >= _ENOUGH)]] = True
+    free.insert_blocks(noted.take(~known))
 
 
 def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:
@@ -261,12 +265,3 @@ def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:
     rows[:, TOP] = np.maximum.reduceat(paths.height, paths.starts)
     rows[:, 2] = (rows[:, BOTTOM] + rows[:, TOP]) / 2.0
     return Blocks(rows, resolution)
-
-
-def _known(noted: Blocks, free: MultiLevelSurfaceMap) -> np.ndarray:
-    """Return (n,) which of the blocks, one per cell, are known for free at their height well enough."""
-    there, _, owners = free.find(noted.cells)
-    gap = np.maximum(there.bottom - noted.height[owners], noted.bottom[owners] - there.height)
-    known = np.zeros(len(noted), dtype=bool)
-    known[owners[(gap < free.resolution) & (there.count >= _ENOUGH)]] = True
-    return known

@@ -165,7 +165,9 @@ def _steps(shares: np.ndarray) -> np.ndarray:
 def _blocks(columns: Mapping[str, np.ndarray], resolution: float, greatest_deviation: float) -> Blocks:
     if not (np.isfinite([resolution, greatest_deviation]).all() and resolution > 0.0 and greatest_deviation > 0.0):
         raise ValueError(f"resolution {resolution} m")
-    _check_columns(columns)
+    for name, kind in _COLUMNS.items():
+        if columns[name].dtype != kind or columns[name].shape != (len(columns["x"]),):
+            raise ValueError(f"column {name}: {columns[name].dtype} {columns[name].shape}")
     cells = np.cumsum(np.column_stack([columns["x"], columns["y"]]).astype(np.int64), axis=0)
     if np.abs(cells).max(initial=0) > _GREATEST_CELL:
         raise ValueError("cells out of range")
@@ -183,9 +185,3 @@ def _blocks(columns: Mapping[str, np.ndarray], resolution: float, greatest_devia
     if not np.isfinite(rows).all() or (count < 1.0).any() or (bottom > top).any():
         raise ValueError("blocks that are not finite, without points, or with bottom above top")
     return Blocks(rows, resolution, columns["crossed"])
-
-
-def _check_columns(columns: Mapping[str, np.ndarray]) -> None:
-    for name, kind in _COLUMNS.items():
-        if columns[name].dtype != kind or columns[name].shape != (len(columns["x"]),):
-            raise ValueError(f"column {name}: {columns[name].dtype} {columns[name].shape}")

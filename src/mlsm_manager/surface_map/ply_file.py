@@ -25,7 +25,15 @@ _ROUNDING = 1e-6  # of a mean, which is summed up from many points and may leave
 
 def write_ply(path: Path, blocks: Blocks) -> None:
     """Write the blocks whole or not at all; raises OSError when the folder cannot be written."""
-    write_whole(path, _header(blocks).encode("ascii") + _vertices(blocks).tobytes())
+    header = (
+        f"ply\nformat binary_little_endian 1.0\ncomment multi level surface map, resolution {blocks.resolution!r} m\n"
+    )
+    header += f"element vertex {len(blocks)}\n{_properties()}end_header\n"
+    columns = [*blocks.mean.T, *blocks.variance.T, blocks.bottom, blocks.height, blocks.count, blocks.type]
+    vertices = np.empty(len(blocks), dtype=_ROW)
+    for (name, _), column in zip(_FIELDS, columns):
+        vertices[name] = column
+    write_whole(path, header.encode("ascii") + vertices.tobytes())
 
 
 def read_ply(path: Path) -> Blocks:
@@ -78,18 +86,5 @@ def _check(path: Path, vertices: np.ndarray) -> None:
             raise ValueError(f"{path}: {np.count_nonzero(~holds)} of {len(holds)} blocks have {fault}; it is damaged")
 
 
-def _header(blocks: Blocks) -> str:
-    comment = f"comment multi level surface map, resolution {blocks.resolution!r} m\n"
-    return f"ply\nformat binary_little_endian 1.0\n{comment}element vertex {len(blocks)}\n{_properties()}end_header\n"
-
-
 def _properties() -> str:
     return "".join(f"property {_PLY_TYPES[kind]} {name}\n" for name, kind in _FIELDS)
-
-
-def _vertices(blocks: Blocks) -> np.ndarray:
-    columns = [*blocks.mean.T, *blocks.variance.T, blocks.bottom, blocks.height, blocks.count, blocks.type]
-    vertices = np.empty(len(blocks), dtype=_ROW)
-    for (name, _), column in zip(_FIELDS, columns):
-        vertices[name] = column
-    return vertices
