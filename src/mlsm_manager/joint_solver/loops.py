@@ -9,6 +9,7 @@ from typing import List, Optional
 
 import numpy as np
 
+from mlsm_manager.joint_solver.map_support import Surfaces
 from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -95,7 +96,10 @@ def _loop(points: PlacedPoints, scan: int, parameters: SolverParameters) -> Opti
     sources = points.selected(own[:: max(1, len(own) // MOST_POINTS)])
     middle, radius = sources.places.mean(axis=0), np.ptp(sources.places, axis=0).max() + REACH * _DRIFT
     targets = points.selected(older & (np.abs(points.places - middle).max(axis=1) < radius))
-    found = best_place(Freedom.as_one(_DRIFT**2 * np.eye(2), np.ones(1), 2), sources, targets, parameters)
+    surfaces = Surfaces(targets, parameters)
+    if not len(targets) or surfaces.shares(sources, sources.places[np.newaxis])[0] > 1.0 - _GAIN:
+        return None
+    found = best_place(Freedom.as_one(_DRIFT**2 * np.eye(2), np.ones(1), 2), sources, surfaces)
     if not found.is_certain or found.fit < found.fit_before + _GAIN:
         return None
     distance = np.hypot(*(targets.places[:, np.newaxis] - sources.places - found.shift).transpose(2, 0, 1)).min(axis=1)

@@ -23,37 +23,49 @@ Met = Sequence[Tuple[Pairs, PlacedPoints, PlacedPoints]]
 """Comparisons with the sets of points that they compare."""
 
 
-def map_support(
-    sources: PlacedPoints, targets: PlacedPoints, places: np.ndarray, parameters: SolverParameters
-) -> np.ndarray:
-    """Return how many of n sources (k,) lie on targets that face the same way, where they are at `places` (k, n, 2).
+class Surfaces:
+    """Points on surfaces, among which others look for the nearest one that faces the same way.
 
-    Each counts by its quality, and in part where it lies a little beside. Of each only the nearest target is looked at.
+    Surfaces from before the run do not say from which side they were heard.
     """
-    distance = surface_distances(sources, targets, places, parameters, parameters.cut, 1)
-    return (nearness(distance) * sources.qualities).sum(axis=1)
+
+    def __init__(self, points: PlacedPoints, parameters: SolverParameters) -> None:
+        self.points, self._parameters = points, parameters
+        self._tree, self._two_sided = cKDTree(points.places), points.scans == BEFORE_THE_RUN
+
+    def shares(self, sources: PlacedPoints, places: np.ndarray) -> np.ndarray:
+        """Return which share (k,) of n sources lies on surfaces where they are at `places` (k, n, 2); see `support`."""
+        return self.support(sources, places) / sources.qualities.sum()
+
+    def support(self, sources: PlacedPoints, places: np.ndarray) -> np.ndarray:
+        """Return how many of n sources (k,) lie on surfaces where they are at `places` (k, n, 2).
+
+        Each counts by its quality, and in part where it lies a little beside. Of each only the nearest target is
+        looked at.
+        """
+        distance = self.distances(sources, places, self._parameters.cut, 1)
+        return (nearness(distance) * sources.qualities).sum(axis=1)
+
+    def distances(self, sources: PlacedPoints, places: np.ndarray, reach: float, candidates: int) -> np.ndarray:
+        """Return how far (k, n) [m] n sources at `places` (k, n, 2) are from the nearest point that faces the same way.
+
+        It is sought among so many `candidates`, the nearest points within `reach` [m]; infinity where none does.
+        """
+        shape = (*places.shape[:2], candidates)
+        ranks = np.arange(1, candidates + 1)
+        distance, index = self._tree.query(places.reshape(-1, 2), k=ranks, distance_upper_bound=reach)
+        distance, index = distance.reshape(shape), index.reshape(shape)
+        near = np.nonzero(np.isfinite(distance))
+        met = index[near]
+        cosine = np.einsum("na,na->n", sources.normals[near[1]], self.points.normals[met])
+        cosine = np.where(self._two_sided[met], np.abs(cosine), cosine)
+        distance[near] = np.where(cosine > self._parameters.min_cosine, distance[near], np.inf)
+        return distance.min(axis=2)
 
 
 def nearness(distance: np.ndarray) -> np.ndarray:
     """Return how far points count as lying on what is `distance` [m] away: 1 on it, 0 far off."""
     return np.exp(-0.5 * (distance / _CELL) ** 2)
-
-
-def surface_distances(
-    sources: PlacedPoints, targets: PlacedPoints, places: np.ndarray, parameters: SolverParameters,
-    reach: float, candidates: int,
-) -> np.ndarray:  # fmt: skip
-    """Return how far (k, n) [m] n sources at `places` (k, n, 2) are from the nearest target that faces the same way.
-
-    It is sought among so many `candidates`, the nearest targets within `reach` [m]; infinity where none of them does.
-    Surfaces from before the run do not say from which side they were heard.
-    """
-    tree, shape = cKDTree(targets.places), (*places.shape[:2], candidates)
-    distance, index = tree.query(places.reshape(-1, 2), k=np.arange(1, candidates + 1), distance_upper_bound=reach)
-    distance, index = distance.reshape(shape), np.where(index < len(targets), index, 0).reshape(shape)
-    cosine = np.einsum("na,knca->knc", sources.normals, targets.normals[index])
-    cosine = np.where((targets.scans == BEFORE_THE_RUN)[index], np.abs(cosine), cosine)
-    return np.where(cosine > parameters.min_cosine, distance, np.inf).min(axis=2)
 
 
 def shares_heard_before(solution: Solution, first: int) -> np.ndarray:
@@ -114,9 +126,8 @@ def _share(solution: Solution, turn: int) -> float:
     own = log.rows(parts * turn, parts * (turn + 1))
     if not len(before) or not len(own):
         return np.nan
-    sources, targets = (solution.placed(rows) for rows in (own, before))
-    here = sources.places[np.newaxis]
-    distances = surface_distances(sources, targets, here, solution.parameters, _SURROUNDINGS, _CANDIDATES)[0]
+    sources, surfaces = solution.placed(own), Surfaces(solution.placed(before), solution.parameters)
+    distances = surfaces.distances(sources, sources.places[np.newaxis], _SURROUNDINGS, _CANDIDATES)[0]
     known = np.isfinite(distances)
     total = sources.qualities[known].sum()
     if total <= _FEWEST_POINTS:

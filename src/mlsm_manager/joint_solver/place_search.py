@@ -10,7 +10,7 @@ from typing import List, NamedTuple, Optional, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.map_support import map_support, nearness
+from mlsm_manager.joint_solver.map_support import Surfaces, nearness
 from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import POSE, YAW, State
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -59,7 +59,7 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     before, own = log.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
-    search = _Search(solution, solution.placed(before), own)
+    search = _Search(solution, Surfaces(solution.placed(before), solution.parameters), own)
     if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
         state, step = search.turned(state, step)
     return search.beside(state, step, MOST_POINTS)[1]
@@ -84,7 +84,7 @@ def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int)
         return None
     sources = solution.placed(own[:: max(1, len(own) // MOST_POINTS)])
     targets = _map_around(solution, sources, REACH * motion.reach + parameters.cut)
-    return best_place(motion, sources, targets, parameters)
+    return best_place(motion, sources, Surfaces(targets, parameters))
 
 
 def submap_place(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
@@ -98,14 +98,14 @@ def submap_place(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
     sources = solution.placed(rows[:: max(1, len(rows) // _SUBMAP_POINTS)])
     freedom = Freedom.as_one(covariance, _shares_of_move(log, first), solution.odometry.width)
     targets = _map_around(solution, sources, REACH * freedom.reach + parameters.cut)
-    return best_place(freedom, sources, targets, parameters)
+    return best_place(freedom, sources, Surfaces(targets, parameters))
 
 
 class _Search(NamedTuple):
-    """What the newest scan is compared with. targets: of earlier scans. own: (n,) rows of the newest scan's points."""
+    """What the newest scan is compared with. own: (n,) rows of its points. surfaces: those of earlier scans."""
 
     solution: Solution
-    targets: PlacedPoints
+    surfaces: Surfaces
     own: np.ndarray
 
     def beside(self, state: State, step: np.ndarray, most: int) -> Tuple[float, np.ndarray]:
@@ -117,7 +117,7 @@ class _Search(NamedTuple):
         sources = solution.placed(self.own[:: max(1, len(self.own) // most)])
         shifts = places_within(step[:2, :2], _MOST_CELLS)
         ends = np.column_stack([np.zeros_like(shifts), shifts])
-        support = map_support(sources, self.targets, moved(sources, ends), parameters)
+        support = self.surfaces.support(sources, moved(sources, ends))
         found = POINT_WEIGHT * MOST_POINTS / most * support
         if parameters.post_confidence:
             found = found + parameters.post_confidence * _POST_WEIGHT * _post_support(solution, ends)

@@ -9,8 +9,7 @@ from typing import List, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.map_support import map_support
-from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.map_support import Surfaces
 from mlsm_manager.joint_solver.placement import PlacedPoints
 
 FEWEST_POINTS = 25
@@ -96,16 +95,14 @@ class PlaceCandidate:
         )
 
 
-def best_place(
-    freedom: Freedom, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters
-) -> PlaceCandidate:
-    """Return where `sources` fit best to `targets`; nowhere, with a fit of 0, where there are none of either."""
-    if not len(sources) or not len(targets):
+def best_place(freedom: Freedom, sources: PlacedPoints, surfaces: Surfaces) -> PlaceCandidate:
+    """Return where `sources` fit best to `surfaces`; nowhere, with a fit of 0, where there are none of either."""
+    if not len(sources) or not len(surfaces.points):
         return PlaceCandidate(freedom.of_nodes[:0, :, 0], np.zeros(2), 0.0, 0.0, 0.0, freedom.reach)
     shifts = places_within(freedom.of_place, _MOST_CELLS)
     few = sources.selected(np.arange(0, len(sources), max(1, len(sources) // _FEW_POINTS)))
-    shares = map_support(few, targets, moved(few, freedom.ends(shifts)), parameters) / few.qualities.sum()
-    found = [_refined(freedom, sources, targets, shift, parameters) for shift in _best_of(shifts, shares)]
+    shares = surfaces.shares(few, moved(few, freedom.ends(shifts)))
+    found = [_refined(freedom, sources, surfaces, shift) for shift in _best_of(shifts, shares)]
     total = sources.qualities.sum()
     best = int(np.argmax([POINT_WEIGHT * share * total - freedom.cost(ends) for ends, share in found]))
     ends, fit = found[best]
@@ -151,12 +148,12 @@ def _best_of(shifts: np.ndarray, shares: np.ndarray) -> List[np.ndarray]:
 
 
 def _refined(
-    freedom: Freedom, sources: PlacedPoints, targets: PlacedPoints, shift: np.ndarray, parameters: SolverParameters
+    freedom: Freedom, sources: PlacedPoints, surfaces: Surfaces, shift: np.ndarray
 ) -> Tuple[np.ndarray, float]:
     """Return the best moves (4,) of beginning and end of the scans about a shift (2,) of both, and the share there."""
     shifts = shift + grid(_ASIDE)
     ends = np.repeat(freedom.ends(shifts), len(freedom.beside), axis=0)
     ends[:, :2] += np.tile(freedom.beside, (len(shifts), 1))
-    shares = map_support(sources, targets, moved(sources, ends), parameters) / sources.qualities.sum()
+    shares = surfaces.shares(sources, moved(sources, ends))
     best = int(np.argmax(shares))
     return ends[best], float(shares[best])
