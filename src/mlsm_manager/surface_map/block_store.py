@@ -105,7 +105,7 @@ class BlockStore:
     def remove(self, rows: np.ndarray, cells: np.ndarray) -> None:
         """Forget the blocks in `rows` (n,), all of them in cells with keys `cells` (c,), none twice."""
         self.release(rows)
-        _unlink_released(self.arrays, self._index.slots(cells))
+        _unlink_released(self._rows, self._next_array.values, self._index.heads, self._index.slots(cells))
 
     def take(self, number: int) -> np.ndarray:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
@@ -122,18 +122,18 @@ class BlockStore:
 
 
 @compiled()
-def _unlink_released(store, slots):
+def _unlink_released(rows, following_row, heads, slots):
     """Let the chains of the cells at `slots` (c,) lead past rows without points."""
     for slot in slots:
-        before, row = NO_BLOCK, store.heads[slot]
+        before, row = NO_BLOCK, heads[slot]
         while row != NO_BLOCK:
-            following = store.following[row]
-            if store.rows[row, COUNT] > 0.0:
+            following = following_row[row]
+            if rows[row, COUNT] > 0.0:
                 before = row
             elif before == NO_BLOCK:
-                store.heads[slot] = following
+                heads[slot] = following
             else:
-                store.following[before] = following
+                following_row[before] = following
             row = following
 
 

@@ -45,13 +45,14 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
 
 def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups, resolution: float) -> None:
     slots = store.slots(cells)
-    runs, fused = _linked(groups, store.arrays, slots, resolution)
+    held = store.arrays
+    runs, fused = _linked(*groups, held.rows, held.following, held.heads, slots, resolution)
     if len(fused):
         store.release(fused)
     new = runs.row < 0
     runs.row[new] = store.take(int(np.count_nonzero(new)))
     store.announce(runs.row[runs.changed])
-    _write(runs, store.arrays, slots)
+    _write(*runs, *store.arrays, slots)
 
 
 @lru_cache(maxsize=None)
@@ -82,25 +83,26 @@ class Runs(NamedTuple):
 
 
 @compiled()
-def _linked(groups, store, slots, resolution):
+def _linked(new_rows, new_cell, new_crossed, rows, following, heads, slots, resolution):
     """Return the Runs of the cells at `slots` (c,) after the groups went into them, each cell at least one, and the row
     numbers (f,) of stored blocks that are part of others by then.
 
-    A merged block keeps the highest row of its parts. What is new resets its crossings: a beam has just hit it.
+    new_rows, new_cell, new_crossed: as Groups has them. rows, following, heads: as StoreArrays has them; numba takes
+    longer to look at a named tuple than at its arrays. A merged block keeps the highest row of its parts. What is new
+    resets its crossings: a beam has just hit it.
     """
-    new_rows, new_cell, new_crossed = groups
-    most = len(new_rows) + _stored_count(store.following, store.heads, slots)
+    most = len(new_rows) + _stored_count(following, heads, slots)
     blocks, row, owner = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
     crossed, changed = np.zeros(most, np.uint16), np.empty(most, np.bool_)
     parts, part_rows = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64)
     stored, fused = np.empty(most, np.int64), np.empty(most, np.int64)
     made, gone, group = 0, 0, 0
     for cell in range(len(slots)):
-        held = _stored_by_bottom(store.rows, store.following, store.heads[slots[cell]], stored)
-        reached, length, following = -np.inf, 0, 0
+        held = _stored_by_bottom(rows, following, heads[slots[cell]], stored)
+        reached, length, looked_at = -np.inf, 0, 0
         while True:
             new_bottom = new_rows[group, BOTTOM] if group < len(new_rows) and new_cell[group] == cell else np.inf
-            old_bottom = store.rows[stored[following], BOTTOM] if following < held else np.inf
+            old_bottom = rows[stored[looked_at], BOTTOM] if looked_at < held else np.inf
             bottom = min(new_bottom, old_bottom)
             if length and (bottom == np.inf or bottom - reached >= resolution):
                 changed[made], owner[made] = length > 1 or part_rows[0] < 0, cell
@@ -115,8 +117,8 @@ def _linked(groups, store, slots, resolution):
                 crossed[made] = max(crossed[made], new_crossed[group])
                 group += 1
             else:
-                parts[length], part_rows[length] = store.rows[stored[following]], stored[following]
-                following += 1
+                parts[length], part_rows[length] = rows[stored[looked_at]], stored[looked_at]
+                looked_at += 1
             reached = max(reached, parts[length, TOP])
             length += 1
     return Runs(blocks[:made], row[:made], owner[:made], crossed[:made], changed[:made]), fused[:gone]
@@ -187,13 +189,13 @@ def _row_of(rows, fused, gone):
 
 
 @compiled()
-def _write(runs, store, slots):
-    """Write the runs, which all have rows, into the store; `slots` (c,) are the cells' places."""
-    for run in range(len(runs.row)):
-        row, cell = runs.row[run], runs.cell[run]
-        if runs.changed[run]:
-            store.rows[row], store.crossed[row] = runs.blocks[run], runs.crossed[run]
-        if run == 0 or runs.cell[run - 1] != cell:
-            store.heads[slots[cell]] = row
-        is_last = run + 1 == len(runs.row) or runs.cell[run + 1] != cell
-        store.following[row] = NO_BLOCK if is_last else runs.row[run + 1]
+def _write(blocks, row_of, cell_of, crossed, changed, stored_rows, following, stored_crossed, heads, slots):
+    """Write Runs, which all have rows, into StoreArrays; `slots` (c,) are the cells' places."""
+    for run in range(len(row_of)):
+        row, cell = row_of[run], cell_of[run]
+        if changed[run]:
+            stored_rows[row], stored_crossed[row] = blocks[run], crossed[run]
+        if run == 0 or cell_of[run - 1] != cell:
+            heads[slots[cell]] = row
+        is_last = run + 1 == len(row_of) or cell_of[run + 1] != cell
+        following[row] = NO_BLOCK if is_last else row_of[run + 1]
