@@ -141,7 +141,8 @@ def test_a_line_without_a_ping360_is_not_connected(tmp_path, head, complaint):
 
 
 def test_a_stop_ends_the_scan_of_the_head_too(tmp_path):
-    with running(PING360, tmp_path / "sonar") as (scan, server):
+    sector = PING360.settings.changed({"sector_width_deg": 18.0})
+    with running(PING360, tmp_path / "sonar", sector) as (scan, server):
         assert scan.wait_for_more(2)
         assert scan.stop()
         end = time.monotonic() + PATIENCE

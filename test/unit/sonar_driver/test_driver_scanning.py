@@ -1,5 +1,7 @@
 """What the driver of every sonar does with its head: over faults, losses of the line and stops."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from emulated_drivers import IMAGENEX_852, PING360, PING360_REQUESTS, SONARS, Scanning, VirtualScan, free_udp_port
@@ -21,8 +23,9 @@ NAMES = [*SONARS, "ping360_udp", "ping360_requests_udp"]
 
 @pytest.fixture(params=BOTH_PORTS, ids=NAMES)
 def ends(request, tmp_path):
-    """Return a sonar, and a port of this computer."""
+    """Return a sonar whose head need not turn far before its first ping, and a port of this computer."""
     sonar, kind = request.param
+    sonar = replace(sonar, settings=sonar.settings.changed({"sector_width_deg": 18}))
     return sonar, str(tmp_path / "sonar") if kind == "serial" else free_udp_port()
 
 
