@@ -1,6 +1,5 @@
 """Sends damaged messages of other packages' sonars through adapters, scans and the laser scan: none may crash."""
 
-import math
 import random
 import struct
 from collections import Counter
@@ -10,6 +9,7 @@ from typing import Any, List
 import genpy
 import numpy as np
 from foreign_messages import DEFINITIONS, message_classes, sane_message, serialised
+from random_messages import RandomMessages
 
 from node_support.errors import RefusedInput
 from sonar_processing.beams.beam import Beam, PlacedBeam
@@ -20,9 +20,6 @@ from sonar_processing.scans.assembler import RevolutionCollector, ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan, planar_laser_scan
 
-_FLOATS = (0.0, -0.0, -1.0, 1e-40, 7.0, 400.0, 1e9, 3e38, math.nan, math.inf, -math.inf)
-_SECONDS = (0, 1, 2**31 - 1, 2**31, 2**32 - 1)
-_FRAMES = ("", "/", "/sonar", "so\0nar", "a" * 3000, "\u00fc \n")
 _DAMAGED_DEFINITIONS = 0.002  # Share: each takes 10 ms
 
 
@@ -32,7 +29,7 @@ class Fuzzer:
     def __init__(self, seed: int) -> None:
         self.outcomes: Counter[str] = Counter()
         self.crashes: List[str] = []
-        self._random = random.Random(seed)
+        self._random, self._source = random.Random(seed), RandomMessages(seed)
         self._parameters = SonarToCloudParameters()
         self._classes, self._reader = MessageClasses(), BeamReader(BeamMessageParameters())
         self._watch, self._assembler = HeadWatch(), ScanAssembler(self._parameters)
@@ -66,7 +63,7 @@ class Fuzzer:
         """Return a message of a kind, sane or damaged, as a subscriber to AnyMsg gets it."""
         made = sane_message(kind, number)
         if self._random.random() < 0.6:
-            self._spoil(made)
+            self._source.spoil(made)
         try:
             data = serialised(made)
         except genpy.SerializationError:
@@ -82,26 +79,6 @@ class Fuzzer:
             definition = self._damaged(DEFINITIONS[kind].encode()).decode(errors="replace")
             header.update(md5sum=str(number), message_definition=definition)
         return SimpleNamespace(_connection_header=header, _buff=data)
-
-    def _spoil(self, message: genpy.Message) -> None:
-        """Replace one field by what no driver should send."""
-        name, kind = self._random.choice(list(zip(message.__slots__, message._slot_types)))
-        if name == "header":
-            self._spoil_header(message.header)
-        elif kind == "uint8[]":
-            setattr(message, name, bytes(self._random.choice((0, 1, 3, 200, 4096, 5000))))
-        elif kind.endswith("[]"):
-            setattr(message, name, getattr(message, name) * self._random.choice((0, 1, 2, 100)))
-        elif kind.startswith("float"):
-            setattr(message, name, self._random.choice((*_FLOATS, self._random.uniform(-500.0, 500.0))))
-        else:
-            setattr(message, name, self._random.choice((0, 1, 2 ** int(kind[4:]) - 1)))
-
-    def _spoil_header(self, header: Any) -> None:
-        if self._random.random() < 0.5:
-            header.frame_id = self._random.choice(_FRAMES)
-        else:
-            header.stamp = genpy.Time(self._random.choice(_SECONDS), self._random.choice((0, 999_999_999)))
 
     def _damaged(self, data: bytes) -> bytes:
         changed = bytearray(data)

@@ -50,17 +50,20 @@ class RandomMessages:
             return self._filled(get_message_class(kind)())
         message = make()
         for _ in range(self._random.choice((0, 1, 1, 2, 4))):
-            self._spoil(message)
+            self.spoil(message)
         return message
 
-    def _spoil(self, message: genpy.Message) -> None:
+    def spoil(self, message: genpy.Message) -> None:
         """Replace one field, however deep it lies."""
         name, kind = self._random.choice(list(zip(message.__slots__, message._slot_types)))
         value = getattr(message, name)
         if isinstance(value, genpy.Message):
-            self._spoil(value)
-        elif isinstance(value, list) and value and isinstance(value[0], genpy.Message) and self._random.random() < 0.8:
-            self._spoil(self._random.choice(value))
+            self.spoil(value)
+        elif isinstance(value, list) and value and isinstance(value[0], genpy.Message):
+            if self._random.random() < 0.8:
+                self.spoil(self._random.choice(value))
+            else:
+                setattr(message, name, value * self._random.choice((0, 2, 100)))
         else:
             setattr(message, name, self._value(kind))
 
@@ -90,7 +93,8 @@ class RandomMessages:
     def _array(self, base: str, size: str) -> Any:
         count = int(size) if size else self._random.choice((0, 0, 1, 2, 7, 50))
         if base in ("uint8", "char"):
-            return bytes(self._random.getrandbits(8) for _ in range(count if size else count * 100))
+            length = count if size else count * 100
+            return self._random.getrandbits(8 * length + 8).to_bytes(length + 1, "little")[:length]
         values = [self._value(base) for _ in range(count)]
         return np.array(values, dtype=base) if base.startswith("float") and not size else values
 
