@@ -1,18 +1,47 @@
-"""Which values a parameter set takes, from where, and what it says of itself and of other values."""
+"""Which values a parameter set takes, from where, and what it says of itself, to dynamic_reconfigure too."""
 
+import ast
 import dataclasses
 import math
+import sys
+from enum import Enum
 
 import pytest
 import yaml
-from example_parameters import Color, ExampleParameters
 from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support import parameters as parameters_module
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameter_text import default_yaml, markdown_table
-from node_support.parameters import ParameterError, describe, with_defaults
+from node_support.parameters import ParameterError, ParameterSet, describe, parameter, with_defaults
+from node_support.ros.reconfigure_description import generator
+
+
+class Color(Enum):
+    """Two choices whose values differ from their names."""
+
+    RED = "red"
+    DEEP_BLUE = "deep+blue"
+
+
+@dataclasses.dataclass(frozen=True)
+class ExampleParameters(ParameterSet):
+    """A field of every type, and two that must fit together."""
+
+    radius: float = parameter(1.5, "how far", unit="m", low=0.0, high=10.0, thesis_name="minRadius")
+    count: int = parameter(20, "how many", low=1, high=1000)
+    fast: bool = parameter(False, "whether fast")
+    frame: str = parameter("odom", "which frame", tunable=False)
+    color: Color = parameter(Color.RED, "which color")
+    step: float = parameter(0.1, "how fine", low=0.0, expert="a tenth is fine enough")
+    inner: float = parameter(0.5, "not more than radius", unit="m", low=0.0)
+
+    def check(self):
+        """Refuse an inner radius that is not inside."""
+        if self.inner > self.radius:
+            raise ParameterError(f"inner = {self.inner}: must be at most radius = {self.radius}")
+
 
 RADIUS = "must be a number from 0 to 10 m"
 COUNT = "must be an integer from 1 to 1000"
@@ -221,3 +250,28 @@ def test_of_several_values_for_one_key_the_last_one_counts():
 def test_a_text_without_key_or_value_is_refused(text):
     with pytest.raises(ParameterError, match="--set"):
         assigned_values([text])
+
+
+@pytest.fixture
+def described(monkeypatch):
+    # The generator takes its output folders from the command line of a .cfg file, and wants it to be there.
+    monkeypatch.setattr(sys, "argv", ["Example.cfg", "devel", "share", "include", "python"])
+    return {entry["name"]: entry for entry in generator(ExampleParameters).group.parameters}
+
+
+def test_every_tunable_field_is_there_with_its_type_and_default(described):
+    assert {name: (entry["type"], entry["default"]) for name, entry in described.items()} == {
+        "radius": ("double", 1.5), "count": ("int", 20), "fast": ("bool", False), "color": ("str", "red"),
+        "step": ("double", 0.1), "inner": ("double", 0.5),
+    }  # fmt: skip
+
+
+def test_ranges_and_units_are_those_of_the_fields(described):
+    assert (described["radius"]["min"], described["radius"]["max"]) == (0.0, 10.0)
+    assert (described["count"]["min"], described["count"]["max"]) == (1, 1000)
+    assert described["radius"]["description"] == "how far [m]"
+
+
+def test_the_choices_of_an_enumeration_are_offered(described):
+    choices = ast.literal_eval(described["color"]["edit_method"])["enum"]
+    assert [(choice["name"], choice["value"]) for choice in choices] == [("RED", "red"), ("DEEP_BLUE", "deep+blue")]
