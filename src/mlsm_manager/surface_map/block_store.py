@@ -105,7 +105,8 @@ class BlockStore:
     def remove(self, rows: np.ndarray, cells: np.ndarray) -> None:
         """Forget the blocks in `rows` (n,), all of them in cells with keys `cells` (c,), none twice."""
         self.release(rows)
-        _unlink_released(self._rows, self._next_array.values, self._index.heads, self._index.slots(cells))
+        held = self.arrays
+        _unlink_released(held.rows, held.following, held.heads, self._index.slots(cells))
 
     def take(self, number: int) -> np.ndarray:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
