@@ -13,7 +13,7 @@ from tqdm import tqdm
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
 from mlsm_manager.offline.findings import Findings, Trust
-from mlsm_manager.offline.recording import Recording, read_recording, scans_of
+from mlsm_manager.offline.recording import Recording, read_recording, whole_turns
 from mlsm_manager.offline.refinement import Refined, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -71,7 +71,8 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
         odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
     parameters = _suited_parameters(recording, odometry, options)
     recording = recording.corrected(parameters.part(BeamCorrection))
-    scans = _scans(recording, parameters, options)
+    with _bar(len(recording.beams), "beam", "echoes") as bar:
+        scans = whole_turns(options.bags[0], recording, parameters.echoes(), bar.update)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)
     replayed = _replayed(recording, scans, parameters)
@@ -108,19 +109,6 @@ def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:
     advice += "; if the head turns the other way, set head_turns"
     for sign in signs.lines():
         print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
-
-
-def _scans(recording: Recording, parameters: ReplayParameters, options: Namespace) -> List[Scan]:
-    with _bar(len(recording.beams), "beam", "echoes") as bar:
-        scans = []
-        for scan, beams in scans_of(recording, parameters.echoes()):
-            scans.append(scan)
-            bar.update(beams)
-    if not scans:
-        raise RecordingError(
-            f"{options.bags[0]}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one"
-        )
-    return scans
 
 
 def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParameters) -> Replayed:

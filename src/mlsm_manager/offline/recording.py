@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Dict, Iterator, List, Optional, Tuple
+from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
@@ -96,6 +96,22 @@ def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[
         track = track_between(recording.track, min(end - _BEFORE, before), end + _AFTER)
         before = end
         yield Scan.from_stamps(found.points, found.time_stamps, end, track), len(turn)
+
+
+def whole_turns(
+    bag: Path, recording: Recording, echoes: EchoExtractorParameters, on_beams: Callable[[int], None] = lambda _: None
+) -> List[Scan]:
+    """Return the scans of the recording in `bag`; `on_beams` takes the number of beams of each.
+
+    Raises RecordingError where there is none.
+    """
+    scans = []
+    for scan, beams in scans_of(recording, echoes):
+        scans.append(scan)
+        on_beams(beams)
+    if not scans:
+        raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one")
+    return scans
 
 
 def track_between(track: Track, start: float, end: float) -> Track:

@@ -9,7 +9,7 @@ from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.recording import Recording, whole_turns
 from mlsm_manager.offline.replay import CORRECTED, Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Path as Trajectory
@@ -59,10 +59,7 @@ class Session:
 def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
     """Return the corrected recording and its scans. Raises RecordingError, and OSError, as `read` does."""
     recording = read(bag).corrected(parameters.part(BeamCorrection))
-    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
-    if not scans:
-        raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one")
-    return recording, scans
+    return recording, whole_turns(bag, recording, parameters.echoes())
 
 
 @contextmanager
