@@ -1,13 +1,13 @@
 """A vehicle tours a walled harbour; its odometry errs in direction and its beams are late. The truth is known."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Callable, List, Optional, Sequence
 
 import numpy as np
 
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import rotated, transformed
+from node_support.geometry import inverse, rotated, transformed
 
 TURN = 14.0  # s per turn of the head
 BEAMS = 120
@@ -55,6 +55,30 @@ def logged(scans: Sequence[Scan], sonar_in_base: np.ndarray = SONAR_IN_BASE) -> 
     for scan in scans:
         log.append(scan, 1.0)
     return log
+
+
+def selected(scan: Scan, rows: np.ndarray) -> Scan:
+    """Return a scan of some of its points."""
+    return replace(scan, points=scan.points[rows], times=scan.times[rows], moving=scan.moving[rows])
+
+
+def deaf(scans: Sequence[Scan], numbers: Sequence[int]) -> List[Scan]:
+    """Return scans of which those with `numbers` heard nothing."""
+    return [scan.without_points(scan.reference_time) if n in numbers else scan for n, scan in enumerate(scans)]
+
+
+def that_heard(scan: Scan, truth: Track, places: np.ndarray) -> Scan:
+    """Return a scan that heard `places` (n, 2) [m] instead, by a vehicle on the path `truth`."""
+    points = scan.points.copy()
+    points[:, :2] = transformed(scan.track.at(scan.times), transformed(inverse(truth.at(scan.times)), places))
+    return replace(scan, points=points)
+
+
+def with_wild_odometry(scan: Scan) -> Scan:
+    """Return a scan that leads to no solution."""
+    poses = scan.track.poses.copy()
+    poses[::2] = 1e200
+    return replace(scan, track=Track(scan.track.times, poses))
 
 
 def ahead(times: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from made_harbour import tour
+from made_harbour import selected, that_heard, tour
 from made_models import followed, solver_parameters
 
 from mlsm_manager.joint_solver.batch_solver import LoopClosure, solved, solved_part, with_loops_closed
@@ -12,7 +12,7 @@ from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.normal_equations import DELAY, RUN_COLUMNS
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import inverse, transformed
 
 pytestmark = pytest.mark.long
@@ -32,8 +32,7 @@ def astray(made, drift):
 
 def _heard_by(scan, number, track):
     points = transformed(track.at(scan.times), transformed(inverse(scan.track.at(scan.times)), scan.points))
-    heard = np.full(len(points), number not in DEAF)
-    return Scan(points[heard], scan.times[heard], scan.moving[heard], track, scan.reference_time)
+    return selected(replace(scan, points=points, track=track), np.full(len(points), number not in DEAF))
 
 
 def errors(solver, batch, track, made):
@@ -69,9 +68,8 @@ def test_noise_makes_no_loops():
     rng = np.random.RandomState(0)
 
     def noisy(scan):
-        points = scan.points.copy()
-        points[:, :2] = scan.track.at(scan.times)[:, :2] + rng.uniform(-30.0, 30.0, (len(points), 2))
-        return replace(scan, points=points)
+        places = scan.track.at(scan.times)[:, :2] + rng.uniform(-30.0, 30.0, (len(scan), 2))
+        return that_heard(scan, scan.track, places)
 
     solver = followed([noisy(scan) for scan in tour(40).scans])
     assert loops_of(solver.solution) == []
@@ -86,9 +84,7 @@ def test_a_canal_makes_no_loops():
         places = made.truth.at(scan.times)
         x = places[:, 0] + rng.uniform(-20.0, 20.0, len(scan.points))
         heard = np.column_stack([x, rng.choice([-12.0, 12.0], len(x)) + rng.normal(0.0, 0.1, len(x))])
-        points = scan.points.copy()
-        points[:, :2] = transformed(scan.track.at(scan.times), transformed(inverse(places), heard))
-        return replace(scan, points=points)
+        return that_heard(scan, made.truth, heard)
 
     solver = followed([between_walls(scan) for scan in made.scans])
     batch = solved(solver)
@@ -118,10 +114,7 @@ def among_furrows(scan, truth, rng):
     places = truth.at(scan.times)
     around = places[:, :2] + rng.uniform(-10.0, 10.0, (len(scan.points), 2))
     echoes = np.column_stack([around[:, 0], np.round(around[:, 1] / PITCH) * PITCH])
-    heard = transformed(inverse(places), echoes)
-    points = scan.points.copy()
-    points[:, :2] = transformed(scan.track.at(scan.times), heard)
-    return replace(scan, points=points)
+    return that_heard(scan, truth, echoes)
 
 
 def verdicts_of(scans):

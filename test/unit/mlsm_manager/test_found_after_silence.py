@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, tour
+from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, deaf, selected, tour
 from made_models import HEADING, solver_parameters
 
 from mlsm_manager.joint_solver.estimate import Turns
@@ -49,7 +49,7 @@ def no_scans(scans):
 
 
 def no_echoes(scans):
-    return [scan.without_points(scan.reference_time) for scan in scans]
+    return deaf(scans, range(len(scans)))
 
 
 def errors(session, truth):
@@ -150,10 +150,6 @@ def run_in(known):
     for scan in made.scans[-EAST:]:
         session.add(with_heading_only(selected(scan, scan.points[:, 0] > EDGE)))
     return session, made.truth
-
-
-def selected(scan, rows):
-    return Scan(scan.points[rows], scan.times[rows], scan.moving[rows], scan.track, scan.reference_time)
 
 
 def blocks_of(corners, spacing=0.5):

@@ -4,11 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, TURN, tour
+from made_harbour import SONAR_IN_BASE, TURN, selected, tour
 
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.surface_map.map_file import map_bytes, map_of_bytes
 from node_support.geometry import composed, transformed
 
@@ -68,7 +68,7 @@ def begun_anew(scans, origin=(12.0, -9.0, 0.4)):
 
 def sector_of(scan, beams=14):
     """Return the first beams of a scan, which hear one wall and say nothing of the way along it."""
-    return Scan(scan.points[:beams], scan.times[:beams], scan.moving[:beams], scan.track, scan.reference_time)
+    return selected(scan, np.arange(beams))
 
 
 def without_a_run(stored):

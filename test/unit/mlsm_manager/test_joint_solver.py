@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, tour
+from made_harbour import SONAR_IN_BASE, TURN, deaf, tour, with_wild_odometry
 from made_models import DVL_ODOMETRY, followed, solver_parameters
 
 from mlsm_manager.joint_solver.batch_solver import solved
@@ -12,7 +12,6 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import DIRECTION, DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.placement import solved_path
-from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry import composed
 
@@ -110,12 +109,6 @@ def test_a_scan_that_is_not_newer_is_refused_and_changes_nothing(made):
     np.testing.assert_array_equal(solver.state.nodes, before)
 
 
-def with_wild_odometry(scan):
-    poses = scan.track.poses.copy()
-    poses[::2] = 1e200
-    return replace(scan, track=Track(scan.track.times, poses))
-
-
 def test_a_scan_without_a_solution_is_refused_and_changes_nothing(made):
     solver, undisturbed = followed(made.scans[:6]), followed(made.scans[:6])
     with pytest.raises(RefusedInput, match="ends at"):
@@ -142,15 +135,14 @@ def test_the_second_scan_is_compared_with_the_first(live):
 
 
 def test_scans_without_echoes_are_bridged_by_the_odometry(made):
-    deaf = [without_points(scan) if 8 <= number < 14 else scan for number, scan in enumerate(made.scans)]
-    solver = followed(deaf)
+    solver = followed(deaf(made.scans, range(8, 14)))
     last = solver.estimates[-1]
     assert np.hypot(*(last.T_map_base - made.truth.at(last.time))[:2]) < 0.6
     assert solver.estimates[13].pose_covariance[0, 0] > solver.estimates[7].pose_covariance[0, 0]
 
 
 def test_a_run_that_begins_deaf_starts_at_the_odometry(made):
-    estimate = LiveSolver(DEFAULTS, SONAR_IN_BASE).add(without_points(made.scans[0]))
+    estimate = LiveSolver(DEFAULTS, SONAR_IN_BASE).add(made.scans[0].without_points(TURN))
     np.testing.assert_allclose(estimate.T_map_base, estimate.T_odom_base, atol=1e-9)
     assert estimate.comparisons == 0
 
@@ -167,7 +159,3 @@ def test_scans_agree_with_the_map_they_made_and_not_with_another(made, live):
     sure = DvlFactors(replace(DVL_ODOMETRY, position_walk=0.001, direction_deviation=0.001))
     solver = followed(tour(10).scans, replace(DEFAULTS, odometry=sure))
     assert solver.add(strange).agreement < 0.5
-
-
-def without_points(scan):
-    return Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), scan.track, scan.reference_time)

@@ -11,12 +11,13 @@ from made_models import DVL, solution_of, solver_parameters
 from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
+from mlsm_manager.joint_solver.estimate import LiveEstimate, stacked, unstacked
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, SparseSolution, State
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Track
 
 
 @pytest.fixture(scope="module")
@@ -174,6 +175,10 @@ def test_tracks_that_overlap_make_one_path_without_a_turn_in_its_yaw():
     assert np.ptp(whole.at(np.arange(0.0, 7.0, 0.5))[:, 2]) < 0.2
 
 
+def test_a_run_without_estimates_stores_none():
+    assert unstacked(LiveEstimate, stacked([], "a."), "a.") == []
+
+
 FIRST, SECOND = heard(2)
 
 
@@ -200,7 +205,7 @@ def test_one_part_is_the_scan_itself():
 
 
 def test_a_turn_without_echoes_has_as_many_parts():
-    empty = Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), SECOND.track, SECOND.reference_time)
+    empty = SECOND.without_points(SECOND.reference_time)
     for newest in (None, FIRST.reference_time):
         parts = parts_of(empty, 3, newest)
         assert len(parts) == 3

@@ -17,7 +17,7 @@ from mlsm_manager.scan_matching.distribution_matcher import (
     relocaliser,
 )
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.scan import MatchStatus, Scan
+from mlsm_manager.scan_matching.scan import MatchStatus
 from node_support.errors import RefusedInput
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
@@ -230,9 +230,7 @@ def test_without_matching_a_cloud_is_inserted_at_once():
 
 def test_an_empty_scan_is_rejected_and_nothing_breaks():
     estimator, _ = mapped([drifting(0), drifting(1)])
-    empty = drifting(2)
-    empty = Scan(np.empty((0, 4)), np.empty(0), np.empty(0, dtype=bool), empty.track, empty.reference_time)
-    assert estimator.add_scan(empty).result.status is MatchStatus.TOO_FEW_POINTS
+    assert estimator.add_scan(drifting(2).without_points(3 * SECONDS)).result.status is MatchStatus.TOO_FEW_POINTS
 
 
 def found(scan, estimator):

@@ -5,7 +5,7 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
-from made_harbour import CANAL, ahead, along_canal, tour
+from made_harbour import CANAL, ahead, along_canal, deaf, selected, tour
 from made_models import followed
 
 from mlsm_manager.joint_solver.batch_solver import solved
@@ -169,13 +169,8 @@ def test_thrusters_find_a_scale_that_is_30_percent_off(made):
     assert newest.node[column] == pytest.approx(0.3, abs=0.06)
 
 
-def silent(scan):
-    return replace(scan, points=np.empty((0, 4)), times=np.empty(0), moving=np.empty(0, dtype=bool))
-
-
 def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
-    scans = [silent(scan) if 8 <= number < 17 else scan for number, scan in enumerate(made.scans)]
-    solver = followed(scans, parameters(OdometryKind.HEADING))
+    solver = followed(deaf(made.scans, range(8, 17)), parameters(OdometryKind.HEADING))
     radii = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
     distance = np.hypot(*errors_of(solver, made)[:, :2].T)
     assert (np.diff(radii[8:17]) > 0.0).all()
@@ -186,8 +181,7 @@ def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
 def unheard_beyond(scan, reach):
     """Return a scan without the echoes from beyond `reach` [m]."""
     places = scan.track.at(scan.times)[:, :2]
-    kept = np.hypot(*(scan.points[:, :2] - places).T) < reach
-    return replace(scan, points=scan.points[kept], times=scan.times[kept], moving=scan.moving[kept])
+    return selected(scan, np.hypot(*(scan.points[:, :2] - places).T) < reach)
 
 
 def test_in_a_straight_canal_the_told_deviation_covers_the_error():

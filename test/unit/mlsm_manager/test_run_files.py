@@ -1,13 +1,12 @@
 """How map_bag takes recordings: corrected, scan by scan, and what it leaves of a run in its folder and says of it."""
 
 import json
-from dataclasses import replace
 
 import matplotlib.colors
 import matplotlib.image
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, tour
+from made_harbour import SONAR_IN_BASE, tour, with_wild_odometry
 from made_maps import blocks_of
 
 from mlsm_manager.offline.findings import Trust
@@ -187,12 +186,6 @@ def recording_of(made):
     beam = Beam(0, "sonar", 0.0, np.zeros(1, dtype=np.uint8), 1.0)
     mounting = matrices(composed(made.odometry.poses[0], np.append(SONAR_IN_BASE, 0.0))[np.newaxis])[0]
     return Recording([PlacedBeam(beam, mounting, False)], 0, made.odometry, None)
-
-
-def with_wild_odometry(scan):
-    poses = scan.track.poses.copy()
-    poses[::2] = 1e200
-    return replace(scan, track=Track(scan.track.times, poses))
 
 
 def test_a_scan_without_a_solution_is_left_out_and_counted_and_changes_nothing_else(made):
