@@ -65,10 +65,9 @@ class MappedBag:
 
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
+    odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
     if options.odometry is None:
         odometry = odometry_of(recording.track)
-    else:
-        odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
     parameters = _suited_parameters(recording, odometry, options)
     recording = recording.corrected(parameters.part(BeamCorrection))
     with _bar(len(recording.beams), "beam", "echoes") as bar:

@@ -137,10 +137,7 @@ def light_of(verdict: Verdict) -> Light:
 
 def light_of_run(lights: List[Light]) -> Light:
     """Return the light of the whole run: that of its worst check."""
-    for light in (Light.RED, Light.AMBER, Light.GREEN):
-        if light in lights:
-            return light
-    return Light.GREY
+    return next((light for light in (Light.RED, Light.AMBER, Light.GREEN) if light in lights), Light.GREY)
 
 
 def sentence(verdict: Verdict) -> str:

@@ -1,8 +1,6 @@
 """What is done with whole maps: moving, merging, cropping, comparing."""
 
 from dataclasses import dataclass, replace
-from typing import Tuple
-
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, MEAN, SQUARES, TOP, Blocks
@@ -60,10 +58,14 @@ def merged_blocks(first: Blocks, second: Blocks, T_first_second: LevelTransform)
     the cell of its mean. Number, mean and variance of all points together stay exact, bottom and top of all too; a
     point on the rim of its block can then count for a cell that lies up to one cell beside its own.
     """
-    surface_map = MultiLevelSurfaceMap(first.resolution, limit=np.inf, expected_blocks=len(first) + len(second))
-    surface_map.insert_blocks(first)
-    surface_map.insert_blocks(moved(second, T_first_second))
-    return surface_map.blocks
+    return _together(first, moved(second, T_first_second)).blocks
+
+
+def _together(first: Blocks, second: Blocks) -> MultiLevelSurfaceMap:
+    both = MultiLevelSurfaceMap(first.resolution, limit=np.inf, expected_blocks=len(first) + len(second))
+    both.insert_blocks(first)
+    both.insert_blocks(second)
+    return both
 
 
 def merged(first: StoredMap, second: StoredMap, T_first_second: LevelTransform) -> StoredMap:
@@ -101,19 +103,12 @@ def difference(first: Blocks, second: Blocks) -> Difference:
     """
     if first.resolution != second.resolution:
         raise ValueError(f"resolutions {first.resolution:g} m and {second.resolution:g} m: must be the same")
-    group_first, group_second = _groups(first, second)
+    both = _together(first, second)
+    group_first, group_second = _holders(both, first), _holders(both, second)
     common = np.intersect1d(group_first, group_second)
     in_first, in_second = np.isin(group_first, common), np.isin(group_second, common)
     shift = _tops(group_second, second.height)[common] - _tops(group_first, first.height)[common]
     return Difference(first.take(~in_first), second.take(~in_second), first.take(in_first), shift)
-
-
-def _groups(first: Blocks, second: Blocks) -> Tuple[np.ndarray, np.ndarray]:
-    """Return for blocks (n,) and (m,) the number of the block that they would be part of in one map."""
-    both = MultiLevelSurfaceMap(first.resolution, limit=np.inf, expected_blocks=len(first) + len(second))
-    both.insert_blocks(first)
-    both.insert_blocks(second)
-    return _holders(both, first), _holders(both, second)
 
 
 def _holders(surface_map: MultiLevelSurfaceMap, parts: Blocks) -> np.ndarray:
