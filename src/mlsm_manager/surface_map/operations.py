@@ -1,6 +1,7 @@
 """What is done with whole maps: moving, merging, cropping, comparing."""
 
 from dataclasses import dataclass, replace
+
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, MEAN, SQUARES, TOP, Blocks
