@@ -39,7 +39,7 @@ class Neighbours:
         For each source and each group of scans these are the nearest targets of other scans, and their shares add up
         to 1. targets: those of the beginning, perhaps moved. Raises ValueError for places that are not finite.
         """
-        if not len(sources) or not len(targets):
+        if not len(sources.scans) or not len(targets.scans):
             nothing = np.empty(0, dtype=np.int64)
             return nothing, nothing, np.empty(0), np.empty(0)
         for points in (sources, targets):
@@ -148,7 +148,7 @@ def summed(
 
 def _packed(points: PlacedPoints) -> np.ndarray:
     """Return points as rows (n, POINT_COLUMNS) of the compiled loops."""
-    rows = np.empty((len(points), POINT_COLUMNS))
+    rows = np.empty((len(points.scans), POINT_COLUMNS))
     rows[:, 0:2], rows[:, 2:4], rows[:, 4:6] = points.places, points.arms, points.normals
     rows[:, 6], rows[:, 7], rows[:, 8:12] = points.slants, points.shares, points.by_run.reshape(-1, 4)
     return rows

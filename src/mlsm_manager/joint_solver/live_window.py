@@ -224,10 +224,11 @@ class LiveWindow:
             yield self._run.submaps.within(pairs, sources, targets)
 
     def _move(self, step: np.ndarray) -> None:
-        nodes = step[: self._layout.run_start].reshape(-1, self._layout.width)
+        run_start = self._layout.run_start
+        nodes = step[:run_start].reshape(-1, self._layout.width)
         self._state.nodes[self._layout.first :] += nodes
         for column, most in _MOST_RUN_STEP.items():
-            self._state.run[column] += np.clip(step[self._layout.run_start + column], -most, most)
+            self._state.run[column] += np.clip(step[run_start + column], -most, most)
 
     @property
     def oldest(self) -> int:

@@ -10,7 +10,7 @@ from typing import Dict, NamedTuple, Optional, Protocol
 import numpy as np
 
 from mlsm_manager.joint_solver.normal_equations import POSE, YAW, Layout, NormalEquations
-from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product
+from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
 from mlsm_manager.scan_matching.prediction import Fading
 
 FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
@@ -194,7 +194,7 @@ class DvlFactors(OdometryModel):
 
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
         step = after.positions - before.positions
-        error = product(product(self.gain(nodes), turned(nodes[:, YAW])), step) - step
+        error = stretched(step, self.gain(nodes), nodes[:, YAW]) - step
         result = nodes.copy()
         result[:, 0] += error.real
         result[:, 1] += error.imag
@@ -208,34 +208,38 @@ class DvlFactors(OdometryModel):
 
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
         starts = layout.node_start(np.arange(layout.first, layout.last))
-        self._add_positions(equations, starts, nodes, motion)
-        add_compass(equations, starts, nodes, motion.durations, self._parameters.compass)
-        walk = self._parameters.direction_walk**2 * motion.durations
+        durations = motion.durations
+        self._add_positions(equations, starts, nodes, np.diff(motion.positions), durations)
+        add_compass(equations, starts, nodes, durations, self._parameters.compass)
+        walk = self._parameters.direction_walk**2 * durations
         add_walk(equations, starts, self.width, nodes[:, DIRECTION], DIRECTION, walk)
-        self._add_scale(equations, starts, nodes, motion.durations)
+        self._add_scale(equations, starts, nodes, durations)
 
     def _add_scale(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
     ) -> None:
         add_walk(equations, starts, self.width, nodes[:, SCALE], SCALE, np.zeros(len(starts)))
 
-    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
-        """Add the steps. Noise is one of the reported velocities, so the residuals are those per unit of scale.
+    def _add_positions(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, step: np.ndarray, durations: np.ndarray
+    ) -> None:
+        """Add the steps; step: (n,) x + i y [m] as reported.
 
-        The derivative by the scale contains that; else the fit would shrink the world to make them smaller.
+        Noise is one of the reported velocities, so the residuals are those per unit of scale. The derivative by the
+        scale contains that; else the fit would shrink the world to make them smaller.
         """
-        step, one = np.diff(motion.positions), np.ones(len(starts))
+        one = np.ones(len(starts))
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         turned_step = product(turned(nodes[:-1, DIRECTION] + yaw), step)
         scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
         change = np.diff(as_complex(nodes))
-        residual = change - (scaled - step) - self._carried(nodes[:-1], motion.durations)
-        weight = 1.0 / (self._parameters.position_walk**2 * motion.durations + _ROUNDING_VARIANCE)
+        residual = change - (scaled - step) - self._carried(nodes[:-1], durations)
+        weight = 1.0 / (self._parameters.position_walk**2 * durations + _ROUNDING_VARIANCE)
         for axis, part in ((0, np.real), (1, np.imag)):
             places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *self._carriers(axis))
             by_angle = -part(1j * scaled)
             slopes = (one, -one, by_angle, -part(turned_step) - part(residual), by_angle / 2.0, by_angle / 2.0)
-            slopes += tuple(-motion.durations for _ in self._carriers(axis))
+            slopes += tuple(-durations for _ in self._carriers(axis))
             columns = starts[:, np.newaxis] + np.array(places)
             equations.add(columns, np.column_stack(slopes), part(residual), weight)
 
@@ -328,8 +332,3 @@ def add_compass(
     kept = np.exp(-durations / compass.heading_correlation_time)
     variance = compass.heading_deviation**2 * (1.0 - kept**2) + compass.heading_walk**2 * durations
     add_forgetting(equations, starts, nodes.shape[1], nodes[:, YAW], YAW, kept, variance)
-
-
-def turned(angle: np.ndarray) -> np.ndarray:
-    """Return the complex numbers that turn by `angle` (...) [rad]."""
-    return np.exp(1j * angle)

@@ -1,6 +1,6 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Union
 
 import numpy as np
@@ -50,12 +50,18 @@ class GrowingArray:
 class Motion:
     """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
 
+    positions: (m,) complex x + i y [m] in odom.
+
     "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
     """
 
     times: np.ndarray
     poses: np.ndarray
     ahead: np.ndarray
+    positions: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", as_complex(self.poses))
 
     def __len__(self) -> int:
         return len(self.times)
@@ -68,11 +74,6 @@ class Motion:
     def durations(self) -> np.ndarray:
         """(m - 1,) s between the times."""
         return np.diff(self.times)
-
-    @property
-    def positions(self) -> np.ndarray:
-        """(m,) complex x + i y [m] in odom."""
-        return as_complex(self.poses)
 
 
 class OdometryLog:
@@ -176,3 +177,13 @@ def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     """
     real = first.real * second.real - first.imag * second.imag
     return real + 1j * (first.real * second.imag + first.imag * second.real)
+
+
+def turned(angle: np.ndarray) -> np.ndarray:
+    """Return the complex numbers that turn by `angle` (...) [rad]."""
+    return np.exp(1j * angle)
+
+
+def stretched(path: np.ndarray, gain: np.ndarray, angle: np.ndarray) -> np.ndarray:
+    """Return complex steps `path` (...) times `gain` (...), turned by `angle` (...) [rad]."""
+    return product(product(gain, turned(angle)), path)

@@ -6,9 +6,9 @@ from typing import Union
 import numpy as np
 
 from mlsm_manager.joint_solver.compiled_placement import placed_rows
-from mlsm_manager.joint_solver.motion_models import OdometryModel, turned
+from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, State
-from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog, as_complex, product
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog, as_complex, stretched
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.surface_points import SurfacePoints
 from mlsm_manager.scan_matching.scan import Track
@@ -41,22 +41,24 @@ class NodePath:
         first, last = self._times[0], self._times[-1]
         inside = np.clip(times, first, last)
         legs = np.clip(np.searchsorted(self._times, inside, side="right") - 1, 0, len(self._times) - 2)
-        motion, near = self._timeline.motion(times), self._timeline.motion(inside)
-        poses = self._poses_of(near, legs)
-        after = times > last
-        gain = np.where(after, self._last_gain, self._gain[0])
-        beyond = product(gain, turned(self._nodes[np.where(after, -1, 0), YAW]))
-        beyond = product(beyond, self._odometry.reference(motion) - self._odometry.reference(near))
+        near = self._timeline.motion(inside)
+        reference = self._odometry.reference(near)
+        poses = self._poses_of(near, reference, legs)
+        if np.array_equal(inside, times):
+            return poses
+        motion, after = self._timeline.motion(times), times > last
+        gain, yaw = np.where(after, self._last_gain, self._gain[0]), self._nodes[np.where(after, -1, 0), YAW]
+        beyond = stretched(self._odometry.reference(motion) - reference, gain, yaw)
         turn = motion.poses[:, 2] - near.poses[:, 2]
         return poses + np.column_stack([beyond.real, beyond.imag, turn])
 
-    def _poses_of(self, motion: Motion, legs: np.ndarray) -> np.ndarray:
-        """Return the poses (m, 3) at times between nodes `legs` (m,) and the next ones."""
+    def _poses_of(self, motion: Motion, reference: np.ndarray, legs: np.ndarray) -> np.ndarray:
+        """Return the poses (m, 3) at times between nodes `legs` (m,) and the next; `reference`: (m,) of the times."""
         share = (motion.times - self._times[legs]) / (self._times[legs + 1] - self._times[legs])
         yaw = (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
-        from_node = self._odometry.reference(motion) - self._reference[legs]
+        from_node = reference - self._reference[legs]
         bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
-        bow = product(product(self._gain[legs], turned(yaw)), bow)
+        bow = stretched(bow, self._gain[legs], yaw)
         place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1] + bow
         return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw])
 

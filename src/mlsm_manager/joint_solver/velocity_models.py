@@ -14,10 +14,9 @@ from mlsm_manager.joint_solver.motion_models import (
     add_compass,
     add_forgetting,
     add_walk,
-    turned,
 )
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
-from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product
+from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
 from mlsm_manager.scan_matching.prediction import Fading
 
 AHEAD, ASIDE, TRAVEL, TURN_RATE = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw
@@ -98,7 +97,7 @@ class HeadingFactors(OdometryModel):
         result[:, AHEAD] = nodes[:, TRAVEL] + kept * (nodes[:, AHEAD] - nodes[:, TRAVEL])
         result[:, ASIDE] = slipping * nodes[:, ASIDE]
         mean = (self.gain(nodes) + self.gain(result)) / 2.0
-        step = product(product(mean, turned(nodes[:, YAW])), self.reference(after) - self.reference(before))
+        step = stretched(self.reference(after) - self.reference(before), mean, nodes[:, YAW])
         error = step - (after.positions - before.positions)
         result[:, 0] += error.real
         result[:, 1] += error.imag

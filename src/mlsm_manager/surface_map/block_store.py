@@ -112,8 +112,9 @@ class BlockStore:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
         reused, self._free = self._free[:number], self._free[number:]
         first, self._used = self._used, self._used + number - len(reused)
-        for array in (self._rows, self._following, self._crossed):
-            array.reserve(self._used)
+        if self._used > len(self._rows.values):
+            for array in (self._rows, self._following, self._crossed):
+                array.reserve(self._used)
         return np.concatenate([reused, np.arange(first, self._used)])
 
     def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
