@@ -252,7 +252,7 @@ OPEN_WATER_SCANS = 50
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("a statistic of many scans; test_map_bag and test_localiser compute single ones")
+@pytest.mark.newest_only("a statistic of many scans; the tests above compute single ones")
 @pytest.mark.parametrize("estimator", EstimatorName)
 def test_noise_and_bubbles_correct_nothing(estimator):
     found = outcome(bubbles, estimator, OPEN_WATER_SCANS, seed=2)
