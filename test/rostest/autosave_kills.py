@@ -3,10 +3,8 @@
 
 import os
 import random
-import shutil
 import signal
 import subprocess
-import tempfile
 import time
 import unittest
 from concurrent.futures import ThreadPoolExecutor
@@ -16,7 +14,7 @@ from typing import Set
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point
-from graph import PACKAGE_ROOT, PATIENCE, forget_links, run, wait_for_publisher_links, wait_until
+from graph import PACKAGE_ROOT, PATIENCE, forget_links, run, temporary_folder, wait_for_publisher_links, wait_until
 from messages import still_cloud
 
 from mlsm_manager.surface_map.map_file import read_map
@@ -133,16 +131,14 @@ class AutosaveKills(unittest.TestCase):
 
     def test_no_kill_loses_what_was_saved(self) -> None:
         """Every node saves while clouds come, loses nothing of that by its kill, and leaves no broken file."""
-        folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, str(folder))
+        folder = temporary_folder(self)
         nodes = [self._node(folder / str(number), f"/vehicle_{number}") for number in range(NODES)]
         with ThreadPoolExecutor(NODES) as pool:
             saved = list(pool.map(lambda node: node.die_often(rospy.get_param("~kills") // NODES), nodes))
         self.assertTrue(all(saved), saved)
 
     def test_a_node_that_another_process_starts_begins_a_new_map(self) -> None:
-        folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, str(folder))
+        folder = temporary_folder(self)
         node = self._node(folder / "0", "/vehicle_of_two")
         self.assertTrue(node.die_often(1))
         self.assertEqual(node.held_when_another_starts_it(), set())

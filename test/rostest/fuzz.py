@@ -19,8 +19,7 @@ import numpy as np
 import rosgraph
 import rospy
 import tf2_ros
-from diagnostic_msgs.msg import DiagnosticArray
-from graph import PATIENCE, Inbox, run, wait_until
+from graph import PATIENCE, Diagnostics, Inbox, run, wait_until
 from messages import publisher, transform, turn
 from random_messages import RandomMessages
 from rosgraph_msgs.msg import Clock
@@ -50,24 +49,15 @@ class Fuzz(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.nodes = _launched(sys.argv[1])
         cls.messages, cls.seed = int(sys.argv[2]), int(sys.argv[3])
-        cls.statuses: Dict[str, Dict[str, str]] = {}
-        cls.reporting: Set[str] = set()
-        cls.lock = threading.Lock()
+        cls.diagnostics = Diagnostics()
         threading.Thread(target=_publish_time, daemon=True).start()
-        rospy.Subscriber("/diagnostics", DiagnosticArray, cls._take_diagnostics, queue_size=100)
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         cls.map.wait_for_link()
-        wait_until(lambda: cls.nodes <= cls.reporting, required=False)
-        assert cls.nodes <= cls.reporting, f"did not start: {cls.nodes - cls.reporting}"
+        reporting = cls.diagnostics.callers
+        wait_until(lambda: cls.nodes <= reporting, required=False)
+        assert cls.nodes <= reporting, f"did not start: {cls.nodes - reporting}"
         cls.processes = _processes()
         cls.topics = _subscribed(cls.processes)
-
-    @classmethod
-    def _take_diagnostics(cls, array: DiagnosticArray) -> None:
-        with cls.lock:
-            cls.reporting.add(array._connection_header["callerid"])
-            for status in array.status:
-                cls.statuses[status.name] = {item.key: item.value for item in status.values}
 
     def test_nothing_that_comes_ends_a_node(self) -> None:
         print(f"{self.messages} messages, seed {self.seed}, {len(self.processes)} nodes, topics {sorted(self.topics)}")
@@ -96,10 +86,10 @@ class Fuzz(unittest.TestCase):
         self.assertEqual(dead, [])
 
     def _expect_no_internal_error(self) -> None:
-        with self.lock:
-            values = {name: items.get("internal errors", "0") for name, items in self.statuses.items()}
+        told = self.diagnostics.all_values()
+        values = {name: items.get("internal errors", "0") for name, items in told.items()}
         self.assertEqual({name: count for name, count in values.items() if count != "0"}, {})
-        refused = sum(int(n) for items in self.statuses.values() for key, n in items.items() if key.endswith("refused"))
+        refused = sum(int(n) for items in told.values() for key, n in items.items() if key.endswith("refused"))
         print(f"{refused} refused, by {len(values)} stages")
 
     def _expect_a_scan(self) -> None:
@@ -112,7 +102,7 @@ class Fuzz(unittest.TestCase):
         beams = publisher("/sonar/raw", SonarScanLine)
         end = time.monotonic() + PATIENCE
         while not any(_reaches_far(cloud) for cloud in self.map.messages):
-            self.assertLess(time.monotonic(), end, f"no sane scan in the map; {self.statuses}")
+            self.assertLess(time.monotonic(), end, f"no sane scan in the map; {self.diagnostics.all_values()}")
             for message in turn(time.time(), 1e-4, BEAMS, SANE_FRAME):
                 beams.publish(message)
                 time.sleep(0.002)

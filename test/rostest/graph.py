@@ -1,8 +1,10 @@
 """What the rostests share: waiting for events, launching nodes, reading diagnostics and maps."""
 
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
 import threading
 import time
 import unittest
@@ -10,7 +12,7 @@ import xmlrpc.client
 from contextlib import contextmanager
 from http.client import HTTPException
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Tuple, Type
+from typing import Any, Callable, Dict, Iterator, List, Set, Tuple, Type
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -59,6 +61,13 @@ def _report_skip(name: str, reason: str) -> None:
     case = f'<testcase classname="recording" name="{name}"><skipped message={quoteattr(reason)}/></testcase>'
     folder = Path(os.environ.get("ROS_TEST_RESULTS_DIR", "/tmp"))
     (folder / f"rosunit-skipped-{name}.xml").write_text(f'<testsuite tests="1">{case}</testsuite>')
+
+
+def temporary_folder(case: unittest.TestCase) -> Path:
+    """Return a folder that is removed at the end of a test."""
+    folder = tempfile.mkdtemp()
+    case.addCleanup(shutil.rmtree, folder)
+    return Path(folder)
 
 
 class Inbox:
@@ -137,6 +146,8 @@ class Diagnostics:
     def __init__(self, node: str = "") -> None:
         """`node`: the only one whose counters are taken, by its full name; without it those of all."""
         self._node = node
+        self.callers: Set[str] = set()
+        """Full names of the nodes that have reported."""
         self._condition = threading.Condition()
         self._values: Dict[str, Dict[str, str]] = {}
         self._subscriber = rospy.Subscriber("/diagnostics", DiagnosticArray, self._take, queue_size=100)
@@ -145,6 +156,7 @@ class Diagnostics:
         if self._node not in ("", array._connection_header["callerid"]):
             return
         with self._condition:
+            self.callers.add(array._connection_header["callerid"])
             for status in array.status:
                 stage = status.name.rpartition(": ")[2]
                 self._values[stage] = {item.key: item.value for item in status.values}
@@ -173,6 +185,11 @@ class Diagnostics:
         """Return what is known of a stage now."""
         with self._condition:
             return dict(self._values.get(stage, {}))
+
+    def all_values(self) -> Dict[str, Dict[str, str]]:
+        """Return what is known of each stage now."""
+        with self._condition:
+            return dict(self._values)
 
     def _number(self, stage: str, counter: str) -> int:
         return int(self._values.get(stage, {}).get(counter, -1))

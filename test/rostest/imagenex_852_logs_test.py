@@ -1,16 +1,13 @@
 #!/usr/bin/env python3
 import math
-import shutil
 import signal
 import subprocess
-import tempfile
 import unittest
-from pathlib import Path
 
 import rosbag
 import rospy
 from driver_listener import beams, diagnostics, values
-from graph import ended, recording, run
+from graph import ended, recording, run, temporary_folder
 
 from imagenex_852_driver.log_file import LogReader, LogWriter
 from imagenex_852_driver.log_record import LoggedPing
@@ -34,8 +31,7 @@ def logged(index):
 
 class TestLogs(unittest.TestCase):
     def setUp(self):
-        self.folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, self.folder)
+        self.folder = temporary_folder(self)
         self.log = self.folder / "made_up.852"
         with LogWriter(self.log) as writer:
             for index in range(10):

@@ -2,11 +2,9 @@
 """play_bag.launch and map_bag map a bag of avora_msgs types as it is, without `rosbag fix`."""
 
 import subprocess
-import tempfile
 import unittest
-from pathlib import Path
 
-from graph import LONG_PATIENCE, PACKAGE, TEST_DATA, Inbox, launched, run
+from graph import LONG_PATIENCE, PACKAGE, TEST_DATA, Inbox, launched, run, temporary_folder
 from old_bag import with_old_types
 from sensor_msgs.msg import PointCloud2
 
@@ -15,9 +13,7 @@ class PlayOldBag(unittest.TestCase):
     """A recording of today under the names of 2015."""
 
     def setUp(self) -> None:
-        folder = tempfile.TemporaryDirectory()
-        self.addCleanup(folder.cleanup)
-        self.folder = Path(folder.name)
+        self.folder = temporary_folder(self)
         self.bag = self.folder / "old.bag"
         with_old_types(TEST_DATA / "basin.bag", self.bag)
 

@@ -2,9 +2,7 @@
 """A node that matches with the joint solver keeps its map and its place over kills with -9 at random moments."""
 
 import os
-import shutil
 import sys
-import tempfile
 import unittest
 from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
@@ -14,7 +12,7 @@ from typing import List
 
 import numpy as np
 import rospy
-from graph import PACKAGE_ROOT, run
+from graph import PACKAGE_ROOT, run, temporary_folder
 from marina import replayed
 from resumed_vehicle import Fate, Kill, Mission, ResumedVehicle
 
@@ -42,8 +40,7 @@ class ResumeKills(unittest.TestCase):
     """Vehicles are killed `~kills` times altogether, in harbours that are made or in the recording `~bag`."""
 
     def test_no_kill_loses_the_map_or_puts_the_vehicle_elsewhere(self) -> None:
-        folder = Path(tempfile.mkdtemp())
-        self.addCleanup(shutil.rmtree, str(folder))
+        folder = temporary_folder(self)
         numbers = range(rospy.get_param("~kills") // KILLS_PER_MISSION)
         with ThreadPoolExecutor(VEHICLES) as pool:
             kills = list(chain.from_iterable(pool.map(lambda number: self._kills(folder, number), numbers)))

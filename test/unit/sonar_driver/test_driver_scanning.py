@@ -4,9 +4,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from emulated_drivers import IMAGENEX_852, PING360, PING360_REQUESTS, SONARS, Scanning, VirtualScan, free_udp_port
-from emulated_drivers import running as running_at
-from emulated_drivers import served as served_at
+from emulated_drivers import (
+    IMAGENEX_852,
+    PING360,
+    PING360_REQUESTS,
+    SONARS,
+    Scanning,
+    VirtualScan,
+    free_udp_port,
+    running,
+    served,
+)
 from fault_experiment import run
 from virtual_line import VirtualStopAt, VirtualTime
 
@@ -37,7 +45,7 @@ def virtual(request):
 
 
 def test_the_scan_goes_on_after_the_line_was_away(ends):
-    with running_at(*ends) as (scan, server):
+    with running(*ends) as (scan, server):
         assert scan.wait_for_more(2)
         server.disappear()
         assert scan.wait(lambda _: not scan.stats.connected)
@@ -47,7 +55,7 @@ def test_the_scan_goes_on_after_the_line_was_away(ends):
 
 
 def test_a_head_that_appears_after_the_driver_is_found(ends):
-    with served_at(*ends) as (server, connection):
+    with served(*ends) as (server, connection):
         server.disappear()
         with Scanning(ends[0], connection) as scan:
             assert not scan.stats.connected
@@ -57,7 +65,7 @@ def test_a_head_that_appears_after_the_driver_is_found(ends):
 
 @pytest.mark.parametrize("gone", [False, True])
 def test_a_stop_ends_the_scan(ends, gone):
-    with running_at(*ends) as (scan, server):
+    with running(*ends) as (scan, server):
         assert scan.wait_for_more(1)
         if gone:
             server.disappear()
@@ -65,13 +73,13 @@ def test_a_stop_ends_the_scan(ends, gone):
 
 
 def test_a_second_scanner_on_the_port_does_not_start(tmp_path):
-    with running_at(IMAGENEX_852, tmp_path / "sonar") as (scan, _):
+    with running(IMAGENEX_852, tmp_path / "sonar") as (scan, _):
         second = Scanner(IMAGENEX_852.device(scan.device.connection), None, print)
         with pytest.raises(PortRefusedError, match="in use by another program"):
             second.connect()
 
 
-# How often each fault is counted, and as what. A head that scans by itself does not wait for a request.
+# As what each fault is counted.
 COUNTED = {
     Fault.GARBLED: "bad_frames",
     Fault.TRUNCATED: "bad_frames",
@@ -81,7 +89,8 @@ COUNTED = {
     Fault.DROPPED: "timeouts",
     Fault.LATE: "unexpected_replies",
 }
-OF_SCANS_BY_ITSELF = {**COUNTED, Fault.DROPPED: "missing_beams", Fault.LATE: "replies"}
+# A driver that has nothing to ask notes a gap, and takes what is late.
+WITHOUT_REQUESTS = {**COUNTED, Fault.DROPPED: "missing_beams", Fault.LATE: "replies"}
 
 
 @pytest.mark.parametrize("fault", COUNTED)
@@ -93,7 +102,7 @@ def test_each_fault_is_counted_and_every_good_beam_delivered_once(virtual, fault
     scan = VirtualScan(sonar, port, faults=faults)
     scan.beams(2)
     faults.order(fault)
-    count = (OF_SCANS_BY_ITSELF if sonar is PING360 else COUNTED)[fault]
+    count = (WITHOUT_REQUESTS if sonar is PING360 else COUNTED)[fault]
     before = getattr(scan.stats, count)
     scan.until(lambda: getattr(scan.stats, count) == before + 1)
     scan.beams(3)
