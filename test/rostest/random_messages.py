@@ -63,7 +63,7 @@ class RandomMessages:
             if self._random.random() < 0.8:
                 self.spoil(self._random.choice(value))
             else:
-                setattr(message, name, value * self._random.choice((0, 2, 100)))
+                setattr(message, name, value * self._random.choice((0, 2, 20)))
         else:
             setattr(message, name, self._value(kind))
 
