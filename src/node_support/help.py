@@ -41,10 +41,7 @@ def write_help(text: str, file: IO[str]) -> None:
 
 
 def answer_help(
-    node: str,
-    parameters: Type[ParameterSet],
-    groups: Mapping[str, Type[ParameterSet]] = _NOTHING,
-    tunable: bool = True,
+    node: str, parameters: Type[ParameterSet], groups: Mapping[str, Type[ParameterSet]] = _NOTHING, tunable: bool = True
 ) -> None:
     """Print the help of a node and end the process, if its command line asks for help; otherwise do nothing.
 

@@ -70,11 +70,7 @@ class Fuzzer:
             data = serialised(sane_message(kind, number))
         if self._random.random() < 0.3:
             data = self._damaged(data)
-        header = {
-            "type": kind,
-            "md5sum": message_classes(kind)[kind]._md5sum,
-            "message_definition": DEFINITIONS[kind],
-        }
+        header = {"type": kind, "md5sum": message_classes(kind)[kind]._md5sum, "message_definition": DEFINITIONS[kind]}
         if self._random.random() < _DAMAGED_DEFINITIONS:
             definition = self._damaged(DEFINITIONS[kind].encode()).decode(errors="replace")
             header.update(md5sum=str(number), message_definition=definition)

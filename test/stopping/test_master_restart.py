@@ -24,11 +24,7 @@ class Master:
 
     def __init__(self, logs):
         self._port = free_port()
-        self.environment = {
-            **os.environ,
-            "ROS_MASTER_URI": f"http://localhost:{self._port}",
-            "ROS_LOG_DIR": str(logs),
-        }
+        self.environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{self._port}", "ROS_LOG_DIR": str(logs)}
         self.start()
 
     def start(self):

@@ -57,8 +57,7 @@ def _sorted(places, low_x, low_y, rows, columns, side):
 
 
 @compiled(
-    "Tuple((f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1]))(f8[:,::1], f8[:,::1], f8)",
-    error_model="numpy",
+    "Tuple((f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1]))(f8[:,::1], f8[:,::1], f8)", error_model="numpy"
 )
 def sorted_into_cells(sources, targets, reach):
     """Return the fields of Cells that cover targets (k, 2) [m], k > 0, and what lies within `reach` of them.

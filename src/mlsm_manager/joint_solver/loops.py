@@ -13,14 +13,7 @@ from mlsm_manager.joint_solver.map_support import Surfaces
 from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.places import (
-    FEWEST_POINTS,
-    MOST_POINTS,
-    REACH,
-    Freedom,
-    PlaceCandidate,
-    best_place,
-)
+from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, Freedom, PlaceCandidate, best_place
 from mlsm_manager.joint_solver.solution import Solution
 
 _APART = 20  # scans: newer ones are compared anyway, and tie a scan to where it is

@@ -35,13 +35,7 @@ def test_every_valid_command_round_trips_and_has_the_terminator_at_its_end_only(
 
 @pytest.mark.parametrize(
     ("field", "value"),
-    [
-        ("max_range", 25),
-        ("train_angle_deg", 4),
-        ("start_gain_db", 41),
-        ("pulse_length_us", 253),
-        ("data_points", 400),
-    ],
+    [("max_range", 25), ("train_angle_deg", 4), ("start_gain_db", 41), ("pulse_length_us", 253), ("data_points", 400)],
 )
 def test_a_value_the_wire_cannot_carry_is_refused(field, value):
     with pytest.raises(FrameError, match="253" if value == 253 else f"{field} = {value}"):
@@ -50,11 +44,7 @@ def test_a_value_the_wire_cannot_carry_is_refused(field, value):
 
 @pytest.mark.parametrize(
     ("values", "kind"),
-    [
-        ({"data_points": 250}, ReplyKind.IMX),
-        ({"data_points": 500}, ReplyKind.IGX),
-        ({"profile": True}, ReplyKind.IPX),
-    ],
+    [({"data_points": 250}, ReplyKind.IMX), ({"data_points": 500}, ReplyKind.IGX), ({"profile": True}, ReplyKind.IPX)],
 )
 def test_the_command_knows_which_reply_it_asks_for(values, kind):
     assert SwitchCommand(max_range=20, **values).reply_kind is kind

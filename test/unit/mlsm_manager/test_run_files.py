@@ -13,14 +13,7 @@ from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.run_files import (
-    Run,
-    errors_of,
-    position_error,
-    write_run,
-    write_summary,
-    write_trajectory,
-)
+from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap

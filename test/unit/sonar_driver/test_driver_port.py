@@ -15,13 +15,7 @@ from imagenex_852_driver.line.parameters import ConnectionParameters
 from imagenex_852_driver.protocol.command import SwitchCommand
 from node_support.parameters import ParameterError
 from sonar_driver.emulator.head_server import UdpLine
-from sonar_driver.line.port import (
-    PortRefusedError,
-    PortUnavailableError,
-    datagram_address,
-    open_port,
-    port_losses,
-)
+from sonar_driver.line.port import PortRefusedError, PortUnavailableError, datagram_address, open_port, port_losses
 
 NO_SPEED = 0
 
