@@ -27,8 +27,8 @@ from recordings.reader import Request
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour")
 SHARES = (0.4, 0.55, 0.7)  # of the run's length, where the silence begins
-_SURE = 3.0  # told deviations
-_FIXED = 6.0  # m told, from which on a place is known
+_SURE = 3.0  # stated deviations
+_FIXED = 6.0  # m stated, below which a place is known
 _WRONG = 3.0  # m: as far off no wall of the map is met, and a second one is drawn
 
 
@@ -44,8 +44,8 @@ class Figures(NamedTuple):
     """Of the fixes after a silence.
 
     before: error of the last fix before it [m]. way: by which the vehicle was carried on meanwhile [m]. turns: scans
-    until the first fix that is told to be good. first, told: error of that and its deviation [m]. end: of the last one.
-    most: of all from then on. lies: share of all since the silence that are wrong and farther off than three told
+    until the first fix that claims to be good. first, stated: its error and deviation [m]. end: error of the last one.
+    most: of all from then on. lies: share of all since the silence that are wrong and farther off than three stated
     deviations.
     """
 
@@ -53,7 +53,7 @@ class Figures(NamedTuple):
     way: float
     turns: int
     first: float
-    told: float
+    stated: float
     end: float
     most: float
     lies: float
@@ -62,8 +62,8 @@ class Figures(NamedTuple):
         """Return them for people."""
         return (
             f"{self.way:.0f} m on, error before {self.before:.2f} m; first fix after {self.turns} scans "
-            f"{self.first:.2f} m off with {self.told:.2f} m told; then at most {self.most:.2f} m, at the end "
-            f"{self.end:.2f} m; wrong but surely told {100.0 * self.lies:.0f} %"
+            f"{self.first:.2f} m off with {self.stated:.2f} m stated; then at most {self.most:.2f} m, at the end "
+            f"{self.end:.2f} m; wrong but stated as sure {100.0 * self.lies:.0f} %"
         )
 
 
@@ -94,16 +94,16 @@ def figures(found: Replayed, truth: Track, start: float, seconds: float) -> Figu
     fixes = [one for one in found.updates if one.accepted and one.result is not None]
     times = np.array([one.scan.reference_time for one in fixes])
     error = np.hypot(*(np.array([one.result.pose[:2] for one in fixes]) - truth.at(times)[:, :2]).T)
-    told = np.array([np.sqrt(np.trace(one.result.covariance[:2, :2])) for one in fixes])
+    stated = np.array([np.sqrt(np.trace(one.result.covariance[:2, :2])) for one in fixes])
     before, after = times < start, times > start + seconds
     way = float(np.hypot(*np.diff(truth.at(np.array([start, start + seconds]))[:, :2], axis=0)[0]))
-    lies = float((error > np.maximum(_SURE * told, _WRONG))[after].mean()) if after.any() else np.nan
-    known = np.flatnonzero(after & (told < _FIXED))
+    lies = float((error > np.maximum(_SURE * stated, _WRONG))[after].mean()) if after.any() else np.nan
+    known = np.flatnonzero(after & (stated < _FIXED))
     if not len(known):
         return Figures(error[before][-1], way, int(after.sum()), np.nan, np.nan, error[-1], np.nan, lies)
     first = int(known[0])
     turns = int(after[: first + 1].sum())
-    return Figures(error[before][-1], way, turns, error[first], told[first], error[-1], error[known].max(), lies)
+    return Figures(error[before][-1], way, turns, error[first], stated[first], error[-1], error[known].max(), lies)
 
 
 def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[str, Recording, Track]]:
@@ -151,8 +151,8 @@ def main() -> None:
                     start = recording.track.times[0] + share * recording.seconds
                     missing = silenced(recording, silence, start, options.seconds)
                     found = figures(replayed(missing, kind, shape), truth, start, options.seconds)
-                    told = f"{name}, {kind.value.lower()}, {silence.value} from {share * recording.seconds:.0f} s on"
-                    print(f"{told}: {found.line()}", flush=True)
+                    case = f"{name}, {kind.value.lower()}, {silence.value} from {share * recording.seconds:.0f} s on"
+                    print(f"{case}: {found.line()}", flush=True)
 
 
 def _runs(options: argparse.Namespace, kind: OdometryKind) -> Iterator[Tuple[str, Recording, Track]]:
