@@ -8,7 +8,6 @@ import argparse
 import dataclasses
 import inspect
 import sys
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Dict, List, Type
 
@@ -87,29 +86,21 @@ LAUNCH = """\
 """
 
 
-@dataclass(frozen=True)
-class LiveNode:
-    """A node with dynamic_reconfigure: its parameters and the name of its cfg file."""
-
-    parameters: Type[ParameterSet]
-    config_name: str
-
-
-LIVE_NODES: Dict[str, LiveNode] = {
-    "circle_detector": LiveNode(CircleDetectorParameters, "CircleDetector"),
-    "dead_reckoning": LiveNode(DeadReckoningParameters, "DeadReckoning"),
-    "imagenex_852_driver": LiveNode(DriverParameters, "Imagenex852"),
-    "imagenex_852_emulator": LiveNode(EmulatorParameters, "Imagenex852Emulator"),
-    "line_detector": LiveNode(LineDetectorParameters, "LineDetector"),
-    "mlsm_core": LiveNode(MlsmCoreParameters, "MlsmCore"),
-    "ping360_driver": LiveNode(Ping360DriverParameters, "Ping360"),
-    "ping360_emulator": LiveNode(Ping360EmulatorParameters, "Ping360Emulator"),
-    "sonar_control": LiveNode(SonarControlParameters, "SonarControl"),
-    "sonar_image": LiveNode(SonarImageParameters, "SonarImage"),
-    "sonar_to_cloud": LiveNode(SonarToCloudParameters, "SonarToCloud"),
-    **{name: LiveNode(stage.parameters, config_name(name)) for name, stage in STAGES.items()},
+LIVE_NODES: Dict[str, Type[ParameterSet]] = {
+    "circle_detector": CircleDetectorParameters,
+    "dead_reckoning": DeadReckoningParameters,
+    "imagenex_852_driver": DriverParameters,
+    "imagenex_852_emulator": EmulatorParameters,
+    "line_detector": LineDetectorParameters,
+    "mlsm_core": MlsmCoreParameters,
+    "ping360_driver": Ping360DriverParameters,
+    "ping360_emulator": Ping360EmulatorParameters,
+    "sonar_control": SonarControlParameters,
+    "sonar_image": SonarImageParameters,
+    "sonar_to_cloud": SonarToCloudParameters,
+    **{name: stage.parameters for name, stage in STAGES.items()},
 }
-
+"""Nodes with dynamic_reconfigure."""
 START_UP_NODES: Dict[str, Type[ParameterSet]] = {
     "sonar_simulator": SimulatorParameters,
     "gazebo_sonar": gazebo_beams.GazeboSonarParameters,
@@ -120,7 +111,7 @@ START_UP_NODES: Dict[str, Type[ParameterSet]] = {
 def generated() -> Dict[Path, str]:
     """Return the whole text of every generated file."""
     texts = {
-        ROOT / f"yaml/{name}_default.yaml": default_yaml(name, node.parameters) for name, node in LIVE_NODES.items()
+        ROOT / f"yaml/{name}_default.yaml": default_yaml(name, parameters) for name, parameters in LIVE_NODES.items()
     }
     groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS}
     for name, parameters in START_UP_NODES.items():
@@ -170,8 +161,8 @@ def thesis_names() -> str:
         "| node | thesis | here |",
         "| --- | --- | --- |",
     ]
-    for name, node in sorted(LIVE_NODES.items()):
-        for field in dataclasses.fields(node.parameters):
+    for name in sorted(LIVE_NODES):
+        for field in dataclasses.fields(LIVE_NODES[name]):
             described = describe(field)
             here = f"{EXPERT}/{field.name}" if described.expert else field.name
             if described.thesis_name:
@@ -198,7 +189,7 @@ def _node_section(name: str, node: NodeDescription, tables: Dict[str, str]) -> s
 def _parameter_tables(node: str) -> Dict[str, str]:
     """Return the parameter tables of a node by their titles."""
     if node in LIVE_NODES:
-        return {"Parameters": markdown_table(LIVE_NODES[node].parameters)}
+        return {"Parameters": markdown_table(LIVE_NODES[node])}
     tables = {"Parameters": markdown_table(START_UP_NODES[node], live=False)}
     if node == "sonar_simulator":
         groups = {name: markdown_table(group, live=False) for name, group in GROUPS.items()}

@@ -20,7 +20,7 @@ from std_msgs.msg import Float32
 
 from mlsm_manager.offline.picture import draw_map
 from mlsm_manager.report.mission import Path as Trajectory
-from mlsm_manager.surface_map.ply_file import read_ply
+from mlsm_manager.surface_map.map_file import read_map
 from node_support.files import write_whole
 from sonar_simulator.world.world_file import load_sdf
 from underwater_map_construction.srv import SaveMap
@@ -150,10 +150,10 @@ def summary(watch: Watch, seconds: float) -> Dict[str, Any]:
 
 def leave_results(watch: Watch, seconds: float, output: Path) -> None:
     """Save the map, draw it and write the summary. Raises DemoError."""
-    answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("map.ply", True)
+    answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("map", True)
     if not answer.success:
         raise DemoError(answer.message)
-    blocks = read_ply(output / "map.ply")
+    blocks = read_map(output / "map.mlsm").shown
     outlines = load_sdf(ROOT / "worlds/basin.sdf").world.outlines()
     poses = np.array(watch.path)
     path = Trajectory("the vehicle's path", "#2a9d4a", poses[:, 0], poses[:, 1:])
@@ -182,7 +182,7 @@ def run(arguments: argparse.Namespace) -> None:
     finally:
         graph.stop()
     print((output / "summary.json").read_text(), end="")
-    print(f"demo: done; map.ply, map.png and summary.json are in {output}")
+    print(f"demo: done; map.mlsm, map.png and summary.json are in {output}")
 
 
 def main() -> int:

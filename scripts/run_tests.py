@@ -30,8 +30,7 @@ SPARE_PRIORITY = 19
 ALONE = ("imagenex_852_load", "ping360_load")
 # Rostests that take longest: those that begin last should be short.
 LONG = (
-    "every_node", "silence", "compass_demo", "strafing_demo", "matching_many_processes", "matching_one_process",
-    "one_and_many_processes", "resume_kills", "imagenex_852_logs",
+    "every_node", "silence", "strafing_demo", "matching", "one_and_many_processes", "resume_kills", "imagenex_852_logs"
 )  # fmt: skip
 # Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds.
 IN_PARALLEL = ("-n", str(os.cpu_count() or 1), "--dist", "loadfile")

@@ -21,13 +21,15 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "chain": chain_figures.rows,
     "simulation": simulation_figures.rows,
 }
-STUDIES = ("canals", "heads", "long_run", "open_water", "silence", "twins", "without_dvl")
+STUDIES = ("canals", "long_run", "no_parameters", "open_water", "silence")
 
 
 def main() -> None:
     """Print one table, or run a study."""
-    if sys.argv[1:2] and sys.argv[1] in STUDIES:
-        import_module(f"benchmarks.{sys.argv.pop(1)}").main()
+    study = "".join(sys.argv[1:2]).lstrip("-").replace("-", "_")
+    if study in STUDIES:
+        sys.argv.pop(1)
+        import_module(f"benchmarks.{study}").main()
         return
     parser = argparse.ArgumentParser(
         "scripts/bench", description=__doc__, epilog=f"STUDY: {', '.join(STUDIES)}",

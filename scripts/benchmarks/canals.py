@@ -13,7 +13,6 @@ from benchmarks.twin_conditions import TwinParameters, lasting, reported
 from benchmarks.twin_water import RESOLUTION, Water, heard, water_of
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording
-from mlsm_manager.offline.suited_parameters import EchoShape
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
@@ -88,11 +87,10 @@ def main() -> None:
     parser.add_argument("--seeds", type=int, default=3, help="runs with each number of posts (default: %(default)s)")
     parser.add_argument("--graded", action="store_true", help="echoes with strengths instead of plateaus")
     arguments = parser.parse_args()
-    shape = EchoShape.PEAK if arguments.graded else EchoShape.PLATEAU
     for posts in arguments.posts:
         for seed in range(arguments.seeds):
             made, truth = recording(posts, seed, not arguments.graded)
-            solver = solved_live(made, OdometryKind.HEADING, shape)
+            solver = solved_live(made, OdometryKind.HEADING)
             found = live_figures(solver, truth.at, lambda times, path=truth: path.at(times)[:, 0] > 0.0)
             print(f"{posts} posts, seed {seed}, from the canal on: {found.line()}", flush=True)
 

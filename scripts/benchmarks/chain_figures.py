@@ -1,16 +1,14 @@
-"""The whole chain, from beams to the blocks of the map, against plain C++ that does the same."""
+"""The whole chain, from beams to the blocks of the map: what each stage takes of a core.
 
-import shutil
-import struct
-import subprocess
-import tempfile
+With NUMBA_DISABLE_JIT=1 it tells what compiling a stage's loops is worth.
+"""
+
 import time
-from pathlib import Path
-from typing import List, Tuple
+from typing import List
 
 import numpy as np
 
-from benchmarks.harness import ROOT, Row, ratio_text
+from benchmarks.harness import ROOT, Row
 from benchmarks.map_figures import RESOLUTION
 from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -22,9 +20,7 @@ from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 ROUNDS = 9
-SOURCE = Path(__file__).with_name("chain.cpp")
 STAGES = ("beams to cloud", "threshold", "statistical outlier removal", "insertion")
-_BEAM = struct.Struct("<18di")
 
 
 def recorded_scans() -> List[List[PlacedBeam]]:
@@ -38,11 +34,11 @@ def recorded_scans() -> List[List[PlacedBeam]]:
     return scans
 
 
-def run(scans: List[List[PlacedBeam]]) -> Tuple[np.ndarray, Tuple[int, int]]:
-    """Return the CPU seconds of each stage, summed over the scans (4,), and the numbers of points and blocks."""
+def stage_seconds(scans: List[List[PlacedBeam]]) -> np.ndarray:
+    """Return the CPU seconds of each stage, summed over the scans (4,)."""
     assembler, surface_map = ScanAssembler(SonarToCloudParameters()), MultiLevelSurfaceMap(RESOLUTION)
     thresholder, remover = Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())
-    seconds, points = np.zeros(len(STAGES)), 0
+    seconds = np.zeros(len(STAGES))
     for scan in scans:
         times = [time.process_time()]
         (cloud,) = [made for made in map(assembler.add, scan) if made is not None]
@@ -54,39 +50,15 @@ def run(scans: List[List[PlacedBeam]]) -> Tuple[np.ndarray, Tuple[int, int]]:
         surface_map.insert(kept.points)
         times.append(time.process_time())
         seconds += np.diff(times)
-        points += len(kept)
-    return seconds, (points, len(surface_map))
-
-
-def _write(scans: List[List[PlacedBeam]], path: Path) -> None:
-    with path.open("wb") as file:
-        for scan in scans:
-            for placed in scan:
-                beam = placed.beam
-                numbers = [*placed.T_target_sonar.ravel(), beam.angle, beam.range_resolution]
-                file.write(_BEAM.pack(*numbers, beam.intensities.size) + beam.intensities.tobytes())
-            file.write(_BEAM.pack(*[0.0] * 18, 0))
+    return seconds
 
 
 def rows() -> List[Row]:
-    """Compare each stage and their sum. Raises RuntimeError where C++ has other numbers of points or blocks."""
-    if shutil.which("g++") is None:
-        return [("whole chain by C++", "not measured: no g++", "")]
-    scans, ours, theirs = recorded_scans(), [], []
-    with tempfile.TemporaryDirectory() as folder:
-        program, data = Path(folder) / "chain", Path(folder) / "beams"
-        subprocess.run(["g++", "-O2", "-o", str(program), str(SOURCE)], check=True)
-        _write(scans, data)
-        for _ in range(ROUNDS + 1):
-            *seconds, points, blocks = map(float, subprocess.check_output([str(program), str(data)]).split())
-            taken, counts = run(scans)
-            if counts != (points, blocks):
-                raise RuntimeError(f"C++: {points:.0f} points, {blocks:.0f} blocks; ours: {counts}")
-            ours.append([*taken, taken.sum()])
-            theirs.append([*seconds, sum(seconds)])
-    mine, others = np.array(ours)[1:], np.array(theirs)[1:]  # The first round loads and fills caches
-    names = [f"{stage} of {len(scans)} scans: plain C++ over ours of" for stage in (*STAGES, "beams to blocks")]
+    """Return the time of each stage and their sum, with quartiles; the first round loads and fills caches."""
+    scans = recorded_scans()
+    taken = np.array([stage_seconds(scans) for _ in range(ROUNDS + 1)])[1:]
+    low, middle, high = 1e3 * np.percentile(np.column_stack([taken, taken.sum(axis=1)]), [25, 50, 75], axis=0)
     return [
-        (f"{name} {1e3 * float(np.median(own)):.1f} ms of CPU", ratio_text(other / own), "")
-        for name, own, other in zip(names, mine.T, others.T)
+        (f"{stage} of {len(scans)} scans", f"{middle[n]:.1f} ms of CPU ({low[n]:.1f} to {high[n]:.1f})", "")
+        for n, stage in enumerate((*STAGES, "beams to blocks"))
     ]

@@ -7,6 +7,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from functools import partial
 from pathlib import Path
 from typing import Any, Callable, Dict, List, Tuple
 
@@ -52,13 +53,6 @@ def mapped(bag: Path, *options: str) -> Tuple[Dict[str, Any], float]:
     return summary, after.children_user + after.children_system - before.children_user - before.children_system
 
 
-def cpu_seconds(call: Callable[[], object]) -> float:
-    """Return the seconds of a core that a call takes."""
-    start = time.process_time()
-    call()
-    return time.process_time() - start
-
-
 def median_seconds(
     call: Callable[[], object], repeats: int = 20, clock: Callable[[], float] = time.perf_counter
 ) -> float:
@@ -71,10 +65,8 @@ def median_seconds(
     return float(np.median(times))
 
 
-def ratio_text(ratios: np.ndarray) -> str:
-    """Return the median of ratios that were each measured in one round, with its quartiles."""
-    low, middle, high = np.percentile(ratios, [25, 50, 75])
-    return f"{middle:.2f} ({low:.2f} to {high:.2f})"
+cpu_seconds = partial(median_seconds, repeats=1, clock=time.process_time)
+"""Returns the seconds of a core that a call takes."""
 
 
 def print_table(rows: List[Row]) -> None:

@@ -1,4 +1,4 @@
-"""Prints what a scan costs the joint solver after 100 scans and after many, on a tour that never ends."""
+"""Prints what a scan costs the localiser, map included, after 100 scans and after many, on a tour that never ends."""
 
 import resource
 import time
@@ -7,7 +7,8 @@ from typing import Iterator
 import numpy as np
 
 from benchmarks.harness import benchmark_parser
-from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
@@ -23,6 +24,13 @@ _NOISE = 0.1
 _DRIFT = 0.02
 _QUAYS = ((1.0, 0.0, 30.0), (-1.0, 0.0, 28.0), (0.0, 1.0, 20.0), (0.0, -1.0, 18.0))
 """Walls around the origin: normal x, normal y, distance [m]."""
+
+
+class _Live(ReplayParameters):
+    """Those of a replay, but for a run that never ends."""
+
+    def solver_parameters(self) -> SolverParameters:
+        return LocaliserParameters.solver_parameters(self)
 
 
 def true_path(times: np.ndarray) -> np.ndarray:
@@ -70,16 +78,24 @@ def main() -> None:
     parser = benchmark_parser("long_run", __doc__)
     parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
     scans = parser.parse_args().scans
-    solver, seconds = LiveSolver(ReplayParameters().solver_parameters(), np.zeros(2)), []
+    localiser, seconds = _Live().build_localiser(np.zeros(2)), []
     for number, scan in enumerate(tour_scans(scans), start=1):
         start = time.process_time()
-        estimate = solver.add(scan)
+        belief = localiser.take_scan(scan).scan.belief
         seconds.append(time.process_time() - start)
         if number in _MEASURED_AT or number == scans:
-            spent = 1e3 * float(np.median(seconds[-_AVERAGED:]))
-            memory = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0
-            error = position_error(number, estimate.T_map_base)
-            print(f"{number} scans: {spent:.0f} ms a scan, {memory:.0f} MB, {error:.2f} m from the truth", flush=True)
+            spent, most = (1e3 * float(statistic(seconds[-_AVERAGED:])) for statistic in (np.median, np.max))
+            error = position_error(number, belief.theta[:3])
+            print(
+                f"{number} scans: {spent:.0f} ms a scan, {most:.0f} ms at most, {memory():.0f} MB, {error:.2f} m from "
+                "the truth", flush=True,
+            )  # fmt: skip
+
+
+def memory() -> float:
+    """Return what the process holds now, MB."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * resource.getpagesize() / 1e6
 
 
 def position_error(number: int, T_map_base: np.ndarray) -> float:

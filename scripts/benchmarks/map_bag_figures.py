@@ -9,6 +9,7 @@ from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 WHOLE, PART = "marina_whole_blind.bag", "marina_first.bag"
 _WANTED = {"": 500, "--refine": 150, "--refine --check": 150}
@@ -41,7 +42,7 @@ def _carving_row(estimator: EstimatorName) -> Row:
     carving, plain = (
         parameters.changed({"carve": carve}).build_localiser(recording.sonar_in_base) for carve in (True, False)
     )
-    scans = [scan for scan, _ in scans_of(recording, parameters.echoes())]
+    scans = [scan for scan, _ in scans_of(recording, EchoExtractor(parameters.echoes()))]
     seconds = [[cpu_seconds(lambda m=m, s=scan: m.take_scan(s)) for m in (carving, plain)] for scan in scans]
     with_it, without = np.mean(seconds[_WARM_UP:], axis=0)
     text = f"{100 * (1.0 - without / with_it):.0f} % of {1e3 * with_it:.0f} ms of a core"

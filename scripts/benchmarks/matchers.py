@@ -7,7 +7,8 @@ from typing import Any, Callable, Dict
 
 import numpy as np
 
-from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.localisation.parameters import MapParameters
+from mlsm_manager.scan_matching.distribution_matcher import NEARBY, DistributionMatcher
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
 from mlsm_manager.scan_matching.scan_path import POSE
@@ -20,6 +21,10 @@ _MOST_DEVIATION, _MOST_JUMP = 0.5, 4.0  # m; standard deviations: as the other m
 _ECHO_VARIANCE = 0.1**2  # m^2, as the range resolution of 50 m in 500 bins; keeps points in their plane too
 _PLANAR = np.array([3, 4, 2])  # Of Open3D's [rotation, translation]: x, y and yaw
 _LEAST_ERROR = 1e-3  # m, of an echo that meets its block exactly, so that the covariance can be inverted
+
+
+BEAM_WIDTH = MapParameters().beam_width
+"""rad, of the simulated head."""
 
 
 class GicpMatcher:
@@ -111,7 +116,7 @@ class MatcherName(Enum):
 
 
 MATCHERS: Dict[MatcherName, Callable[[], Matcher]] = {
-    MatcherName.DISTRIBUTIONS: lambda: DistributionMatcher(DistributionMatcherParameters()),
+    MatcherName.DISTRIBUTIONS: lambda: DistributionMatcher(NEARBY, BEAM_WIDTH, 0.0),
     MatcherName.THESIS: lambda: ThesisMatcher(ThesisMatcherParameters()),
     MatcherName.GICP: GicpMatcher,
 }

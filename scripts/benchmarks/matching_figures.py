@@ -1,14 +1,16 @@
 """Matching one scan: from how far off it finds its place, and whether one that has no place, or several, is refused."""
 
 import time
+from dataclasses import replace
 from typing import Callable, Dict, List, Tuple
 
 import numpy as np
 import yaml
 
 from benchmarks.harness import ROOT, Row
+from benchmarks.matchers import BEAM_WIDTH
 from benchmarks.scans import KINDS, ScanMaker, SonarKind, noise_scan, still
-from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import NEARBY, DistributionMatcher
 from mlsm_manager.scan_matching.scan import Prior, Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -43,13 +45,13 @@ def tour_stops() -> np.ndarray:
     return np.array([[pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])] for pose in poses])
 
 
-def start_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
-    """Return how many of the starts converge, narrow and wide."""
+def start_rows(kind: SonarKind, first_seed: int = 0, count: int = STARTS) -> List[Row]:
+    """Return how many of `count` starts converge, narrow and wide."""
     maker, rows = ScanMaker("basin", kind), []
     target = tour_map(maker)
     for distance, angle, changes, limit in ((3.0, 20.0, {}, 50), (6.0, 45.0, WIDE, 100)):
-        matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
-        cases = [_start(maker, distance, np.radians(angle), seed) for seed in range(first_seed, first_seed + STARTS)]
+        matcher = DistributionMatcher(replace(NEARBY, **changes), BEAM_WIDTH, 0.0)
+        cases = [_start(maker, distance, np.radians(angle), seed) for seed in range(first_seed, first_seed + count)]
         results, times = [], [time.thread_time()]
         for scan, prior, _ in cases:
             results.append(matcher.match(scan, target, prior))
@@ -59,8 +61,8 @@ def start_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
         accepted = np.array([result.accepted for result in results])
         title = f"starts {distance:g} m and {angle:g} deg off, basin, {kind}"
         rows += [
-            (f"{title}: converge", f"{(accepted & found).sum()} of {STARTS}", ">= 99"),
-            (f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {STARTS}", "0"),
+            (f"{title}: converge", f"{(accepted & found).sum()} of {count}", f">= {0.99 * count:g}"),
+            (f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {count}", "0"),
             (f"{title}: time of a core", f"{1e3 * np.median(np.diff(times)):.0f} ms", f"<= {limit} ms"),
         ]
     return rows
@@ -113,7 +115,7 @@ def cases(kind: SonarKind) -> Dict[str, Callable[[int], Case]]:
 
 def false_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
     """Return how many scans were accepted with a covariance that excludes the truth."""
-    matcher = DistributionMatcher(DistributionMatcherParameters())
+    matcher = DistributionMatcher(NEARBY, BEAM_WIDTH, 0.0)
     rows: List[Row] = []
     for title, make in cases(kind).items():
         seeds = range(first_seed, first_seed + SCANS)

@@ -11,10 +11,10 @@ from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.suited_parameters import echo_shape_of, suited
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 SCANS = 1000
 _BEAMS, _BINS, _RESOLUTION = 120, 250, 0.2
@@ -75,8 +75,7 @@ def outcome(turn: Turn, estimator: EstimatorName, scans: int, seed: int) -> Outc
     """Map open water as map_bag does."""
     made = recording(turn, scans, seed)
     parameters = ReplayParameters(estimator=estimator)
-    parameters = suited(parameters, echo_shape_of([placed.beam for placed in made.beams]), frozenset())
-    found = [scan for scan, _ in scans_of(made, parameters.echoes())]
+    found = [scan for scan, _ in scans_of(made, EchoExtractor(parameters.echoes()))]
     replayed = replay(made, found, parameters, lambda _: None)
     fixes = sum(update.accepted and update.result is not None for update in replayed.updates)
     return Outcome(len(found), fixes, float(np.hypot(*(replayed.corrected - replayed.odometry)[:, :2].T).max()))

@@ -4,14 +4,14 @@ from typing import Callable, List, NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.odometry_log import as_complex
-from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.suited_parameters import EchoShape, echo_sigma, suited, with_odometry
+from mlsm_manager.offline.suited_parameters import with_odometry
 from mlsm_manager.scan_matching.scan import Scan
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 Truth = Callable[[np.ndarray], np.ndarray]
 """From times (n,) [s] to true places (n, 2 or more) [m]."""
@@ -43,16 +43,15 @@ class PathFigures(NamedTuple):
         )
 
 
-def replay_input(recording: Recording, kind: OdometryKind, shape: EchoShape) -> Tuple[List[Scan], ReplayParameters]:
-    """Return the scans and parameters that map_bag uses for an odometry and for echoes of a shape."""
-    sigma = echo_sigma([placed.beam for placed in recording.beams])
-    parameters = suited(with_odometry(ReplayParameters(), kind, ()), shape, (), sigma)
-    return [scan for scan, _ in scans_of(recording, parameters.echoes())], parameters
+def replay_input(recording: Recording, kind: OdometryKind) -> Tuple[List[Scan], ReplayParameters]:
+    """Return the scans and parameters that map_bag uses for an odometry."""
+    parameters = with_odometry(ReplayParameters(), kind, ())
+    return [scan for scan, _ in scans_of(recording, EchoExtractor(parameters.echoes()))], parameters
 
 
-def solved_live(recording: Recording, kind: OdometryKind, shape: EchoShape) -> LiveSolver:
+def solved_live(recording: Recording, kind: OdometryKind) -> LiveSolver:
     """Return the joint solver after all scans of a recording."""
-    scans, parameters = replay_input(recording, kind, shape)
+    scans, parameters = replay_input(recording, kind)
     solver = LiveSolver(parameters.solver_parameters(), recording.sonar_in_base)
     for scan in scans:
         solver.add(scan)
@@ -64,14 +63,7 @@ def live_figures(solver: LiveSolver, truth: Truth, is_judged: Truth = lambda tim
     path = np.array([estimate.T_map_base[:2] for estimate in solver.estimates])
     covariances = np.array([estimate.pose_covariance[:2, :2] for estimate in solver.estimates])
     chosen = is_judged(solver.log.node_times[1:])
-    return _judged(path[chosen], _aligned(solver, truth)[chosen], covariances[chosen])
-
-
-def batch_figures(solver: LiveSolver, truth: Truth) -> Tuple[PathFigures, BatchResult]:
-    """Return those of the whole run fitted afterwards, and the fit."""
-    batch = fitted(solver)
-    path = solver.log.node_poses(np.arange(len(batch.state.nodes)))[1:, :2] + batch.state.nodes[1:, :2]
-    return _judged(path, _aligned(solver, truth), batch.pose_covariances[1:, :2, :2]), batch
+    return judged(path[chosen], _aligned(solver, truth)[chosen], covariances[chosen])
 
 
 def _aligned(solver: LiveSolver, truth: Truth) -> np.ndarray:
@@ -80,7 +72,8 @@ def _aligned(solver: LiveSolver, truth: Truth) -> np.ndarray:
     return places[1:] - places[0] + solver.log.node_poses(np.array([0]))[0, :2]
 
 
-def _judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> PathFigures:
+def judged(path: np.ndarray, truth: np.ndarray, covariances: np.ndarray) -> PathFigures:
+    """Return the figures of a path (n, 2) with its stated covariances (n, 2, 2); truth: (n, 2), aligned."""
     error = path - truth
     squared = np.einsum("na,na->n", error, np.linalg.solve(covariances, error[..., np.newaxis])[..., 0])
     distance, stated = np.hypot(*error.T), np.sqrt(np.trace(covariances, axis1=1, axis2=2))

@@ -12,7 +12,7 @@ from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import pose_matrix, rotated
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.echo_extractor import EchoExtractorParameters, extract_echoes
+from sonar_processing.filters.echo_extractor import EchoExtractorParameters, ExtractionMode, extract_echoes
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_simulator.echoes.echo_model import make_echo_model
@@ -69,7 +69,9 @@ class ScanMaker:
         self._caster = _caster(world)
         self._pattern = BeamPattern(math.radians(22.0), math.radians(2.5), *RAYS[kind.rays])
         self._model = LaserCone(LaserConeParameters(spread=kind.spread, noise_echoes=kind.noise_echoes))
-        self._extraction = EchoExtractorParameters(pulse_sigma=kind.pulse_sigma, min_height=2.0)
+        self._extraction = EchoExtractorParameters(
+            mode=ExtractionMode.MATCHED_FILTER, pulse_sigma=kind.pulse_sigma, threshold_share=1.0
+        )
 
     def scan(
         self, true_pose: Poses, odometry: Poses, seed: int, turn: int = 0, moving: bool = False,

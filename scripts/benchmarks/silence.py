@@ -4,24 +4,20 @@ One line per tour, odometry, kind of silence and beginning of it. The error is t
 should be, the marina's against the path by its own DVL without the silence.
 """
 
-import argparse
 from dataclasses import replace
 from enum import Enum
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from itertools import chain
 from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
-from heading_only import reduce_bag
 
 from benchmarks.harness import benchmark_parser, recorded
 from benchmarks.paths import replay_input
-from benchmarks.tours import simulated
+from benchmarks.tours import simulated, with_track
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording, read_recording
 from mlsm_manager.offline.replay import Replayed, replay
-from mlsm_manager.offline.suited_parameters import EchoShape, echo_shape_of
 from mlsm_manager.scan_matching.scan import Track
 from recordings.reader import Request
 
@@ -83,9 +79,9 @@ def silenced(recording: Recording, kind: Silence, start: float, seconds: float) 
     return replace(recording, beams=beams, track=track)
 
 
-def replayed(recording: Recording, kind: OdometryKind, shape: EchoShape) -> Replayed:
-    """Return what map_bag makes of a recording of an odometry and of a sonar whose echoes have a shape."""
-    scans, parameters = replay_input(recording, kind, shape)
+def replayed(recording: Recording, kind: OdometryKind) -> Replayed:
+    """Return what map_bag makes of a recording of an odometry."""
+    scans, parameters = replay_input(recording, kind)
     return replay(recording, scans, parameters, lambda count: None)
 
 
@@ -123,14 +119,10 @@ def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[st
 
 def marina(kind: OdometryKind) -> Tuple[str, Recording, Track]:
     """Return the marina's first part, and the vehicle's path in it by its DVL."""
-    bag = recorded("marina_first.bag")
-    recording = read_recording(bag, Request())
-    whole = replayed(recording, OdometryKind.DVL, echo_shape_of([placed.beam for placed in recording.beams]))
+    recording = read_recording(recorded("marina_first.bag"), Request())
+    whole = replayed(recording, OdometryKind.DVL)
     if kind is OdometryKind.HEADING:
-        with TemporaryDirectory() as folder:
-            reduced = Path(folder) / "heading_only.bag"
-            reduce_bag(bag, reduced, "odom", "base_link")
-            recording = read_recording(reduced, Request())
+        recording = with_track(recording, Track(recording.track.times, recording.track.poses * [0.0, 0.0, 1.0]))
     return "marina", recording, Track(whole.times, whole.corrected)
 
 
@@ -144,21 +136,15 @@ def main() -> None:
     parser.add_argument("--marina", action="store_true", help="the marina's recording as well")
     options = parser.parse_args()
     for kind in (OdometryKind(name.upper()) for name in options.odometry):
-        for name, recording, truth in _runs(options, kind):
-            shape = echo_shape_of([placed.beam for placed in recording.beams])
+        recordings = chain(tours(options.tours, kind, options.seeds), (marina(kind) for _ in range(options.marina)))
+        for name, recording, truth in recordings:
             for silence in Silence:
                 for share in SHARES:
                     start = recording.track.times[0] + share * recording.seconds
                     missing = silenced(recording, silence, start, options.seconds)
-                    found = figures(replayed(missing, kind, shape), truth, start, options.seconds)
+                    found = figures(replayed(missing, kind), truth, start, options.seconds)
                     case = f"{name}, {kind.value.lower()}, {silence.value} from {share * recording.seconds:.0f} s on"
                     print(f"{case}: {found.line()}", flush=True)
-
-
-def _runs(options: argparse.Namespace, kind: OdometryKind) -> Iterator[Tuple[str, Recording, Track]]:
-    yield from tours(options.tours, kind, options.seeds)
-    if options.marina:
-        yield marina(kind)
 
 
 if __name__ == "__main__":

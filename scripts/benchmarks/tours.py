@@ -1,5 +1,6 @@
 """Simulated tours: what the sonar hears on them, and recordings of them with an odometry of one's choice."""
 
+from dataclasses import replace
 from typing import List, NamedTuple
 
 import numpy as np
@@ -8,9 +9,9 @@ import yaml
 from benchmarks.harness import ROOT
 from benchmarks.scans import RAYS, SonarKind
 from benchmarks.twin_conditions import TwinParameters, reported
-from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import matrices
+from node_support.geometry import composed, inverse, matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot import RobotDescription
@@ -31,23 +32,30 @@ class Tour(NamedTuple):
     def recording(self, odometry: Track) -> Recording:
         """Return the recording with an odometry."""
         places = matrices(odometry.at(np.array([beam.stamp_ns for beam in self.beams]) * 1e-9)) @ self.T_base_sonar
-        return Recording([PlacedBeam(beam, place, True) for beam, place in zip(self.beams, places)], 0, odometry, None)
+        beams = [PlacedBeam(beam, place, True) for beam, place in zip(self.beams, places)]
+        return Recording(beams, 0, odometry, Truth(self.truth.times, self.truth.poses[:, :2]))
 
-    def with_dvl(self, seed: int) -> Recording:
-        """Return the recording with errors of a DVL and a compass, drawn at random."""
+    def scaled(self, error: float) -> Recording:
+        """Return the recording with an odometry of which true distances are 1 + `error` times what it reports."""
+        start = np.append(self.truth.poses[0, :2], 0.0)
+        factors = np.array([1.0 / (1.0 + error), 1.0 / (1.0 + error), 1.0])
+        return self.recording(Track(self.truth.times, (self.truth.poses - start) * factors + start))
+
+    def with_dvl(self, seed: int, **errors: float) -> Recording:
+        """Return the recording with errors of a DVL and a compass, drawn at random; `errors`: see TwinParameters."""
         rng = np.random.RandomState(seed)
-        errors = TwinParameters(direction=rng.normal(0.0, _MOUNTING), scale=rng.normal(0.0, _SCALE))
-        made = reported(self.truth, errors, rng)
+        usual = {"direction": rng.normal(0.0, _MOUNTING), "scale": rng.normal(0.0, _SCALE)}
+        made = reported(self.truth, TwinParameters(**{**usual, **errors}), rng)
         return self.recording(Track(made.times, made.poses + np.append(self.truth.poses[0, :2], 0.0)))
 
 
-def simulated(name: str, kind: SonarKind = HEAD) -> Tour:
+def simulated(name: str, kind: SonarKind = HEAD, seed: int = 1) -> Tour:
     """Return what a sonar hears on the tour yaml/`name`.yaml in the world that the name begins with."""
     values = yaml.safe_load((ROOT / "yaml/sonar_simulator_demo.yaml").read_text())
     rows, columns = RAYS[kind.rays]
     values.update(
         laser_cone={"spread": kind.spread}, sonar={"ray_rows": rows, "ray_columns": columns},
-        world=f"worlds/{name.split('_')[0]}.sdf", script=f"yaml/{name}.yaml", odometry={"scale_error": 0.0},
+        world=f"worlds/{name.split('_')[0]}.sdf", script=f"yaml/{name}.yaml", odometry={"scale_error": 0.0}, seed=seed,
     )  # fmt: skip
     robot = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
     setup = make_setup(Settings.from_mapping(values), ROOT, robot, lambda warning: None)
@@ -62,3 +70,13 @@ def simulated(name: str, kind: SonarKind = HEAD) -> Tour:
             beams.append(Beam(round(1e9 * time), "sonar", ping.angle, ping.strengths, setup.sonar.range_resolution))
     path, steps = Track(np.array(times), np.array(poses)), np.arange(times[0], times[-1], _STEP)
     return Tour(Track(steps, path.at(steps)), beams, setup.T_base_sonar)
+
+
+def with_track(recording: Recording, track: Track) -> Recording:
+    """Return a recording of which the odometry said `track`, at the same times."""
+    times = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
+    moves = matrices(composed(track.at(times), inverse(recording.track.at(times))))
+    beams = [
+        replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in zip(recording.beams, moves)
+    ]
+    return replace(recording, beams=beams, track=track)

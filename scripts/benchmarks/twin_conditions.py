@@ -30,7 +30,8 @@ class TwinParameters:
     half_width: of the beam at half power. echo_length: of a plateau, m per 10 dB above the threshold. objects: piers,
     boats and posts. clutter: share of beams with a false echo. basin_radius, canal_radius: m of water kept free.
     rotation: of the path. binary: strengths are 0 or 127, else graded. soft_iron: of the compass, amplitude of an error
-    that turns twice with the heading.
+    that turns twice with the heading. scale_walk: 1/sqrt(s), by which the scale changes besides. current: m/s along +x,
+    which the odometry does not feel.
     """
 
     seed: int = 1
@@ -52,6 +53,8 @@ class TwinParameters:
     canal_radius: float = 11.0
     binary: bool = True
     soft_iron: float = 0.0
+    scale_walk: float = 0.0
+    current: float = 0.0
 
 
 TWINS = {
@@ -126,12 +129,21 @@ def reported(path: Track, parameters: TwinParameters, rng: np.random.RandomState
     heading = path.poses[:, 2] + parameters.heading_deviation * lasting(rng, steps, _HEADING_TIME)
     heading = heading + _QUICK_HEADING[0] * lasting(rng, steps, _QUICK_HEADING[1])
     heading = heading + parameters.soft_iron * np.sin(2.0 * path.poses[:, 2])
-    heading = heading + parameters.heading_walk * np.cumsum(rng.normal(size=len(steps)) * np.sqrt(np.abs(steps)))
-    velocity = rotated(np.gradient(path.poses[:, :2], path.times, axis=0), -path.poses[:, 2] - parameters.direction)
+    heading = heading + parameters.heading_walk * _walk(rng, steps)
+    through_water = np.gradient(path.poses[:, :2], path.times, axis=0) - [parameters.current, 0.0]
+    velocity = rotated(through_water, -path.poses[:, 2] - parameters.direction)
     noise = np.column_stack([lasting(rng, steps, _SPEED_TIME) for _ in range(2)])
-    velocity = velocity / (1.0 + parameters.scale) + parameters.speed_deviation * noise
+    scale = np.full((len(steps), 1), 1.0 + parameters.scale)
+    if parameters.scale_walk:
+        scale[:, 0] += parameters.scale_walk * _walk(rng, steps)
+    velocity = velocity / scale + parameters.speed_deviation * noise
     positions = np.cumsum(rotated(velocity, heading) * steps[:, np.newaxis], axis=0)
     return Track(path.times, np.column_stack([positions - positions[0], heading]))
+
+
+def _walk(rng: np.random.RandomState, steps: np.ndarray) -> np.ndarray:
+    """Return a random walk (m,) of deviation 1 after a second; steps: (m,) s."""
+    return np.cumsum(rng.normal(size=len(steps)) * np.sqrt(np.abs(steps)))
 
 
 def lasting(rng: np.random.RandomState, steps: np.ndarray, time: float) -> np.ndarray:

@@ -1,21 +1,13 @@
-"""Prints how far live and batch paths are from the truth on twins of a recorded run."""
+"""Twins of a recorded run: its path and timing, in other water and with other errors."""
 
 from dataclasses import replace
-from functools import partial
-from pathlib import Path
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser
-from benchmarks.paths import batch_figures, live_figures, solved_live
-from benchmarks.twin_conditions import TWINS, TwinParameters, reported, true_path
+from benchmarks.twin_conditions import TwinParameters, reported, true_path
 from benchmarks.twin_water import heard, made_water
-from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.recording import Recording, Truth, read_recording
-from mlsm_manager.offline.run_files import positions_at
-from mlsm_manager.offline.suited_parameters import echo_shape_of
+from mlsm_manager.offline.recording import Recording, Truth
 from node_support.geometry import matrices
-from recordings.reader import Request
 from sonar_processing.beams.beam import PlacedBeam
 
 _AT_ENDS = 2.0  # s at both ends of the recording without beams, so that odometry covers delayed beams
@@ -45,22 +37,3 @@ def twin_of(source: Recording, parameters: TwinParameters) -> Recording:
     ]
     times = np.arange(path.times[0], path.times[-1], 1.0)
     return Recording(made, 0, odometry, Truth(times, path.at(times)[:, :2]))
-
-
-def main() -> None:
-    """Print two lines per twin."""
-    parser = benchmark_parser("twins", __doc__)
-    parser.add_argument("bag", type=Path, help="recording whose path and timing the twins have")
-    parser.add_argument("twins", nargs="*", default=list(TWINS), help="which ones; default: " + ", ".join(TWINS))
-    arguments = parser.parse_args()
-    source = read_recording(arguments.bag, Request())
-    for name in arguments.twins:
-        twin = twin_of(source, TWINS[name])
-        solver = solved_live(twin, OdometryKind.DVL, echo_shape_of([placed.beam for placed in twin.beams]))
-        truth = partial(positions_at, twin.truth.times, twin.truth.positions)
-        print(f"{name}, live: {live_figures(solver, truth).line()}", flush=True)
-        print(f"{name}, batch: {batch_figures(solver, truth)[0].line()}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -43,7 +43,7 @@ def make_environment(python: str) -> None:
         return
     shutil.rmtree(str(ENVIRONMENT), ignore_errors=True)
     subprocess.run([python, "-m", "venv", str(ENVIRONMENT)], check=True)
-    pip = [str(ENVIRONMENT / "bin/python"), "-m", "pip", "install", "--quiet", "--disable-pip-version-check"]
+    pip = [str(ENVIRONMENT / "bin/python"), "-m", "pip", "install", "-q", "--no-compile", "--disable-pip-version-check"]
     subprocess.run([*pip, "wheel"], check=True)
     subprocess.run([*pip, "-r", str(REQUIREMENTS[0])], check=True)
     (site_packages,) = ENVIRONMENT.glob("lib/python3.8/site-packages")

@@ -3,8 +3,9 @@
 from typing import Dict, List
 
 import numpy as np
-from benchmarks.heads import mean_figures
 from benchmarks.matchers import MatcherName
+from benchmarks.no_parameters import outcome
+from benchmarks.paths import PathFigures
 from benchmarks.scans import KINDS, ScanMaker, SonarKind
 from benchmarks.tours import simulated
 from matplotlib.axes import Axes
@@ -68,8 +69,10 @@ def _row(kind: SonarKind, squares: np.ndarray) -> List[str]:
 
 
 def _joint(world: str, kind: SonarKind) -> List[str]:
-    found = mean_figures(simulated(f"{world}_tour", kind), _DRAWS)
-    cells = [text for one in found for text in (f"{one.mean:.2f} m", f"{one.stated:.2f} m", f"{one.nees:.2f}")]
+    tour = simulated(f"{world}_tour", kind)
+    outcomes = [outcome(tour.with_dvl(seed), ()) for seed in range(_DRAWS)]
+    means = [PathFigures(*np.mean([one[path] for one in outcomes], axis=0)) for path in (0, 1)]
+    cells = [text for one in means for text in (f"{one.mean:.2f} m", f"{one.stated:.2f} m", f"{one.nees:.2f}")]
     return [world, str(kind), *cells]
 
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import List, Sequence, Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.figure import Figure
 from matplotlib.image import AxesImage
-from PIL import Image
+from PIL import Image, ImageChops
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from node_support.files import write_whole
@@ -31,8 +31,6 @@ _BLOCK_COLOURS = {BlockType.HORIZONTAL: (0.72, 0.15, 0.12), BlockType.VERTICAL: 
 """The thesis's: red, and light yellow for vertical blocks."""
 _LEAST_HEIGHT = 0.08  # m: a block of one point is drawn this high
 _CORNERS = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
-# Brightness of the top and of the sides that look to -x and to -y.
-_SHADES = (1.0, 0.82, 0.66)
 
 
 class Pictures:
@@ -88,8 +86,9 @@ def _png(figure: Figure, resolution: int) -> bytes:
 
 
 def _in_few_colours(png: bytes) -> bytes:
-    small = BytesIO()
-    image = Image.open(BytesIO(png)).convert("RGB").quantize(_COLOURS, method=Image.FASTOCTREE, dither=0)
+    """Return the picture with fewer colours and without white around it, which boxes in space have much of."""
+    small, image = BytesIO(), Image.open(BytesIO(png)).convert("RGB")
+    image = image.crop(ImageChops.invert(image).getbbox()).quantize(_COLOURS, method=Image.FASTOCTREE, dither=0)
     image.save(small, format="png", optimize=True)
     return small.getvalue()
 
@@ -139,48 +138,18 @@ def draw_outlines(axes: Axes, world: World, label: str) -> None:
     axes.add_collection(LineCollection(lines, colors="#1f5fa8", linewidths=1.0, zorder=1, label=label))
 
 
-def draw_in_space(axes: Axes, blocks: Blocks, direction: float, elevation: float) -> None:
-    """Draw blocks as boxes in parallel projection, as seen from `direction` and `elevation` [rad].
-
-    Boxes on a grid do not cut each other: drawn from far to near, each hides what is behind it.
-    """
-    towards = np.array(
-        [np.cos(direction) * np.cos(elevation), np.sin(direction) * np.cos(elevation), np.sin(elevation)]
-    )
-    right = np.array([-np.sin(direction), np.cos(direction), 0.0])
-    up = np.cross(towards, right)
-    faces, colours = _faces(blocks, towards)
-    order = np.argsort(np.einsum("nki,i->n", faces, towards), kind="stable")
-    flat = np.stack([faces @ right, faces @ up], axis=-1)[order]
-    axes.add_collection(
-        PolyCollection(flat, facecolors=colours[order], edgecolors=colours[order] * 0.7, linewidths=0.2)
-    )
-    axes.set_aspect("equal")
-    axes.autoscale_view()
+def drawn_in_space(blocks: Blocks, direction: float, elevation: float) -> Figure:
+    """Return a figure of blocks as boxes in parallel projection, seen from `direction` and `elevation` [rad]."""
+    figure = Figure(figsize=(9.0, 9.0), constrained_layout=True)
+    axes = figure.add_subplot(projection="3d", proj_type="ortho")
+    low = blocks.centers - blocks.resolution / 2.0
+    height = np.maximum(blocks.depth, _LEAST_HEIGHT)
+    colours = [_BLOCK_COLOURS[BlockType(int(kind))] for kind in blocks.type]
+    axes.bar3d(*low.T, blocks.bottom, blocks.resolution, blocks.resolution, height, colours, shade=True)
+    axes.view_init(np.degrees(elevation), np.degrees(direction))
+    axes.set_box_aspect([np.ptp(axis) for axis in (axes.get_xlim(), axes.get_ylim(), axes.get_zlim())], zoom=1.12)
     axes.set_axis_off()
-
-
-def _faces(blocks: Blocks, towards: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the visible faces (n, 4, 3) and their colours (n, 3)."""
-    size = blocks.resolution
-    low = blocks.centers - size / 2.0
-    bottom, top = blocks.bottom, np.maximum(blocks.height, blocks.bottom + _LEAST_HEIGHT)
-    base = np.array([_BLOCK_COLOURS[BlockType(int(kind))] for kind in blocks.type])
-    plan = low[:, np.newaxis] + _CORNERS * size
-    faces: List[np.ndarray] = [_at_height(plan, top)]
-    for axis in (0, 1):
-        side = low.copy()
-        side[:, axis] += size if towards[axis] > 0 else 0.0
-        other = np.zeros(2)
-        other[1 - axis] = size
-        edge = np.stack([side, side + other], axis=1)
-        faces.append(np.concatenate([_at_height(edge, bottom), _at_height(edge, top)[:, ::-1]], axis=1))
-    return np.concatenate(faces), np.concatenate([base * shade for shade in _SHADES])
-
-
-def _at_height(plan: np.ndarray, heights: np.ndarray) -> np.ndarray:
-    """Return places (n, k, 3) of places (n, k, 2) seen from above."""
-    return np.concatenate([plan, np.broadcast_to(heights[:, np.newaxis, np.newaxis], (*plan.shape[:2], 1))], axis=2)
+    return figure
 
 
 def draw_from_above(axes: Axes, blocks: Blocks, alpha: float = 1.0) -> None:

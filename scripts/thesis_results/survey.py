@@ -1,10 +1,10 @@
 """7.3: the harbour surveyed by stepping the tilt servo, as blocks, and how far these are from its surfaces."""
 
 import itertools
+from importlib import import_module
 from typing import List, Mapping
 
 import numpy as np
-import trimesh
 import yaml
 from benchmarks.harness import ROOT
 
@@ -22,10 +22,10 @@ from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.vehicle.robot import Servo, ServoParameters, tilted
-from sonar_simulator.world.world import Shape, World
+from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.page import joined, prose, table
-from thesis_results.pictures import Pictures, draw_in_space, new_figure
+from thesis_results.pictures import Pictures, drawn_in_space
 
 RESOLUTION = 0.5
 _PLACE = (-20.0, 10.0, -2.5)
@@ -86,11 +86,8 @@ def surveyed(world: World, opening_deg: float, reach: float) -> Blocks:
 
 
 def _shown(pictures: Pictures, file: str, name: str, blocks: Blocks) -> str:
-    figure, ((axes,),) = new_figure(10.0, 6.0)
-    draw_in_space(axes, blocks, *_SEEN_FROM)
-    return pictures.save(
-        file, figure, f"{name.capitalize()}: {len(blocks)} blocks. Light yellow: vertical, red: horizontal."
-    )
+    what = f"{name.capitalize()}: {len(blocks)} blocks. Light yellow: vertical, red: horizontal."
+    return pictures.save(file, drawn_in_space(blocks, *_SEEN_FROM), what)
 
 
 def _rows(found: List[Blocks], world: World) -> List[List[str]]:
@@ -116,22 +113,6 @@ def _block_errors(blocks: Blocks, world: World) -> np.ndarray:
 
 def distances(world: World, points: np.ndarray) -> np.ndarray:
     """Return (n,) distances [m] of points (n, 3) from the nearest surface, which may be seen from inside or outside."""
-    return np.min([_distance(shape, points) for shape in world.shapes], axis=0)
-
-
-def _distance(shape: Shape, points: np.ndarray) -> np.ndarray:
-    if shape.kind == "mesh":
-        vertices, faces = shape.triangles()
-        corners = vertices[faces]
-        nearest = [trimesh.triangles.closest_point(corners, np.tile(point, (len(corners), 1))) for point in points]
-        return np.linalg.norm(np.array(nearest) - points[:, np.newaxis], axis=2).min(axis=1)
-    local = (points - shape.pose[:3, 3]) @ shape.pose[:3, :3]
-    if shape.kind == "sphere":
-        return np.abs(np.linalg.norm(local, axis=1) - shape.size[0])
-    if shape.kind == "cylinder":
-        radius, length = shape.size
-        beyond = np.column_stack([np.hypot(local[:, 0], local[:, 1]) - radius, np.abs(local[:, 2]) - length / 2.0])
-    else:
-        beyond = np.abs(local) - np.array(shape.size) / 2.0
-    outside = np.linalg.norm(np.maximum(beyond, 0.0), axis=1)
-    return np.where(beyond.max(axis=1) > 0.0, outside, -beyond.max(axis=1))
+    scene = import_module("open3d").t.geometry.RaycastingScene()
+    scene.add_triangles(world.vertices.astype(np.float32), world.faces.astype(np.uint32))
+    return scene.compute_distance(points.astype(np.float32)).numpy()

@@ -2,9 +2,8 @@
 
 import mmap
 import os
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Iterable, Iterator, List, Optional, Tuple, Union
+from typing import Iterable, Iterator, List, NamedTuple, Optional, Tuple, Union
 
 from imagenex_852_driver.log_record import (
     HEADER_LENGTH,
@@ -17,8 +16,6 @@ from imagenex_852_driver.log_record import (
 from imagenex_852_driver.protocol.reply import FrameError
 
 USUAL_RATE = 10.0  # 1/s: pings of a head at 30 m, for logs whose stamps do not tell
-# Damaged parts beyond this number are only counted.
-_REMEMBERED_DAMAGES = 100
 
 
 def timed(pings: Iterable[LoggedPing], rate: Optional[float] = None) -> Iterator[Tuple[float, LoggedPing]]:
@@ -41,8 +38,7 @@ class LogWriteError(OSError):
     """A ping could not be written; the file still ends with a complete ping."""
 
 
-@dataclass(frozen=True)
-class DamagedPart:
+class DamagedPart(NamedTuple):
     """A part of a log that is not a ping: where it begins, its number of bytes, and what is wrong with it."""
 
     offset: int
@@ -54,27 +50,19 @@ class DamagedPart:
 
 
 class LogReader:
-    """Iterates over the pings of a log; skips every damaged part up to the next complete ping.
+    """Iterates once over the pings of a log; skips every damaged part up to the next complete ping.
 
-    `ping_count`, `damage_count` and `damages` (the first 100 `DamagedPart`s) are final after the last ping.
+    `ping_count` and `damages` are final after the last ping.
     """
 
     def __init__(self, path: Union[str, Path]) -> None:
         self.ping_count = 0
-        self.damage_count = 0
         self.damages: List[DamagedPart] = []
         with open(path, "rb") as file:
             empty = os.fstat(file.fileno()).st_size == 0
             self._data = b"" if empty else mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ)
-        self._pings = self._read()
 
     def __iter__(self) -> Iterator[LoggedPing]:
-        return self
-
-    def __next__(self) -> LoggedPing:
-        return next(self._pings)
-
-    def _read(self) -> Iterator[LoggedPing]:
         position, damage_start, reason = 0, None, ""
         while position < len(self._data):
             ping, end, problem = self._record_at(position)
@@ -123,10 +111,7 @@ class LogReader:
                 start = found + 1
 
     def _note_damage(self, start: Optional[int], end: int, reason: str) -> None:
-        if start is None:
-            return
-        self.damage_count += 1
-        if len(self.damages) < _REMEMBERED_DAMAGES:
+        if start is not None:
             self.damages.append(DamagedPart(start, end - start, reason))
 
 

@@ -16,22 +16,19 @@ _INDICES = {ReplyKind.IPX: 0, ReplyKind.IMX: 2, ReplyKind.IGX: 3}
 _RECORD_LENGTHS = {ReplyKind.IPX: 128, ReplyKind.IMX: 384, ReplyKind.IGX: 640}
 _MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 _STAMP = re.compile(rb"(\d\d)-([A-Za-z]{3})-(\d{4})\0(\d\d):(\d\d):(\d\d)\0\.(\d\d)\0")
-_ZERO_TRAIN = 70  # Codes of the manufacturer's log format: train angle 0, and what is added to the number of turns
-_TURNS_OFFSET = 100
-_DEFAULT_SPEED_OF_SOUND = 1500.0  # m/s: the speed that the head uses for its ranges
-_FEET = 0.3048  # m
-# Bytes that the manufacturer calls reserved but always writes.
-_RESERVED = {42: 20, 43: 9}
+_ZERO_TRAIN = 70  # Code of train angle 0 (manufacturer's log format)
+# Bytes that the manufacturer calls reserved but always writes, and 1500 m/s, which the head makes ranges with: flagged
+# as known, in tenths.
+_CONSTANT = {42: 20, 43: 9, 46: 0x80 | 15000 >> 8, 47: 15000 & 0xFF}
 
 
 @dataclass(frozen=True)
 class LoggedPing:
     """One ping of a log.
 
-    `stamp` is seconds since 1970 (the log's date and time taken as UTC, hundredths), None if they cannot
-    be read; degrees are clockwise, as the head counts them; `depth` in metres, `heading_deg` and `turns` are None
-    if the logger had none; `text` is the user's, 31 characters at most. Sector, train angle, step and
-    direction of an echo sounder mean nothing.
+    `stamp` is seconds since 1970 (the log's date and time taken as UTC, hundredths), None if they cannot be read;
+    degrees are clockwise, as the head counts them. Sector, train angle, step and direction of an echo sounder mean
+    nothing. The user's text and what the logger's own sensors measured are left out.
     """
 
     reply: Reply
@@ -44,11 +41,6 @@ class LoggedPing:
     train_angle_deg: int = 0
     pulse_length_us: int = 0
     profile: int = 0
-    speed_of_sound: float = _DEFAULT_SPEED_OF_SOUND
-    text: str = ""
-    depth: Optional[float] = None
-    heading_deg: Optional[float] = None
-    turns: Optional[float] = None
     frequency_khz: int = 675
 
     @classmethod
@@ -76,15 +68,9 @@ class LoggedPing:
         record[4:6] = len(record).to_bytes(2, "big")
         record[6:8] = kind.length.to_bytes(2, "big")
         record[8:33] = _encoded_stamp(self.stamp)
-        for index, value in {**_RESERVED, **self._header_bytes()}.items():
+        for index, value in {**_CONSTANT, **self._header_bytes()}.items():
             require(f"byte {index} of the log record", value, range(256))
             record[index] = value
-        record[46:48] = _flagged(self.speed_of_sound)
-        record[48:79] = self.text.encode("latin-1", "replace")[:31].ljust(31, b"\0")
-        record[80:82] = _flagged(self.depth)
-        record[82:83] = b"\0" if self.depth is None else b"M"
-        record[83:85] = _flagged(self.heading_deg)
-        record[85:87] = _flagged(self.turns, _TURNS_OFFSET)
         record[HEADER_LENGTH : HEADER_LENGTH + kind.length] = self.reply.encode()
         return bytes(record)
 
@@ -104,10 +90,7 @@ class LoggedPing:
 
 
 def decode_record(record: bytes) -> LoggedPing:
-    """Read one record, with or without zero fill; raise FrameError if its header or reply is inconsistent.
-
-    Texts, times and values of the logger's own sensors never cause a ping to be refused.
-    """
+    """Read one record, with or without zero fill; raise FrameError if its header or reply is inconsistent."""
     kind = check_record_header(record)
     return LoggedPing(
         reply=Reply.decode(record[HEADER_LENGTH : HEADER_LENGTH + kind.length]),
@@ -120,11 +103,6 @@ def decode_record(record: bytes) -> LoggedPing:
         train_angle_deg=(record[40] - _ZERO_TRAIN) * 3,
         pulse_length_us=record[44],
         profile=record[45],
-        speed_of_sound=_unflagged(record[46:48]) or _DEFAULT_SPEED_OF_SOUND,
-        text=record[48:80].split(b"\0")[0].decode("latin-1"),
-        depth=_decoded_depth(record),
-        heading_deg=_unflagged(record[83:85]),
-        turns=_unflagged(record[85:87], _TURNS_OFFSET),
         frequency_khz=850 if record[87] == 1 else 675,
     )
 
@@ -167,21 +145,3 @@ def _decoded_stamp(data: bytes) -> Optional[float]:
     if seconds is None or tuple(time.gmtime(seconds)[:6]) != fields:
         return None
     return seconds + hundredths / 100
-
-
-def _flagged(value: Optional[float], offset: float = 0.0) -> bytes:
-    if value is None:
-        return b"\0\0"
-    tenths = round((value + offset) * 10)
-    require(f"tenths of {value}", tenths, range(0x8000))
-    return (0x8000 | tenths).to_bytes(2, "big")
-
-
-def _unflagged(data: bytes, offset: float = 0.0) -> Optional[float]:
-    value = int.from_bytes(data, "big")
-    return (value & 0x7FFF) / 10 - offset if value & 0x8000 else None
-
-
-def _decoded_depth(record: bytes) -> Optional[float]:
-    depth = _unflagged(record[80:82])
-    return depth * _FEET if depth is not None and record[82:83] == b"F" else depth

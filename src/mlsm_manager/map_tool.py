@@ -13,12 +13,11 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
 from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
-from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
+from mlsm_manager.surface_map.map_file import StoredMap, read_map
 from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged
-from mlsm_manager.surface_map.ply_file import read_ply
 from node_support.help import CommandLine
 
-_MAPS = "a map (.mlsm, or a .ply of this package)"
+_MAPS = "a map (.mlsm)"
 
 
 def run_map_tool() -> None:
@@ -44,11 +43,6 @@ def _tell(lines: List[str]) -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def read_any(path: Path) -> StoredMap:
-    """Return the map in a .mlsm or in a .ply of this package. Raises ValueError, of one line, and OSError."""
-    return StoredMap("map", {Layer.SHOWN: read_ply(path)}) if path.suffix == ".ply" else read_map(path)
-
-
 def info_lines(path: Path, stored: StoredMap) -> List[str]:
     """Return in words what a map holds."""
     made = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(stored.made)) if stored.made else "at a time not known"
@@ -69,11 +63,11 @@ def _layer_line(blocks: Blocks) -> str:
 
 
 def _info(options: Namespace) -> List[str]:
-    return [line for path in options.maps for line in info_lines(path, read_any(path))]
+    return [line for path in options.maps for line in info_lines(path, read_map(path))]
 
 
 def _view(options: Namespace) -> List[str]:
-    stored, color_by = read_any(options.map), ColorBy(options.color.upper())
+    stored, color_by = read_map(options.map), ColorBy(options.color.upper())
     if has_screen():
         show(stored.shown, options.map.name, color_by)
         return []
@@ -84,7 +78,7 @@ def _view(options: Namespace) -> List[str]:
 
 def _export(options: Namespace) -> List[str]:
     low, high = options.slice
-    export(read_any(options.map), options.out, ExportOptions(low, high, ColorBy(options.color.upper())))
+    export(read_map(options.map), options.out, ExportOptions(low, high, ColorBy(options.color.upper())))
     return [f"{options.out} written"]
 
 
@@ -93,7 +87,7 @@ def _crop(options: Namespace) -> List[str]:
         raise ValueError(f"--low {options.low} --high {options.high}: must both be X Y or both X Y Z")
     if any(low > high for low, high in zip(options.low, options.high)):
         raise ValueError(f"--low {options.low} --high {options.high}: low must not be above high")
-    stored = cropped(read_any(options.map), np.array(options.low), np.array(options.high))
+    stored = cropped(read_map(options.map), np.array(options.low), np.array(options.high))
     if not len(stored):
         raise ValueError(f"{options.map}: the map has no blocks between {options.low} and {options.high}")
     export(stored, options.out, ExportOptions())
@@ -103,7 +97,7 @@ def _crop(options: Namespace) -> List[str]:
 def _merge(options: Namespace) -> List[str]:
     x, y, z, yaw = options.transform
     transform = LevelTransform(x, y, z, np.radians(yaw))
-    first, second = read_any(options.first), read_any(options.second)
+    first, second = read_map(options.first), read_map(options.second)
     stored = merged(first, second, transform)
     export(stored, options.out, ExportOptions())
     exact = "exactly" if transform.keeps_cells(stored.shown.resolution) else "cells do not align, so to within a cell"
@@ -111,7 +105,7 @@ def _merge(options: Namespace) -> List[str]:
 
 
 def _diff(options: Namespace) -> List[str]:
-    result = difference(read_any(options.first).shown, read_any(options.second).shown)
+    result = difference(read_map(options.first).shown, read_map(options.second).shown)
     lines = [
         f"{len(result.both)} blocks of {options.first.name} are in {options.second.name} too",
         f"{len(result.only_first)} are in {options.first.name} only",

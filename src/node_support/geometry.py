@@ -105,21 +105,15 @@ def quaternion_of(matrix: np.ndarray) -> np.ndarray:
     return row / math.sqrt(row.dot(row))
 
 
-def quaternions_of(matrices: np.ndarray) -> np.ndarray:
-    """Return the unit quaternions (n, 4), x y z w, of the rotations in (n, 3, 3) or (n, 4, 4) matrices."""
-    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = np.moveaxis(matrices[:, :3, :3], 0, -1)
-    products = np.array(
-        [
-            [1.0 + xx - yy - zz, xy + yx, xz + zx, zy - yz],
-            [xy + yx, 1.0 - xx + yy - zz, yz + zy, xz - zx],
-            [xz + zx, yz + zy, 1.0 - xx - yy + zz, yx - xy],
-            [zy - yz, xz - zx, yx - xy, 1.0 + xx + yy + zz],
-        ]
-    )
-    largest = np.argmax(np.diagonal(products), axis=1)
-    rows = products[largest, :, np.arange(len(matrices))]
-    # numpy's dot product adds as in quaternion_of.
-    return rows / np.sqrt(rows[:, np.newaxis] @ rows[:, :, np.newaxis])[:, 0]
+def rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
+    """Return (n, 3, 3) rotations of unit quaternions (n, 4), x y z w."""
+    x, y, z, w = quaternions.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.array(rows).transpose(2, 0, 1)
 
 
 def yaw_of(pose: np.ndarray) -> float:

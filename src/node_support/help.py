@@ -2,6 +2,7 @@
 
 import argparse
 import dataclasses
+import math
 import re
 import signal
 import sys
@@ -26,6 +27,14 @@ class CommandLine(argparse.ArgumentParser):
     def print_help(self, file: Optional[IO[str]] = None) -> None:
         """Print the help on `file`, standard output unless told otherwise."""
         write_help(self.format_help().rstrip("\n"), file or sys.stdout)
+
+
+def positive(text: str) -> float:
+    """Return the number above 0 that an argument of a command line gives; raises ArgumentTypeError, ValueError."""
+    value = float(text)
+    if not 0.0 < value < math.inf:
+        raise argparse.ArgumentTypeError(f"{text}: must be above 0")
+    return value
 
 
 def write_help(text: str, file: IO[str]) -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import partial
 from typing import Dict, Tuple
 
 from node_support import topics
@@ -41,18 +42,7 @@ class HostDescription:
     hosted: Tuple[str, ...]
 
 
-def _subscribes(name: str, kind: str, text: str) -> Interface:
-    return Interface(Role.INPUT, name, kind, text)
-
-
-def _publishes(name: str, kind: str, text: str) -> Interface:
-    return Interface(Role.OUTPUT, name, kind, text)
-
-
-def _serves(name: str, kind: str, text: str) -> Interface:
-    return Interface(Role.SERVICE, name, kind, text)
-
-
+_subscribes, _publishes, _serves = (partial(Interface, role) for role in Role)
 _BEAMS_IN = _subscribes(
     topics.BEAMS, "SonarScanLine", "beams; also of the types of other sonars, see [sonars](sonars.md)"
 )
@@ -73,7 +63,7 @@ DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "cou
 NODES: Dict[str, NodeDescription] = {
     "imagenex_852_driver": NodeDescription(
         "Driver of the Imagenex 852 sonar (thesis 4.1.3, 4.5.1). See [the driver](imagenex_852_driver.md), also for "
-        "the log tools `play_852`, `record_852` and `convert_852`.",
+        "the log tools `play_852` and `record_852`.",
         _OF_DRIVERS,
     ),
     "imagenex_852_emulator": NodeDescription(

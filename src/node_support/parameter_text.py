@@ -5,6 +5,8 @@ import textwrap
 from enum import Enum
 from typing import List, Mapping, Tuple, Type
 
+import yaml
+
 from node_support.parameters import EXPERT, ParameterSet, describe
 
 _FOR_EXPERTS = "hardly ever changed: each with the reason for its default"
@@ -87,4 +89,5 @@ def _yaml_value(value: object) -> str:
         return "true" if value else "false"
     if isinstance(value, str):
         return f'"{value}"'
-    return repr(value)
+    # yaml 1.1 takes 7e-05 for a text.
+    return yaml.safe_dump(value).splitlines()[0]

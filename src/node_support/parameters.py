@@ -18,7 +18,7 @@ from difflib import get_close_matches
 from enum import Enum
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar
 
-from node_support.old_keys import GONE, RENAMED
+from node_support.old_keys import GONE, OLD_VALUES, RENAMED
 
 EXPERT = "expert"
 """The key under which yaml files and the parameter server hold the parameters for experts."""
@@ -35,7 +35,12 @@ class ParameterError(ValueError):
 
 @dataclasses.dataclass(frozen=True)
 class Description:
-    """What is known of one parameter besides its name, type and default."""
+    """What is known of one parameter besides its name, type and default.
+
+    `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
+    the others only at start-up; `may_be_empty` allows an empty string; `thesis_name` is the parameter's name in the
+    2015 package; `expert` is the reason for the default of a parameter that hardly anybody needs to change.
+    """
 
     text: str
     unit: str = ""
@@ -62,26 +67,9 @@ class Description:
         return " ".join([number, *bounds]) + unit
 
 
-def parameter(
-    default: Any,
-    text: str,
-    *,
-    unit: str = "",
-    low: Optional[float] = None,
-    high: Optional[float] = None,
-    thesis_name: str = "",
-    tunable: bool = True,
-    may_be_empty: bool = False,
-    expert: str = "",
-) -> Any:
-    """Declare one field of a `ParameterSet`.
-
-    `low` and `high` are inclusive; `tunable` parameters can be changed while the node runs (dynamic_reconfigure),
-    the others only at start-up; `may_be_empty` allows an empty string; `thesis_name` is the parameter's name in the
-    2015 package; `expert` is the reason for the default of a parameter that hardly anybody needs to change.
-    """
-    description = Description(text, unit, low, high, thesis_name, tunable, may_be_empty, expert)
-    return dataclasses.field(default=default, metadata={_METADATA_KEY: description})
+def parameter(default: Any, text: str, **details: Any) -> Any:
+    """Declare one field of a `ParameterSet`; `details` are fields of its `Description`."""
+    return dataclasses.field(default=default, metadata={_METADATA_KEY: Description(text, **details)})
 
 
 def describe(field: dataclasses.Field) -> Description:
@@ -113,7 +101,7 @@ class ParameterSet:
 
     @classmethod
     def by_name(cls, values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
-        """Return plain values by the names of the parameters, and a remark on each key of an older version.
+        """Return plain values by the names of the parameters, and a remark on each key or value of an older version.
 
         A key beside `expert` goes before the same one under it, and an older name before the newer one: whoever gives
         them wants something else than the default files, which hold the others. Raises ParameterError for a key that
@@ -133,6 +121,10 @@ class ParameterSet:
                 remarks.append(f"{key} -> nothing ({GONE[key]})")
             else:
                 raise ParameterError(f"{key} = {given[key]!r}: no such parameter; {_names_like(key, known)}")
+        for key, value in found.items():
+            if isinstance(value, str) and (key, value) in OLD_VALUES:
+                found[key] = OLD_VALUES[key, value]
+                remarks.append(f"{key} = {value} -> {found[key]}")
         return found, remarks
 
     @classmethod

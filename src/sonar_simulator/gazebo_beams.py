@@ -60,16 +60,6 @@ class GazeboSonarParameters(StampParameters):
         if self.echo_model not in ECHO_MODELS:
             raise ParameterError(f"echo_model = {self.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
 
-    @property
-    def vertical_opening(self) -> float:
-        """Height of the ray sensor's pyramid, rad."""
-        return math.radians(self.vertical_opening_deg)
-
-    @property
-    def horizontal_opening(self) -> float:
-        """Width of a beam, rad."""
-        return math.radians(self.horizontal_opening_deg)
-
 
 GROUPS: Dict[str, Type[ParameterSet]] = {name: kind.parameters for name, kind in ECHO_MODELS.items()}
 """Groups of parameters, one for each echo model; the one that `echo_model` names is used."""

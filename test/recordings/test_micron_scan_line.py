@@ -6,7 +6,7 @@ import pytest
 from mlsm_manager.offline.recording import read_recording, scans_of
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import Request
-from sonar_processing.filters.echo_extractor import EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 BEAMS, TURNS = 2028, 10
 
@@ -38,7 +38,7 @@ def test_what_was_assumed_is_said(micron):
 
 def test_every_turn_hears_the_bank_as_one_line(micron):
     """The vehicle swings, so that the bank is elsewhere in each turn; within one turn it is a line."""
-    scans = [scan for scan, _ in scans_of(micron, EchoExtractorParameters())]
+    scans = [scan for scan, _ in scans_of(micron, EchoExtractor(EchoExtractorParameters()))]
     assert len(scans) == TURNS
     for scan in scans[1:]:
         bank = scan.points[(scan.points[:, 0] > 2.0) & (np.abs(scan.points[:, 1]) < 6.0)]

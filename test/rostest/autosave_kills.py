@@ -36,6 +36,8 @@ class KilledNode:
         rospy.set_param(f"{namespace}/mlsm_core/map_directory", str(folder))
         rospy.set_param(f"{namespace}/mlsm_core/autosave_period", PERIOD)
         rospy.set_param(f"{namespace}/mlsm_core/estimator", rospy.get_param("/mlsm_core/estimator"))
+        rospy.set_param(f"{namespace}/mlsm_core/start_matching", False)
+        rospy.set_param(f"{namespace}/mlsm_core/map_input", "CLEANED")
         self._publisher = rospy.Publisher(f"{namespace}/sonar/scan/cleaned", StampedIntensityCloud, queue_size=10)
         self._get_region = f"{namespace}/mlsm_core/get_region"
         self._sent = 0

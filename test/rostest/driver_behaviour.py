@@ -27,6 +27,7 @@ class DriverBehaviour:
 
     sonar: the nodes' names are those of this sonar. defaults: set before each test. step: rad from beam to beam with
     the defaults. refused: changes that the head cannot do. foreign_fault: what its emulator cannot do, and its answer.
+    counted_faults: faults of the head and as what the driver counts them.
     """
 
     sonar: ClassVar[str]
@@ -34,6 +35,7 @@ class DriverBehaviour:
     step: ClassVar[float]
     refused: ClassVar[Tuple[Dict[str, Any], ...]]
     foreign_fault: ClassVar[Tuple[str, str]]
+    counted_faults: ClassVar[Dict[str, str]]
 
     @classmethod
     def setUpClass(cls) -> None:
@@ -119,6 +121,16 @@ class DriverBehaviour:
         assert gap > absence
         assert health.wait(lambda arrays: values(arrays[-1])["connected"] == "true")
 
+    def test_faults_of_the_head_are_counted_and_the_scan_goes_on(self) -> None:
+        health = diagnostics(f"{self.sonar}_driver")
+        before = values(health.wait_for_more(1)[0])
+        for fault in self.counted_faults:
+            assert self.order_fault(fault, 1).success
+        for count in self.counted_faults.values():
+            wanted = int(before.get(count, 0)) + 1
+            assert health.wait(lambda arrays, w=wanted, c=count: int(values(arrays[-1]).get(c, 0)) >= w), count
+        self.fresh_beams(3)
+
     def test_refused_changes_leave_everything_as_it_was(self) -> None:
         for bad in self.refused:
             before = self.client.get_configuration(timeout=PATIENCE)
@@ -143,6 +155,9 @@ class Imagenex852(DriverBehaviour, unittest.TestCase):
     }  # fmt: skip
     refused = ({"max_range": 25}, {"train_angle_deg": 60}, {"data_points": 300}, {"max_range": 1000})
     foreign_fault = "explosion", "explosion"
+    counted_faults: ClassVar[Dict[str, str]] = {
+        "garbled": "bad frames", "doubled": "unexpected replies", "dropped": "timeouts", "overrun": "overruns"
+    }  # fmt: skip
 
     def is_of_defaults(self, beam):
         return beam.maxrange_meters == 20.0
@@ -181,6 +196,7 @@ class Ping360(DriverBehaviour, unittest.TestCase):
     }  # fmt: skip
     refused = ({"max_range": 0.5}, {"transmit_duration_us": 3}, {"gain_setting": 3})
     foreign_fault = "overrun", "must be one of none, dropped"
+    counted_faults: ClassVar[Dict[str, str]] = {"garbled": "bad frames", "doubled": "unexpected replies"}
 
     def is_of_defaults(self, beam):
         return len(beam.intensities) == 400 and beam.gain == 1 and abs(beam.maxrange_meters - 8.0) < 0.05

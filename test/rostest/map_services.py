@@ -16,7 +16,7 @@ from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
 
-from mlsm_manager.surface_map.ply_file import read_ply
+from mlsm_manager.surface_map.map_file import read_map
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion, LoadMap, SaveMap
 
@@ -63,9 +63,9 @@ class MapServices(unittest.TestCase):
         self.assertEqual(len(set(stamps)), len(stamps))
 
     def test_a_map_is_saved_in_the_folder_that_was_named(self) -> None:
-        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar.ply", False)
+        answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("pillar", False)
         self.assertTrue(answer.success, answer.message)
-        self.assertEqual(sorted(read_ply(self.folder / "pillar.ply").count), [1, 15])
+        self.assertEqual(sorted(read_map(self.folder / "pillar.mlsm").shown.count), [1, 15])
 
     def test_a_saved_map_can_be_loaded_and_a_damaged_one_changes_nothing(self) -> None:
         load = rospy.ServiceProxy("/mlsm_core/load_map", LoadMap)

@@ -23,6 +23,7 @@ from mlsm_manager.offline.replay import Replayed, replay
 from node_support.geometry import composed, wrapped
 from recordings.reader import Request
 from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 TOPICS = ("/sonar/raw", "/tf", "/tf_static", "/cmd_vel")
 SECONDS = 300.0
@@ -113,7 +114,9 @@ def replayed(bag: Path) -> Replayed:
     parameters = map_bag_arguments(options).parameters
     raw = read_recording(bag, Request())
     found = raw.corrected(parameters.part(BeamCorrection))
-    return replay(found, [scan for scan, _ in scans_of(found, parameters.echoes())], parameters, lambda _: None)
+    return replay(
+        found, [scan for scan, _ in scans_of(found, EchoExtractor(parameters.echoes()))], parameters, lambda _: None
+    )
 
 
 def nearest(poses: list, wanted: float) -> np.ndarray:

@@ -4,7 +4,7 @@
 import unittest
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any, Dict, List
+from typing import Any, Dict, List, Sequence
 
 import numpy as np
 from graph import TEST_DATA, Inbox, launched, rows, run, wait_for_links, wait_for_subscribers
@@ -12,7 +12,9 @@ from playback import Step, play, steps_every
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
 
-from underwater_map_construction.msg import StampedIntensityCloud
+from sonar_processing.ros.conversions import cloud_from_message
+from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
+from underwater_map_construction.msg import Circles, StampedIntensityCloud, Walls
 
 HALF_LENGTH, HALF_WIDTH = 60.0, 25.0
 RANGE = 50.0
@@ -21,15 +23,19 @@ CELL = 0.5
 # Turns of the head in the bag, which ends in the middle of one.
 SCANS = 10
 BAG = TEST_DATA / "basin.bag"
+N_WALLS = 2  # as match_cleaned.yaml says
 SECONDS = 4.0  # between waits for slow nodes
 # Of the beams, in each layout: sonar_to_cloud, and a node for images where it has one.
 LISTENERS = {"one": 1, "many": 2}
 INNER_TOPICS = {"one": (), "many": ("sonarCloud", "thresholded", "cleaned", "polar")}
+LISTENING = {"sonarCloud": 1, "thresholded": 2, "cleaned": 3, "polar": 1}  # nodes and this test, with detectors
 TOPICS = {
     "cleaned": ("/sonar/scan/cleaned", StampedIntensityCloud),
     "echoes": ("/sonar/scan/echoes", StampedIntensityCloud),
     "laserScan": ("/sonar/scan/laserScan", LaserScan),
     "threshold": ("/thresholder/threshold", Float32),
+    "walls": ("/sonar/scan/line/coefficients", Walls),
+    "circles": ("/sonar/scan/circle/coefficients", Circles),
     "image": ("/sonar/image", Image),
 }
 
@@ -53,6 +59,13 @@ class OneAndManyProcesses(unittest.TestCase):
         np.testing.assert_array_equal(one["laserScan"].ranges, many["laserScan"].ranges)
         self.assertEqual(one["threshold"].data, many["threshold"].data)
         self.assertEqual((one["image"].width, one["image"].encoding), (501, "mono8"))
+
+    def test_both_layouts_search_the_newest_cleaned_cloud_for_walls_and_circles(self) -> None:
+        for made in self.beside.values():
+            found = LineDetector(LineDetectorParameters(n_walls=N_WALLS))(cloud_from_message(made["cleaned"]))
+            self.assertEqual(len(made["walls"].walls), len(found))
+            for shapes in (made["walls"], made["circles"]):
+                self.assertEqual(shapes.header.stamp, made["cleaned"].header.stamp)
 
     def test_echoes_of_the_walls_lie_on_them(self) -> None:
         """Those that are not of the buoys and the gate."""
@@ -96,13 +109,15 @@ class OneAndManyProcesses(unittest.TestCase):
         self.assertLess(abs(np.median(short_walls)), CELL / 2)
 
 
-def _steps(clouds: Inbox, maps: Inbox) -> List[Step]:
-    """Wait every few seconds of the bag until the map holds all clouds that have come."""
+def _steps(clouds: Inbox, shapes: Sequence[Inbox], maps: Inbox) -> List[Step]:
+    """Wait every few seconds of the bag until all clouds that have come are searched for shapes and in the map."""
 
     def wait() -> None:
-        newest = clouds.messages[-1:]
-        if newest:
-            maps.wait_for(lambda shown: shown.header.stamp >= newest[0].header.stamp)
+        came = clouds.messages
+        for found in shapes if came else ():
+            found.wait_for_number(len(came))
+        if came:
+            maps.wait_for(lambda shown: shown.header.stamp >= came[-1].header.stamp)
 
     return steps_every(SECONDS, BAG, wait)
 
@@ -115,13 +130,13 @@ def _made(processes: str, folder: Path) -> Dict[str, Any]:
     inboxes = {name: Inbox(topic, kind) for name, (topic, kind) in TOPICS.items()}
     maps = Inbox("/MLSM/cloud", PointCloud2)
     arguments = (f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml", f"map_directory:={folder}")
-    with launched("mapping.launch", *arguments):
+    with launched("mapping.launch", "shapes:=true", *arguments):
         for inbox in (maps, *inboxes.values()):
             inbox.wait_for_link()
         for topic in INNER_TOPICS[processes]:
-            wait_for_links(f"/sonar/scan/{topic}", 2 if topic == "cleaned" else 1)
+            wait_for_links(f"/sonar/scan/{topic}", LISTENING[topic])
         wait_for_subscribers("/sonar/raw", LISTENERS[processes])
-        play(BAG, rate=15, steps=_steps(inboxes["cleaned"], maps))
+        play(BAG, rate=15, steps=_steps(inboxes["cleaned"], (inboxes["walls"], inboxes["circles"]), maps))
         # Images come more often than turns.
         made = {name: inbox.wait_for_number(SCANS)[-1] for name, inbox in inboxes.items()}
         stamp = made["cleaned"].header.stamp

@@ -16,8 +16,7 @@ ATTEMPTS = 5
     [
         ("demo.launch", ["rviz:=false"]),
         ("survey_simulated.launch", ["rviz:=false", "processes:=many"]),
-        ("driver_emulated.launch", ["processes:=many"]),
-        ("driver_emulated.launch", ["sonar:=ping360"]),
+        ("driver_emulated.launch", ["sonar:=ping360", "processes:=many"]),
         ("play_bag.launch", ["rviz:=false", BAG]),
         ("vehicle.launch", ["standing:=true", "servo:=true", "processes:=many"]),
     ],

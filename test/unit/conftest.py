@@ -22,5 +22,5 @@ settings.register_profile("repeatable", derandomize=True, max_examples=50, **ANY
 # Other examples in every run, to look for what nobody thought of: pytest --hypothesis-profile=thorough.
 settings.register_profile("thorough", max_examples=1000, **ANY_SPEED)
 # For a second run of all tests with other versions, see scripts/oldest.
-settings.register_profile("few", settings.get_profile("repeatable"), max_examples=20)
+settings.register_profile("few", settings.get_profile("repeatable"), max_examples=5)
 settings.load_profile("repeatable")

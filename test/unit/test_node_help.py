@@ -14,7 +14,7 @@ from node_support.node_table import HOSTS, NODES
 from sonar_simulator.simulation.simulation_setup import GROUPS
 
 EXECUTABLES = sorted(path.name for path in (ROOT / "nodes").iterdir())
-PARAMETERS = {**{name: node.parameters for name, node in LIVE_NODES.items()}, **START_UP_NODES}
+PARAMETERS = {**LIVE_NODES, **START_UP_NODES}
 
 
 def _help(node, *arguments):
@@ -70,7 +70,7 @@ def test_the_arguments_that_roslaunch_adds_do_not_hide_the_question():
 
 def test_every_node_is_described():
     programs = {
-        "convert_852", "convert_bag", "map_bag", "map_tool", "play_852", "play_bag", "record_852", "simulate_bag",
+        "convert_bag", "map_bag", "map_tool", "play_852", "play_bag", "record_852", "simulate_bag",
     }  # fmt: skip
     assert {*NODES, *HOSTS, *programs} == set(EXECUTABLES)
 

@@ -9,6 +9,7 @@ from document import LIVE_NODES, START_UP_NODES, generated
 
 from node_support.node_table import NODES
 from node_support.parameters import describe
+from sonar_processing.filters.stage_table import config_name
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -36,7 +37,7 @@ def test_every_described_topic_stands_in_the_source(name):
 
 @pytest.mark.parametrize("name", LIVE_NODES)
 def test_the_default_yaml_makes_the_defaults(name):
-    parameters = LIVE_NODES[name].parameters
+    parameters = LIVE_NODES[name]
     text = (ROOT / "yaml" / f"{name}_default.yaml").read_text()
     assert parameters.from_mapping(yaml.safe_load(text)) == parameters()
 
@@ -44,8 +45,8 @@ def test_the_default_yaml_makes_the_defaults(name):
 @pytest.fixture(params=sorted(LIVE_NODES))
 def live(request):
     """Return a parameter dataclass and the dynamic_reconfigure module that the build made of it."""
-    node = LIVE_NODES[request.param]
-    return node.parameters, importlib.import_module(f"underwater_map_construction.cfg.{node.config_name}Config")
+    module = f"underwater_map_construction.cfg.{config_name(request.param.replace('_driver', ''))}Config"
+    return LIVE_NODES[request.param], importlib.import_module(module)
 
 
 def test_dynamic_reconfigure_offers_the_tunable_fields(live):

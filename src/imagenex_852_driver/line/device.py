@@ -1,12 +1,12 @@
 """The head on its serial line: sends one command, returns its reply, and counts everything else."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Iterator, List, Optional
 
 from imagenex_852_driver.line.parameters import ConnectionParameters
 from imagenex_852_driver.protocol.command import SwitchCommand
 from imagenex_852_driver.protocol.reply import Reply, ReplyKind
-from imagenex_852_driver.protocol.reply_parser import ParsedReply, ParserCounts, ReplyParser
+from imagenex_852_driver.protocol.reply_parser import ParsedReply, ReplyParser
 from sonar_driver.line.device import LineDevice
 from sonar_driver.line.driver_health import LineStats
 
@@ -22,14 +22,12 @@ class DeviceStats(LineStats):
     """Counts since the start.
 
     `early_replies`: whole replies that began before the sound of the outstanding command can have returned; they are
-    dropped. `overruns` and `rejected_switches` are reported by the head in replies that are otherwise valid. `parser`
-    holds the parser's own counts.
+    dropped. `overruns` and `rejected_switches` are reported by the head in replies that are otherwise valid.
     """
 
     early_replies: int = 0
     overruns: int = 0
     rejected_switches: int = 0
-    parser: ParserCounts = field(default_factory=ParserCounts)
     problems = {  # noqa: RUF012
         "timeouts": "no reply; check the head's power, the cable, baud_rate and head_id",
         "bad frames": "a broken reply; check the cable",
@@ -158,8 +156,6 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         except BaseException:
             self._count("interrupted")
             raise
-        finally:
-            self._note(parser=self._parser.counts)
         if wait.early_replies:
             self._count("early_replies", _EARLY, wait.early_replies)
         if wait.unexpected_replies:

@@ -1,11 +1,11 @@
 """Every parameter of the driver: the head's settings, validated before any of them is sent, the line and its timing."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from enum import Enum
 
 from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
 from imagenex_852_driver.protocol.command import SwitchCommand
-from imagenex_852_driver.protocol.reply import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError
+from imagenex_852_driver.protocol.reply import HEAD_IDS, SONAR_HEAD_ID, FrameError
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_driver.line.parameters import LineParameters, MountingParameters
 from sonar_driver.line.port import transmission_time
@@ -65,32 +65,17 @@ class HeadSettings(ParameterSet):
     def check(self) -> None:
         """Raise ParameterError for values between the allowed steps and for a sector the head cannot scan."""
         super().check()
-        self._require_one_of("max_range", RANGES)
-        self._require_one_of("step_size_deg", (0, 3, 6))
-        self._require_one_of("data_points", (250, 500))
-        self._require_one_of("frequency_khz", (675, 850))
-        self._require_step("train_angle_deg", 3, "deg")
-        self._require_step("sector_width_deg", 3, "deg")
-        self._require_step("switch_delay_ms", 2, "ms")
-        self._check_sector()
         self.command()
+        self._check_sector()
 
     def command(self) -> SwitchCommand:
         """Return the command that asks for one ping with these settings."""
+        same = {one.name: getattr(self, one.name) for one in fields(SwitchCommand) if hasattr(self, one.name)}
         try:
             return SwitchCommand(
-                head_id=self.head_id,
-                max_range=self.max_range,
                 reverse=self.direction is Direction.COUNTERCLOCKWISE,
-                start_gain_db=self.start_gain_db,
                 absorption_centi_db_per_m=round(self.absorption_db_per_m * 100),
-                train_angle_deg=self.train_angle_deg,
-                sector_width_deg=self.sector_width_deg,
-                step_size_deg=self.step_size_deg,
-                pulse_length_us=self.pulse_length_us,
-                data_points=self.data_points,
-                switch_delay_ms=self.switch_delay_ms,
-                frequency_khz=self.frequency_khz,
+                **same,
             )
         except FrameError as error:
             raise ParameterError(self._terminator_complaint() or str(error)) from error
@@ -106,15 +91,6 @@ class HeadSettings(ParameterSet):
             raise ParameterError(
                 f"sector_width_deg = {self.sector_width_deg}: narrower than step_size_deg = {self.step_size_deg}"
             )
-
-    def _require_one_of(self, name: str, allowed: tuple) -> None:
-        if getattr(self, name) not in allowed:
-            choices = ", ".join(str(value) for value in allowed)
-            raise ParameterError(f"{name} = {getattr(self, name)}: must be one of {choices}")
-
-    def _require_step(self, name: str, step: int, unit: str) -> None:
-        if getattr(self, name) % step:
-            raise ParameterError(f"{name} = {getattr(self, name)}: must be a multiple of {step} {unit}")
 
     def _terminator_complaint(self) -> str:
         suspects = {"pulse_length_us": 253, "switch_delay_ms": 506}

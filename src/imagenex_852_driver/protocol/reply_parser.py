@@ -1,7 +1,6 @@
 """Finds replies in a stream of bytes, however the stream is split and whatever is between the replies."""
 
 import re
-from dataclasses import dataclass
 from typing import List, NamedTuple, Optional
 
 from imagenex_852_driver.protocol.reply import HEAD_IDS, HEADER_LENGTH, FrameError, Reply, ReplyKind, check_header
@@ -18,37 +17,16 @@ class ParsedReply(NamedTuple):
     reply: Reply
 
 
-@dataclass(frozen=True)
-class ParserCounts:
-    """What the parser has found so far: complete replies, broken ones, and bytes that belong to no reply."""
-
-    replies: int = 0
-    corrupt: int = 0
-    incomplete: int = 0
-    skipped_bytes: int = 0
-
-
 class ReplyParser:
     """Incremental parser of replies.
 
-    A reply is *corrupt* if all its bytes arrived but are inconsistent, and *incomplete* if it ended early: the next
-    reply began inside it, or `reset` was called. Every skipped byte is examined again, so a complete reply is
-    never lost because of garbage before it. In return, a reply whose echoes form a complete reply header counts
-    as incomplete.
+    Every skipped byte is examined again, so a complete reply is never lost because of garbage before it. In return, a
+    reply whose echoes form a complete reply header is taken for one that ended early.
     """
 
     def __init__(self) -> None:
         self._buffer = bytearray()
         self._offset = 0
-        self._replies = 0
-        self._corrupt = 0
-        self._incomplete = 0
-        self._skipped_bytes = 0
-
-    @property
-    def counts(self) -> ParserCounts:
-        """The counts so far; `reset` does not change them."""
-        return ParserCounts(self._replies, self._corrupt, self._incomplete, self._skipped_bytes)
 
     @property
     def pending(self) -> bool:
@@ -62,12 +40,10 @@ class ReplyParser:
         while self._skip_to_letters():
             kind = self._announced()
             if kind is None:
-                self._corrupt += 1
                 self._skip(1)
                 continue
             inner = self._inner_header(kind.length)
             if inner is not None:
-                self._incomplete += 1
                 self._skip(inner)
             elif len(self._buffer) < kind.length:
                 break
@@ -77,9 +53,7 @@ class ReplyParser:
 
     def reset(self) -> None:
         """Give up waiting for the rest of a reply and count positions from zero again."""
-        if _LETTERS.match(self._buffer):
-            self._incomplete += 1
-        self._skip(len(self._buffer))
+        self._buffer.clear()
         self._offset = 0
 
     def _announced(self) -> Optional[ReplyKind]:
@@ -92,11 +66,9 @@ class ReplyParser:
         try:
             parsed = ParsedReply(self._offset, Reply.decode(bytes(self._buffer[: kind.length])))
         except FrameError:
-            self._corrupt += 1
             self._skip(1)
             return []
-        self._replies += 1
-        self._drop(kind.length)
+        self._skip(kind.length)
         return [parsed]
 
     def _inner_header(self, length: int) -> Optional[int]:
@@ -124,10 +96,6 @@ class ReplyParser:
         return False
 
     def _skip(self, count: int) -> None:
-        self._skipped_bytes += count
-        self._drop(count)
-
-    def _drop(self, count: int) -> None:
         del self._buffer[:count]
         self._offset += count
 

@@ -1,16 +1,12 @@
-"""The ROS side of .852 logs: plays them, records them, and converts them to bags."""
+"""The ROS side of .852 logs: plays and records them."""
 
 import math
-import os
-import sys
 import threading
 import time
-from argparse import ArgumentParser, ArgumentTypeError, Namespace
+from argparse import Namespace
 from dataclasses import replace
-from pathlib import Path
 from typing import List, Optional
 
-import rosbag
 import rospy
 from dynamic_reconfigure.encoding import decode_config
 from dynamic_reconfigure.msg import Config
@@ -23,9 +19,8 @@ from imagenex_852_driver.protocol.reply import Reply, ReplyKind, head_position
 from imagenex_852_driver.ros.nodes import reply_message
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.files import whole_file
 from node_support.headers import check_stamp
-from node_support.help import CommandLine
+from node_support.help import CommandLine, positive
 from node_support.parameters import ParameterError
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, run
@@ -47,22 +42,17 @@ def run_recorder() -> None:
     run("record_852", lambda: LogRecorder(options))
 
 
-def run_converter() -> None:
-    """Convert a log to a bag; needs no ROS master."""
-    try:
-        print(f"convert_852: {convert(convert_arguments(sys.argv[1:]))}")
-    except StartError as error:
-        sys.exit(f"convert_852: {error}")
-
-
 def play_arguments(arguments: List[str]) -> Namespace:
     """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
     parser = CommandLine("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
-    _add_rate(parser)
+    parser.add_argument(
+        "--rate", type=positive, help="pings per second (default: as logged, and 10 where the log has no times)"
+    )
     parser.add_argument("--loop", action="store_true", help="start again at the end")
     parser.add_argument("--wait-for-subscribers", action="store_true", help="start when somebody subscribes")
-    _add_mount(parser)
+    parser.add_argument("--frame-id", default="sonar", help="frame of the head")
+    parser.add_argument("--inverted", action="store_true", help="the head was mounted upside down")
     return parser.parse_args(arguments)
 
 
@@ -72,38 +62,6 @@ def record_arguments(arguments: List[str]) -> Namespace:
     parser.add_argument("file", help="log to append to")
     parser.add_argument("--driver", default="imagenex_852_driver", help="node whose settings go into the log")
     return parser.parse_args(arguments)
-
-
-def convert_arguments(arguments: List[str]) -> Namespace:
-    """Return file, out, rate, start, topic, frame_id and inverted; exits on a bad command line."""
-    parser = CommandLine("convert_852", description="Convert a .852 log to a bag.")
-    parser.add_argument("file", help="log to convert")
-    parser.add_argument("--out", required=True, help="bag to write; an existing one is replaced")
-    _add_rate(parser)
-    parser.add_argument(
-        "--start", type=_positive, help="time of the first ping, s since 1970 (default: the log's, else the file's)"
-    )
-    parser.add_argument("--topic", default=f"/{topics.BEAMS}")
-    _add_mount(parser)
-    return parser.parse_args(arguments)
-
-
-def _add_rate(parser: ArgumentParser) -> None:
-    parser.add_argument(
-        "--rate", type=_positive, help="pings per second (default: as logged, and 10 where the log has no times)"
-    )
-
-
-def _add_mount(parser: ArgumentParser) -> None:
-    parser.add_argument("--frame-id", default="sonar", help="frame of the head")
-    parser.add_argument("--inverted", action="store_true", help="the head was mounted upside down")
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise ArgumentTypeError(f"{text}: must be above 0")
-    return value
 
 
 class LogPlayer:
@@ -150,8 +108,9 @@ class LogPlayer:
     def _publish_ping(self, ping: LoggedPing) -> None:
         stamp = rospy.get_time()
         check_stamp(round(stamp * 1e9))
-        message = _message(ping, stamp, self._options)
+        message = reply_message(ping.reply, ping.start_gain_db, self._options.inverted)
         if message is not None:
+            message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp), self._options.frame_id
             self._beams.publish(message)
             self._health.count("beams out")
             self._published += 1
@@ -159,29 +118,6 @@ class LogPlayer:
     def _end(self) -> None:
         self._ended.set()
         print(f"play_852: {self._published} beams published; {summary(self._reader)}")
-
-
-def convert(options: Namespace) -> str:
-    """Write the bag of a log, whole or not at all; return in words what was written.
-
-    Raises StartError when that cannot be done, and when the file holds no ping.
-    """
-    reader = opened(options.file)
-    count, start = 0, options.start
-    try:
-        with whole_file(Path(options.out)) as temporary, rosbag.Bag(str(temporary), "w") as bag:
-            for moment, ping in timed(reader, options.rate):
-                if start is None:
-                    start = ping.stamp or os.path.getmtime(options.file)
-                message = _message(ping, start + moment, options)
-                if message is not None:
-                    bag.write(options.topic, message, message.header.stamp)
-                    count += 1
-            if not reader.ping_count:
-                raise StartError(f"{options.file}: not a .852 log, no ping in it; nothing was written")
-    except OSError as error:
-        raise StartError(f"{options.out}: {error.strerror}") from error
-    return f"{options.out}: {count} beams; {summary(reader)}"
 
 
 class LogRecorder:
@@ -269,12 +205,5 @@ def opened(path: str) -> LogReader:
 def summary(reader: LogReader) -> str:
     """Return in words what the part of a log that was read contains."""
     damages = "; ".join(str(damage) for damage in reader.damages[:3])
-    skipped = f", skipped {reader.damage_count} damaged parts: {damages}" if reader.damage_count else ""
+    skipped = f", skipped {len(reader.damages)} damaged parts: {damages}" if damages else ""
     return f"{reader.ping_count} pings in the log{skipped}"
-
-
-def _message(ping: LoggedPing, stamp: float, options: Namespace) -> Optional[SonarScanLine]:
-    message = reply_message(ping.reply, ping.start_gain_db, options.inverted)
-    if message is not None:
-        message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp), options.frame_id
-    return message

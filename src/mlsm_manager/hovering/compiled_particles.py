@@ -4,14 +4,48 @@ They are compiled, or read from the cache on disk, when this module is imported:
 ImportError without numba.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numba import boolean, float64, int64, types
 
 from node_support.numba_cache import compiled
 
 _LANES = 64  # particles that are compared at once: fewer use registers worse, more have fewer targets out of reach
 _NEVER = 1e300  # squared deviations: no echo lies so far away
-ARM_X, ARM_Y, SHARE, ACROSS_X, ACROSS_Y, ALONG_X, ALONG_Y = range(7)
-"""Columns of a point. ACROSS, ALONG: two directions, divided by the deviation in each, 1/m; a source has none."""
+ARM_X, ARM_Y, SHARE, WEIGHT, ACROSS_X, ACROSS_Y, ALONG_X, ALONG_Y = range(8)
+"""Columns of a point. WEIGHT: log likelihood of a source on a target. ACROSS, ALONG: two directions of a target,
+divided by the deviation in each, 1/m."""
+
+
+class Points(NamedTuple):
+    """n echoes, with the fields of Echoes."""
+
+    nodes: np.ndarray
+    arms: np.ndarray
+    shares: np.ndarray
+    normals: np.ndarray
+    weights: np.ndarray
+    post: np.ndarray
+
+
+class Pull(NamedTuple):
+    """How much echoes pull: 1/m^2 across and along a surface and around a post, and `fading` with squared deviations.
+
+    farthest: squared deviations beyond which none pulls. stiffness: 1/m^2 that holds the end of each path.
+    """
+
+    across: float
+    along: float
+    around: float
+    farthest: float
+    fading: float
+    stiffness: float
+
+
+_ROWS, _VALUES, _TABLE = int64[::1], float64[::1], float64[:, ::1]
+_POINTS = types.NamedTuple((_ROWS, _TABLE, _VALUES, _TABLE, _VALUES, boolean[::1]), Points)
+_PULL = types.NamedUniTuple(float64, 6, Pull)
 
 
 @compiled(fastmath=True)
@@ -74,24 +108,24 @@ def _write_deviations(places, target, deviations):
 
 
 @compiled(fastmath=True)
-def _lower(least, places, source, deviations, across_x, across_y, along_x, along_y):
-    """Lower `least` (s, lanes) of a source at `places` (s, 2, lanes) to its squared deviations from a target."""
-    for lane in range(least.shape[1]):
-        across = places[source, 0, lane] * across_x + places[source, 1, lane] * across_y - deviations[0, lane]
-        along = places[source, 0, lane] * along_x + places[source, 1, lane] * along_y - deviations[1, lane]
-        least[source, lane] = min(least[source, lane], across * across + along * along)
+def _lower(least, places, deviations, target):
+    """Lower `least` (lanes,) of a source at `places` (2, lanes) to its squared deviations from a target."""
+    across_x, across_y, along_x, along_y = target[ACROSS_X], target[ACROSS_Y], target[ALONG_X], target[ALONG_Y]
+    for lane in range(len(least)):
+        across = places[0, lane] * across_x + places[1, lane] * across_y - deviations[0, lane]
+        along = places[0, lane] * along_x + places[1, lane] * along_y - deviations[1, lane]
+        least[lane] = min(least[lane], across * across + along * along)
 
 
-@compiled("f8[::1](f8[:,:,::1], i8[::1], i8[::1], f8[:,::1], f8[::1], i8[::1], f8[:,::1], f8)", error_model="numpy")
-def log_likelihoods(paths, starts, candidates, sources, weights, target_nodes, targets, farthest):
+@compiled(_VALUES(float64[:, :, ::1], _ROWS, _ROWS, _TABLE, _ROWS, _TABLE, float64), error_model="numpy")
+def log_likelihoods(paths, starts, candidates, sources, target_nodes, targets, farthest):
     """Return how much (n,) sources speak for n particles: a weight for each nearest target, fading with its distance.
 
     Some particles are taken at a time, so that one instruction compares several; targets that none of them can reach
     are dropped first.
 
-    paths: (n, k, 2) m. starts, candidates: rows of the sources that may lie on each target. sources (s, 7), targets
-    (t, 7): points; sources were heard between the last two nodes. weights: (s,) log likelihoods where they lie on a
-    target. farthest: squared deviations.
+    paths: (n, k, 2) m. starts, candidates: rows of the sources that may lie on each target. sources (s, 8), targets
+    (t, 8): points; sources were heard between the last two nodes. farthest: squared deviations.
     """
     result, last = np.zeros(len(paths)), paths.shape[1] - 2
     nodes, ranges = np.empty((paths.shape[1], 2, _LANES)), np.empty((paths.shape[1], 4))
@@ -107,7 +141,6 @@ def log_likelihoods(paths, starts, candidates, sources, weights, target_nodes, t
         least[:] = _NEVER
         for row in range(len(targets)):
             target, node = targets[row], target_nodes[row]
-            across_x, across_y, along_x, along_y = target[ACROSS_X], target[ACROSS_Y], target[ALONG_X], target[ALONG_Y]
             _write_reach(target, ranges[node], ranges[node + 1], reach)
             is_placed = False
             for index in range(starts[row], starts[row + 1]):
@@ -118,11 +151,11 @@ def log_likelihoods(paths, starts, candidates, sources, weights, target_nodes, t
                     _write_places(target, nodes[node], nodes[node + 1], target_places)
                     _write_deviations(target_places, target, deviations)
                     is_placed = True
-                _lower(least, places, source, deviations, across_x, across_y, along_x, along_y)
+                _lower(least[source], places[source], deviations, target)
         for source in range(len(sources)):
             for lane in range(count):
                 if least[source, lane] < farthest:
-                    result[first + lane] += weights[source] * np.exp(-0.5 * least[source, lane])
+                    result[first + lane] += sources[source, WEIGHT] * np.exp(-0.5 * least[source, lane])
     return result
 
 
@@ -134,7 +167,7 @@ def _place(arm, share, path, node):
 
 
 @compiled()
-def _nearest(x, y, rows, places, normals, is_post, information):
+def _nearest(x, y, rows, places, normals, is_post, pull):
     """Return which of the targets in `rows` is nearest to x, y, and how far off in squared deviations."""
     best, least = -1, np.inf
     for row in rows:
@@ -142,18 +175,17 @@ def _nearest(x, y, rows, places, normals, is_post, information):
         across = offset_x * normals[row, 0] + offset_y * normals[row, 1]
         along = offset_y * normals[row, 0] - offset_x * normals[row, 1]
         if is_post:
-            squared = (offset_x * offset_x + offset_y * offset_y) * information[2]
+            squared = (offset_x * offset_x + offset_y * offset_y) * pull.around
         else:
-            squared = across * across * information[0] + along * along * information[1]
+            squared = across * across * pull.across + along * along * pull.along
         if squared < least:
             best, least = row, squared
     return best, least
 
 
 @compiled()
-def _add(sums, x, y, place, normal, is_post, weight, share):
-    """Add a source's weights xx, xy, yy and forces x, y to `sums` (5,)."""
-    offset_x, offset_y = place[0] - x, place[1] - y
+def _add(sums, offset_x, offset_y, normal, is_post, weight, share):
+    """Add a source's weights xx, xy, yy and forces x, y to `sums` (5,); offset: of its target from it."""
     if is_post:
         xx, xy, yy = weight, 0.0, weight
     else:
@@ -165,35 +197,27 @@ def _add(sums, x, y, place, normal, is_post, weight, share):
     sums[4] += share * (xy * offset_x + yy * offset_y)
 
 
-@compiled(
-    "f8[:,::1](f8[:,:,::1], i8[::1], i8[::1], f8[:,::1], f8[::1], f8[::1], b1[::1], i8[::1], f8[:,::1], f8[::1],"
-    "f8[:,::1], f8[::1], f8, f8, f8)",
-    error_model="numpy",
-)
-def moves_onto_echoes(
-    paths, starts, candidates, arms, shares, weights, post, target_nodes, target_arms, target_shares, target_normals,
-    information, farthest, fading, stiffness
-):  # fmt: skip
+@compiled(_TABLE(float64[:, :, ::1], _ROWS, _ROWS, _POINTS, _POINTS, _PULL), error_model="numpy")
+def moves_onto_echoes(paths, starts, candidates, sources, targets, pull):
     """Return moves (n, 2) [m] of the ends of n particles, to where the sources lie better on their nearest targets.
 
-    paths: (n, k, 2) m. starts, candidates: rows of targets that each source may lie on. arms to post: of the sources,
-    heard between the last two nodes. target_nodes to target_normals: of the targets. information: (3,) 1/m^2 across,
-    along and around. farthest: squared deviations. fading: of squared deviations. stiffness: 1/m^2 that holds each end.
+    paths: (n, k, 2) m. starts, candidates: rows of targets that each source may lie on. sources: heard between the
+    last two nodes.
     """
-    moves, last, places = np.empty((len(paths), 2)), paths.shape[1] - 2, np.empty((len(target_nodes), 2))
+    moves, last, places = np.empty((len(paths), 2)), paths.shape[1] - 2, np.empty((len(targets.nodes), 2))
     for particle in range(len(paths)):
-        sums = np.array([stiffness, 0.0, stiffness, 0.0, 0.0])
-        for row in range(len(target_nodes)):
-            places[row] = _place(target_arms[row], target_shares[row], paths[particle], target_nodes[row])
-        for source in range(len(shares)):
-            x, y = _place(arms[source], shares[source], paths[particle], last)
+        sums = np.array([pull.stiffness, 0.0, pull.stiffness, 0.0, 0.0])
+        for row in range(len(places)):
+            places[row] = _place(targets.arms[row], targets.shares[row], paths[particle], targets.nodes[row])
+        for source in range(len(sources.nodes)):
+            share, is_post = sources.shares[source], sources.post[source]
+            x, y = _place(sources.arms[source], share, paths[particle], last)
             rows = candidates[starts[source] : starts[source + 1]]
-            best, squared = _nearest(x, y, rows, places, target_normals, post[source], information)
-            if squared < farthest:
-                weight = (
-                    weights[source] * np.exp(-fading * squared) * (information[2] if post[source] else information[0])
-                )
-                _add(sums, x, y, places[best], target_normals[best], post[source], weight, shares[source])
+            best, squared = _nearest(x, y, rows, places, targets.normals, is_post, pull)
+            if squared < pull.farthest:
+                weight = sources.weights[source] * np.exp(-pull.fading * squared)
+                weight *= pull.around if is_post else pull.across
+                _add(sums, places[best, 0] - x, places[best, 1] - y, targets.normals[best], is_post, weight, share)
         determinant = sums[0] * sums[2] - sums[1] ** 2
         moves[particle, 0] = (sums[2] * sums[3] - sums[1] * sums[4]) / determinant
         moves[particle, 1] = (sums[0] * sums[4] - sums[1] * sums[3]) / determinant

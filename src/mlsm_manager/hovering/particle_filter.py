@@ -11,7 +11,7 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.hovering.compiled_particles import log_likelihoods, moves_onto_echoes
+from mlsm_manager.hovering.compiled_particles import Points, Pull, log_likelihoods, moves_onto_echoes
 from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST, Echoes
 from mlsm_manager.hovering.particles import Particles, drawn, led, squares_of
 from mlsm_manager.joint_solver.normal_equations import YAW
@@ -190,18 +190,18 @@ def likelihoods_of(particles: Particles, sources: Echoes, nearby: Nearby) -> np.
     order = np.argsort(nearby.rows, kind="stable")
     starts = np.searchsorted(nearby.rows[order], np.arange(len(nearby.targets) + 1))
     return log_likelihoods(
-        np.ascontiguousarray(particles.paths), starts, nearby.sources[order], _columns(sources), sources.weights,
+        np.ascontiguousarray(particles.paths), starts, nearby.sources[order], _columns(sources),
         nearby.targets.nodes, _columns(nearby.targets), FARTHEST,
     )  # fmt: skip
 
 
 def _columns(echoes: Echoes) -> np.ndarray:
-    """Return the points (n, 7) as `compiled_particles` takes them. A post has no normal of its own."""
+    """Return the points (n, 8) as `compiled_particles` takes them. A post has no normal of its own."""
     post = echoes.post[:, np.newaxis]
     normals = np.where(post, [1.0, 0.0], echoes.normals)
     across = normals / np.where(post, AROUND, ACROSS)
     along = np.column_stack([-normals[:, 1], normals[:, 0]]) / np.where(post, AROUND, ALONG)
-    return np.ascontiguousarray(np.column_stack([echoes.arms, echoes.shares, across, along]))
+    return np.ascontiguousarray(np.column_stack([echoes.arms, echoes.shares, echoes.weights, across, along]))
 
 
 def pulled(
@@ -225,9 +225,7 @@ def pulls_of(particles: Particles, sources: Echoes, nearby: Nearby) -> np.ndarra
 
     Surfaces pull across themselves only.
     """
-    targets, starts = nearby.targets, np.searchsorted(nearby.sources, np.arange(len(sources) + 1))
-    return moves_onto_echoes(
-        np.ascontiguousarray(particles.paths), starts, nearby.rows, sources.arms, sources.shares, sources.weights,
-        sources.post, targets.nodes, targets.arms, targets.shares, targets.normals,
-        np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST, FADING, _FREEDOM**-2.0,
-    )  # fmt: skip
+    starts = np.searchsorted(nearby.sources, np.arange(len(sources) + 1))
+    points, others = (Points(**vars(echoes)) for echoes in (sources, nearby.targets))
+    pull = Pull(*np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST, FADING, _FREEDOM**-2.0)
+    return moves_onto_echoes(np.ascontiguousarray(particles.paths), starts, nearby.rows, points, others, pull)

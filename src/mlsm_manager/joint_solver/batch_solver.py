@@ -5,7 +5,8 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons, pairs_of, support
+from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, add_loops, loops_of
@@ -21,6 +22,7 @@ from mlsm_manager.joint_solver.normal_equations import (
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
+from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
@@ -158,6 +160,7 @@ class _Batch:
         self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
         self._posts = PostComparisons(solution, scans, np.ones(len(scans)))
+        self._prior = AdaptedPrior(odometry.mixture, solution.prior_term)
 
     def converge(self) -> Tuple[int, bool]:
         """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
@@ -174,10 +177,13 @@ class _Batch:
         points, pairs = self._met()
         add_comparisons(equations, self._layout, pairs, points, points, parameters, parameters.cut)
         self._posts.add(equations, self._layout, self._run, parameters.cut)
+        newest = self._layout.node_start(self._layout.last)
+        self._prior.add(equations, newest, self.state.nodes[-1])
         self._solution = solution_of(equations)
         self._move = self._solution.step + _MOMENTUM * self._move
         self.state.nodes += self._nodes_of(self._move)
         self.state.run += self._move[self._layout.run_start :]
+        self._prior.learn(newest, self.state.nodes[-1], self._covariance)
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
@@ -190,11 +196,11 @@ class _Batch:
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
         equations = NormalEquations(self._layout.size)
-        odometry = self._odometry
-        equations.add_prior(0, self.state.nodes[0], odometry.first_node(), odometry.first_deviations())
-        equations.add_prior(
-            self._layout.run_start, self.state.run, self._parameters.run_mean, self._parameters.run_deviations
-        )
+        odometry, parameters = self._odometry, self._parameters
+        value = np.append(self.state.nodes[0], self.state.run)
+        mean = np.append(odometry.first_node(), parameters.run_mean)
+        deviations = np.append(odometry.first_deviations(), parameters.run_deviations(self._run.log))
+        equations.add_prior(self._layout.with_run(np.array([0]))[0], value, mean, deviations)
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
         if self._fixed_steps is not None:
             now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
@@ -226,18 +232,21 @@ class _Batch:
         nodes = np.arange(self._layout.last + 1)
         poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
         places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
-        by_scale = scale_covariance(places, self._parameters.world_scale_deviation)
-        return np.concatenate(poses) + by_scale, self._columns_of_inverse(run)[run]
+        by_scale = scale_covariance(places, self._parameters.world_scale_deviation(self._run.log))
+        return np.concatenate(poses) + by_scale, self._covariance(run)
 
     def newest_covariance(self) -> np.ndarray:
         """Return that of the newest node's and the run's unknowns (width + 2, width + 2)."""
-        columns = np.arange(self._layout.node_start(self._layout.last), self._layout.size)
-        return self._columns_of_inverse(columns)[columns]
+        return self._covariance(self._layout.with_run(np.array([self._layout.last]))[0])
 
     def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
         columns = self._layout.pose_columns(nodes)
         inverse = self._columns_of_inverse(columns.ravel()).reshape(self._layout.size, len(nodes), POSE_COLUMNS)
         return np.stack([inverse[own, number] for number, own in enumerate(columns)])
+
+    def _covariance(self, columns: np.ndarray) -> np.ndarray:
+        """Return that of unknowns `columns` (k,), (k, k)."""
+        return self._columns_of_inverse(columns)[columns]
 
     def _columns_of_inverse(self, columns: np.ndarray) -> np.ndarray:
         unit = np.zeros((self._layout.size, len(columns)))

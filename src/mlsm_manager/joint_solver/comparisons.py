@@ -3,13 +3,21 @@
 A point is compared with its nearest neighbours in every group of scans.
 """
 
-from dataclasses import dataclass, replace
 from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compiled_comparisons import POINT_COLUMNS, summed_comparisons, weighed_pairs
-from mlsm_manager.joint_solver.compiled_neighbours import Cells, shared_neighbours, sorted_into_cells
+from mlsm_manager.joint_solver.compiled_comparisons import (
+    POINT_COLUMNS,
+    Limits,
+    Noise,
+    Packed,
+    Pairs,
+    Surfaces,
+    summed_comparisons,
+    weighed_pairs,
+)
+from mlsm_manager.joint_solver.compiled_neighbours import shared_neighbours
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, Layout, NormalEquations
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -31,7 +39,6 @@ class Neighbours:
         """targets: ascending by scan; every `group_scans` scans of them are searched together."""
         _, groups = np.unique(targets.scans // group_scans, return_inverse=True)
         self._groups = groups.astype(np.int64)
-        self._count = int(groups[-1]) + 1 if len(groups) else 0
 
     def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
         """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
@@ -46,12 +53,8 @@ class Neighbours:
             if not np.isfinite(points.places).all():
                 nowhere = np.count_nonzero(~np.isfinite(points.places).all(axis=1))
                 raise ValueError(f"{nowhere} of {len(points)} points without a finite place")
-        places, other_places = np.ascontiguousarray(sources.places), np.ascontiguousarray(targets.places)
-        cells = Cells(*sorted_into_cells(places, other_places, cut + TIE))
-        return shared_neighbours(
-            places, np.ascontiguousarray(sources.scans), other_places, np.ascontiguousarray(targets.scans),
-            self._groups, self._count, cut, TIE, *cells,
-        )  # fmt: skip
+        arrays = sources.places, sources.scans, targets.places, targets.scans
+        return shared_neighbours(*(np.ascontiguousarray(array) for array in arrays), self._groups, cut, TIE)
 
 
 def shares_of(distance: np.ndarray, nearest: np.ndarray) -> np.ndarray:
@@ -63,22 +66,6 @@ def shares_of(distance: np.ndarray, nearest: np.ndarray) -> np.ndarray:
     return share / share.sum(axis=0)
 
 
-@dataclass(frozen=True)
-class Pairs:
-    """m comparisons: rows of the compared points and of their neighbours in two sets of placed points.
-
-    importance: (m,) factors of their weights, above 0 to 1.
-    """
-
-    rows: np.ndarray
-    neighbours: np.ndarray
-    importance: np.ndarray
-
-    def weighted(self, factors: np.ndarray) -> "Pairs":
-        """Return the comparisons with their importance times the factor of their neighbour; factors: (k,)."""
-        return replace(self, importance=self.importance * factors[self.neighbours])
-
-
 def pairs_of(
     lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, parameters: SolverParameters
 ) -> Pairs:
@@ -87,13 +74,9 @@ def pairs_of(
     Points of one scan are never compared with each other, nor surfaces that face different ways. In its own group, a
     point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
     """
-    normals, other_normals = (np.ascontiguousarray(points.normals) for points in (sources, targets))
-    return Pairs(
-        *weighed_pairs(
-            *lists.within(sources, targets, cut), normals, sources.qualities, other_normals, targets.qualities,
-            cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING,
-        )
-    )  # fmt: skip
+    own, others = (Surfaces(np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
+    limits = Limits(cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
+    return weighed_pairs(lists.within(sources, targets, cut), own, others, limits)
 
 
 def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, parameters: SolverParameters) -> np.ndarray:
@@ -138,20 +121,18 @@ def summed(
     aslant may have heard it anywhere in its width: such a point is less certain. The kernel is Geman and McClure's
     (1985), wider while the cut is.
     """
-    packed = _packed(sources)
-    return summed_comparisons(
-        pairs.rows, pairs.neighbours, pairs.importance,
-        packed, sources.scans, packed if targets is sources else _packed(targets), targets.scans,
-        parameters.echo_deviation**2, parameters.beam_half_width**2, parameters.weight, max(1.0, cut / parameters.cut),
-    )  # fmt: skip
+    own = _packed(sources)
+    others = own if targets is sources else _packed(targets)
+    widening = max(1.0, cut / parameters.cut)
+    noise = Noise(parameters.echo_deviation**2, parameters.beam_half_width**2, parameters.weight)
+    return summed_comparisons(pairs, own, others, noise, widening)
 
 
-def _packed(points: PlacedPoints) -> np.ndarray:
-    """Return points as rows (n, POINT_COLUMNS) of the compiled loops."""
+def _packed(points: PlacedPoints) -> Packed:
     rows = np.empty((len(points.scans), POINT_COLUMNS))
     rows[:, 0:2], rows[:, 2:4], rows[:, 4:6] = points.places, points.arms, points.normals
     rows[:, 6], rows[:, 7], rows[:, 8:12] = points.slants, points.shares, points.by_run.reshape(-1, 4)
-    return rows
+    return Packed(rows, points.scans)
 
 
 def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters) -> float:

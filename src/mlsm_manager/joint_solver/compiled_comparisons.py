@@ -4,9 +4,73 @@ They are compiled, or read from the cache on disk, when this module is imported:
 rows as `comparisons` packs them.
 """
 
+from typing import NamedTuple
+
 import numpy as np
+from numba import float64, int64, types
 
 from node_support.numba_cache import compiled
+
+
+class Pairs(NamedTuple):
+    """m comparisons: rows of the compared points and of their neighbours in two sets of placed points.
+
+    importance: (m,) factors of their weights, above 0 to 1.
+    """
+
+    rows: np.ndarray
+    neighbours: np.ndarray
+    importance: np.ndarray
+
+    def weighted(self, factors: np.ndarray) -> "Pairs":
+        """Return the comparisons with their importance times the factor of their neighbour; factors: (k,)."""
+        return self._replace(importance=self.importance * factors[self.neighbours])
+
+
+class Surfaces(NamedTuple):
+    """What n points lie on: normals (n, 2), and how well they are known (n,)."""
+
+    normals: np.ndarray
+    qualities: np.ndarray
+
+
+class Limits(NamedTuple):
+    """Pairs count up to `near` [m] fully, and less up to `cut` [m]; likewise from `full_cosine` on, and from the least.
+
+    The cosine is that between both normals.
+    """
+
+    cut: float
+    near: float
+    least_cosine: float
+    full_cosine: float
+
+
+class Packed(NamedTuple):
+    """Points (n, POINT_COLUMNS), and which scans (n,) heard them."""
+
+    points: np.ndarray
+    scans: np.ndarray
+
+
+class Noise(NamedTuple):
+    """The variance of a comparison is `variance` + `by_slant` * (sum of both squared slants).
+
+    weight: of each comparison, for neighbours share errors.
+    """
+
+    variance: float
+    by_slant: float
+    weight: float
+
+
+_ROWS, _VALUES, _TABLE = int64[::1], float64[::1], float64[:, ::1]
+# No two have members of the same types: numba 0.48 takes one for the other.
+_PAIRS = types.NamedTuple((_ROWS, _ROWS, _VALUES), Pairs)
+_SURFACES = types.NamedTuple((_TABLE, _VALUES), Surfaces)
+_LIMITS = types.NamedUniTuple(float64, 4, Limits)
+_PACKED = types.NamedTuple((_TABLE, _ROWS), Packed)
+_NOISE = types.NamedUniTuple(float64, 3, Noise)
 
 
 @compiled()
@@ -15,30 +79,22 @@ def _ramp(value, zero, one):
     return min(max((value - zero) / (one - zero), 0.0), 1.0)
 
 
-@compiled(
-    "Tuple((i8[::1], i8[::1], f8[::1]))"
-    "(i8[::1], i8[::1], f8[::1], f8[::1], f8[:,::1], f8[::1], f8[:,::1], f8[::1], f8, f8, f8, f8)",
-    error_model="numpy",
-)
-def weighed_pairs(
-    rows, neighbours, distances, shares, source_normals, source_qualities, target_normals, target_qualities,
-    cut, near, least_cosine, full_cosine,
-):  # fmt: skip
-    """Return the comparisons that count: rows, neighbours and importance, each (m,); see comparisons.pairs_of.
-
-    near: m up to which a pair counts fully. full_cosine: that from which on it does.
-    """
+@compiled(_PAIRS(types.Tuple((_ROWS, _ROWS, _VALUES, _VALUES)), _SURFACES, _SURFACES, _LIMITS), error_model="numpy")
+def weighed_pairs(found, sources, targets, limits):
+    """Return the comparisons that count; see comparisons.pairs_of. found: what Neighbours.within returns."""
+    rows, neighbours, distances, shares = found
     own, met, importance = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64), np.empty(len(rows))
     made = 0
     for pair in range(len(rows)):
         i, j = rows[pair], neighbours[pair]
-        cosine = source_normals[i, 0] * target_normals[j, 0] + source_normals[i, 1] * target_normals[j, 1]
-        faded = _ramp(distances[pair], cut, near) * _ramp(cosine, least_cosine, full_cosine)
-        weight = shares[pair] * faded * source_qualities[i] * target_qualities[j]
+        cosine = sources.normals[i, 0] * targets.normals[j, 0] + sources.normals[i, 1] * targets.normals[j, 1]
+        faded = _ramp(distances[pair], limits.cut, limits.near)
+        faded *= _ramp(cosine, limits.least_cosine, limits.full_cosine)
+        weight = shares[pair] * faded * sources.qualities[i] * targets.qualities[j]
         if weight > 0.0:
             own[made], met[made], importance[made] = i, j, weight
             made += 1
-    return own[:made].copy(), met[:made].copy(), importance[:made].copy()
+    return Pairs(own[:made].copy(), met[:made].copy(), importance[:made].copy())
 
 
 X, Y, ARM_X, ARM_Y, NORMAL_X, NORMAL_Y, SLANT, SHARE, BY_SCALE_X, BY_DELAY_X, BY_SCALE_Y, BY_DELAY_Y = range(12)
@@ -89,10 +145,16 @@ def _grouped(group_of, groups):
 
 @compiled()
 def _write_slopes(source, target, slopes):
-    """Write the derivatives (c,) of a comparison's residual; return that."""
+    """Write the derivatives (c,) of a comparison's residual; return that.
+
+    The target's normal turns with its yaw: else two scans that turn together would seem to disagree, and the fit would
+    pretend to know how the whole map is turned.
+    """
     x, y = target[NORMAL_X], target[NORMAL_Y]
-    residual = (source[X] - target[X]) * x + (source[Y] - target[Y]) * y
-    by_yaw, by_other_yaw = source[ARM_X] * y - source[ARM_Y] * x, target[ARM_X] * y - target[ARM_Y] * x
+    apart_x, apart_y = source[X] - target[X], source[Y] - target[Y]
+    residual = apart_x * x + apart_y * y
+    by_yaw = source[ARM_X] * y - source[ARM_Y] * x
+    by_other_yaw = (target[ARM_X] + apart_x) * y - (target[ARM_Y] + apart_y) * x
     late, later = source[SHARE], target[SHARE]
     slopes[0], slopes[1], slopes[2] = (1.0 - late) * x, (1.0 - late) * y, (1.0 - late) * by_yaw
     slopes[3], slopes[4], slopes[5] = late * x, late * y, late * by_yaw
@@ -137,35 +199,32 @@ def _write_sums(slopes, residuals, weights, information, gradient):
 
 
 @compiled(
-    "Tuple((i8[::1], i8[::1], f8[:,:,::1], f8[:,::1]))"
-    "(i8[::1], i8[::1], f8[::1], f8[:,::1], i8[::1], f8[:,::1], i8[::1], f8, f8, f8, f8)",
+    types.Tuple((_ROWS, _ROWS, float64[:, :, ::1], _TABLE))(_PAIRS, _PACKED, _PACKED, _NOISE, float64),
     error_model="numpy",
 )
-def summed_comparisons(
-    rows, neighbours, importance, sources, source_scans, targets, target_scans,
-    least_variance, by_slant, least_weight, widening,
-):  # fmt: skip
+def summed_comparisons(pairs, sources, targets, noise, widening):
     """Return both scans (g,), information (g, c, c) and gradient (g, c) of each pair of scans; c is PAIR_COLUMNS.
 
-    rows, neighbours, importance: (m,) as in Pairs; those of one source scan follow each other. The variance of a
-    comparison is `least_variance` + `by_slant` * (sum of both squared slants).
+    Pairs whose sources are of one scan follow each other. widening: of the robust kernel.
     """
-    group_of, scans, other_scans = _groups_of(rows, neighbours, source_scans, target_scans)
+    rows, neighbours, importance = pairs
+    group_of, scans, other_scans = _groups_of(rows, neighbours, sources.scans, targets.scans)
     order, starts = _grouped(group_of, len(scans))
     most = (starts[1:] - starts[:-1]).max() if len(scans) else 0
     slopes, residuals, weights = np.empty((most, PAIR_COLUMNS)), np.empty(most), np.empty(most)
     information, gradient = np.empty((len(scans), PAIR_COLUMNS, PAIR_COLUMNS)), np.empty((len(scans), PAIR_COLUMNS))
     for group in range(len(scans)):
-        pairs = order[starts[group] : starts[group + 1]]
-        for place in range(len(pairs)):
-            pair = pairs[place]
-            source, target = sources[rows[pair]], targets[neighbours[pair]]
+        own = order[starts[group] : starts[group + 1]]
+        for place in range(len(own)):
+            pair = own[place]
+            source, target = sources.points[rows[pair]], targets.points[neighbours[pair]]
             residual = _write_slopes(source, target, slopes[place])
-            variance = least_variance + by_slant * (source[SLANT] * source[SLANT] + target[SLANT] * target[SLANT])
+            slants = source[SLANT] * source[SLANT] + target[SLANT] * target[SLANT]
+            variance = noise.variance + noise.by_slant * slants
             kernel = 1.0 + residual * residual / variance / (widening * widening)
-            weights[place] = least_weight / variance / (kernel * kernel) * importance[pair]
+            weights[place] = noise.weight / variance / (kernel * kernel) * importance[pair]
             residuals[place] = residual
-        _write_sums(slopes[: len(pairs)], residuals, weights, information[group], gradient[group])
+        _write_sums(slopes[: len(own)], residuals, weights, information[group], gradient[group])
     return scans, other_scans, information, gradient
 
 

@@ -6,7 +6,6 @@ imported: never while a scan waits.
 """
 
 from collections import namedtuple
-from typing import NamedTuple
 
 import numpy as np
 
@@ -16,37 +15,34 @@ _CELLS_PER_REACH = 2  # small cells leave less to compare for each source, but m
 _MOST_CELLS = 512  # on each side of the grid: bounds its memory, however far apart points lie
 
 
-class Cells(NamedTuple):
-    """Square cells of `side` [m], row by row from `low_x`, `low_y` on. span: how many cells a reach is at most.
-
-    target_order: (k,) the targets, those of one cell after the other. target_starts: (cells + 1,) where those of each
-    cell begin. source_order, source_starts: the same of the sources; those farther than the reach are left out.
-    """
-
-    low_x: float
-    low_y: float
-    rows: int
-    columns: int
-    side: float
-    span: int
-    target_starts: np.ndarray
-    target_order: np.ndarray
-    source_starts: np.ndarray
-    source_order: np.ndarray
+_Grid = namedtuple("_Grid", "low_x low_y rows columns side span")
+"""Square cells of `side` [m], row by row from `low_x`, `low_y` on. span: how many cells a reach is at most."""
 
 
 @compiled()
-def _sorted(places, low_x, low_y, rows, columns, side):
+def _grid_around(targets, reach):
+    """Return cells that cover targets (k, 2) [m], k > 0, and what lies within `reach` [m] of them."""
+    low_x, low_y, high_x, high_y = targets[0, 0], targets[0, 1], targets[0, 0], targets[0, 1]
+    for point in range(len(targets)):
+        low_x, high_x = min(low_x, targets[point, 0]), max(high_x, targets[point, 0])
+        low_y, high_y = min(low_y, targets[point, 1]), max(high_y, targets[point, 1])
+    low_x, low_y, width, height = low_x - reach, low_y - reach, high_x - low_x + 2 * reach, high_y - low_y + 2 * reach
+    side = max(reach / _CELLS_PER_REACH, max(width, height) / _MOST_CELLS)
+    return _Grid(low_x, low_y, int(height / side) + 1, int(width / side) + 1, side, int(np.ceil(reach / side)))
+
+
+@compiled()
+def _sorted(places, grid):
     """Return where the points of each cell begin, and the points in this order; those in no cell are left out."""
     cell = np.empty(len(places), np.int64)
-    starts = np.zeros(rows * columns + 2, np.int64)
+    starts = np.zeros(grid.rows * grid.columns + 2, np.int64)
     for point in range(len(places)):
-        row, column = (places[point, 1] - low_y) / side, (places[point, 0] - low_x) / side
+        row, column = (places[point, 1] - grid.low_y) / grid.side, (places[point, 0] - grid.low_x) / grid.side
         cell[point] = -1
-        if 0.0 <= row < rows and 0.0 <= column < columns:
-            cell[point] = int(row) * columns + int(column)
+        if 0.0 <= row < grid.rows and 0.0 <= column < grid.columns:
+            cell[point] = int(row) * grid.columns + int(column)
             starts[cell[point] + 2] += 1
-    for number in range(rows * columns):
+    for number in range(grid.rows * grid.columns):
         starts[number + 2] += starts[number + 1]
     order = np.empty(starts[-1], np.int64)
     for point in range(len(places)):
@@ -56,27 +52,6 @@ def _sorted(places, low_x, low_y, rows, columns, side):
     return starts[:-1].copy(), order
 
 
-@compiled(
-    "Tuple((f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1]))(f8[:,::1], f8[:,::1], f8)", error_model="numpy"
-)
-def sorted_into_cells(sources, targets, reach):
-    """Return the fields of Cells that cover targets (k, 2) [m], k > 0, and what lies within `reach` of them.
-
-    sources: (n, 2) m.
-    """
-    low_x, low_y, high_x, high_y = targets[0, 0], targets[0, 1], targets[0, 0], targets[0, 1]
-    for point in range(len(targets)):
-        low_x, high_x = min(low_x, targets[point, 0]), max(high_x, targets[point, 0])
-        low_y, high_y = min(low_y, targets[point, 1]), max(high_y, targets[point, 1])
-    low_x, low_y, width, height = low_x - reach, low_y - reach, high_x - low_x + 2 * reach, high_y - low_y + 2 * reach
-    side = max(reach / _CELLS_PER_REACH, max(width, height) / _MOST_CELLS)
-    rows, columns = int(height / side) + 1, int(width / side) + 1
-    target_starts, target_order = _sorted(targets, low_x, low_y, rows, columns, side)
-    source_starts, source_order = _sorted(sources, low_x, low_y, rows, columns, side)
-    span = int(np.ceil(reach / side))
-    return low_x, low_y, rows, columns, side, span, target_starts, target_order, source_starts, source_order
-
-
 CANDIDATES = 6
 """Nearest points of a block that may share a comparison."""
 _HALF_DIAGONAL = 0.7072  # of a cell, in sides, rounded up
@@ -84,8 +59,6 @@ _SLACK = 1e-9  # m, and of a squared distance: so far may it be rounded
 _NEVER = 1e300  # m^2: no point is so far away
 _FIRST_CAPACITY = 1024
 
-_Grid = namedtuple("_Grid", "low_x low_y rows columns side span")
-"""See Cells."""
 _Targets = namedtuple("_Targets", "x y scan block row")
 """Points in the order of their cells; row: (k,) where each stood before."""
 _Around = namedtuple("_Around", "place square count nearest scan other bound")
@@ -282,21 +255,18 @@ def _room(points, blocks):
 
 
 @compiled(
-    "Tuple((i8[::1], i8[::1], f8[::1], f8[::1]))(f8[:,::1], i8[::1], f8[:,::1], i8[::1], i8[::1], i8, f8, f8,"
-    "f8, f8, i8, i8, f8, i8, i8[::1], i8[::1], i8[::1], i8[::1])",
+    "Tuple((i8[::1], i8[::1], f8[::1], f8[::1]))(f8[:,::1], i8[::1], f8[:,::1], i8[::1], i8[::1], f8, f8)",
     error_model="numpy",
 )
-def shared_neighbours(
-    sources, source_scans, places, scans, blocks, count, cut, tie,
-    low_x, low_y, rows, columns, side, span, target_starts, target_order, source_starts, source_order,
-):  # fmt: skip
+def shared_neighbours(sources, source_scans, places, scans, blocks, cut, tie):
     """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see comparisons.Neighbours.
 
-    sources: (n, 2) m. places: (k, 2) m, scans: (k,), blocks: (k,) from 0 to before `count`: of the targets, k > 0.
-    low_x to source_order: Cells for a reach of `cut` + `tie`.
+    sources: (n, 2) m. places: (k, 2) m, scans: (k,), blocks: (k,) from 0 on: of the targets, k > 0.
     """
-    reach, radius = cut + tie, _HALF_DIAGONAL * side
-    grid = _Grid(low_x, low_y, rows, columns, side, span)
+    reach, count = cut + tie, blocks.max() + 1
+    grid = _grid_around(places, reach)
+    target_starts, target_order = _sorted(places, grid)
+    source_starts, source_order = _sorted(sources, grid)
     x, y = places[:, 0].copy()[target_order], places[:, 1].copy()[target_order]
     targets = _Targets(x, y, scans[target_order], blocks[target_order], target_order)
     around, near = _room(len(places), count)
@@ -305,12 +275,13 @@ def shared_neighbours(
     found = _Found(np.empty(_FIRST_CAPACITY, np.int64), np.empty(_FIRST_CAPACITY), np.empty(_FIRST_CAPACITY))
     starts, ends = np.zeros(len(sources), np.int64), np.zeros(len(sources), np.int64)
     made = 0
-    for cell in range(rows * columns):
+    for cell in range(grid.rows * grid.columns):
         own = source_order[source_starts[cell] : source_starts[cell + 1]]
         if not len(own):
             continue
-        looked_at = _look_around(cell // columns, cell % columns, among_sources, grid, target_starts, targets, around)
-        _write_bounds(source_scans[own], reach, radius, tie, around)
+        row, column = cell // grid.columns, cell % grid.columns
+        looked_at = _look_around(row, column, among_sources, grid, target_starts, targets, around)
+        _write_bounds(source_scans[own], reach, _HALF_DIAGONAL * grid.side, tie, around)
         blocks_near = _take_near(looked_at, around, targets, near)
         for source in own:
             if made + count * CANDIDATES > len(found.shares):

@@ -5,7 +5,7 @@ from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.motion_models import Drift
+from mlsm_manager.joint_solver.motion_models import DRIFT_SCALE, Drift
 from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
 from mlsm_manager.joint_solver.odometry_log import as_complex
 
@@ -21,6 +21,7 @@ class LiveEstimate:
     world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
     mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
+    prior_term: (k, k + 1) what a mixture of priors added, see PriorTerm; k is 0 for models without one.
     misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place.
     """
 
@@ -39,6 +40,7 @@ class LiveEstimate:
     agreement: float
     distance: float
     surfaces: np.ndarray
+    prior_term: np.ndarray
     misfit_variance: float = 0.0
 
     @property
@@ -46,6 +48,18 @@ class LiveEstimate:
         """(3, 3) of T_map_base: m^2, m rad, rad^2; what the world's scale adds grows from the map's origin."""
         by_scale = scale_covariance(self.T_map_base[np.newaxis], self.world_scale_deviation)[0]
         return self.covariance[POSE, POSE] + by_scale + misfit_covariance(np.array([self.misfit_variance]))[0]
+
+    @property
+    def stated_deviation(self) -> float:
+        """Standard deviation of the position [m], in both directions together."""
+        return float(np.sqrt(np.trace(self.pose_covariance[:2, :2])))
+
+    @property
+    def length_deviation(self) -> float:
+        """Relative standard deviation of the lengths of the path: by the odometry's scale and the world's."""
+        by_odometry = self.drift.slopes[DRIFT_SCALE]
+        variance = by_odometry @ self.covariance[:-RUN_COLUMNS, :-RUN_COLUMNS] @ by_odometry
+        return float(np.hypot(np.sqrt(variance), self.world_scale_deviation))
 
     @property
     def node_deviations(self) -> np.ndarray:
@@ -103,15 +117,22 @@ def misfit_covariance(variances: np.ndarray) -> np.ndarray:
     return variances[:, np.newaxis, np.newaxis] * np.diag([1.0, 1.0, 0.0])
 
 
+def expected_deviations(moves: np.ndarray, lengths: np.ndarray, heading_deviation: float) -> np.ndarray:
+    """Return by how much (n,) [m] positions are uncertain whatever the water tells: by compass and lengths.
+
+    moves: (n, 2) m from where the run began. lengths: (n,) relative deviations. heading_deviation: rad.
+    """
+    return np.hypot(*moves.T) * np.hypot(heading_deviation, lengths)
+
+
 class Turns(NamedTuple):
-    """n turns. times: (n,) s of their ends. agreements: (n,), surfaces: (n, 2, 2), see LiveEstimate. radii: (n,) m,
-    stated deviation of the position. apart: (n,) bool, whether their place in the map is not known.
+    """n turns. times: (n,) s of their ends. agreements: (n,), surfaces: (n, 2, 2), see LiveEstimate. apart: (n,) bool,
+    whether their place in the map is not known.
     """
 
     times: np.ndarray
     agreements: np.ndarray
     surfaces: np.ndarray
-    radii: np.ndarray
     apart: np.ndarray
 
     @classmethod
@@ -122,7 +143,6 @@ class Turns(NamedTuple):
             times=np.array([estimate.time for estimate in ends]),
             agreements=np.array([estimate.agreement for estimate in estimates]).reshape(-1, parts).mean(axis=1),
             surfaces=np.array([estimate.surfaces for estimate in estimates]).reshape(-1, parts, 2, 2).sum(axis=1),
-            radii=np.sqrt([np.trace(estimate.pose_covariance[:2, :2]) for estimate in ends]),
             apart=apart[parts - 1 :: parts],
         )
 

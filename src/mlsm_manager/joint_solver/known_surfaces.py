@@ -5,7 +5,8 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.comparisons import Pairs, faded, shares_of
+from mlsm_manager.joint_solver.comparisons import faded, shares_of
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints

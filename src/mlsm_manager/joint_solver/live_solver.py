@@ -1,20 +1,24 @@
 """Follows the vehicle scan by scan: the newest nodes are free, what is older stays where it was found."""
 
 from dataclasses import replace
-from typing import Dict, List, Mapping, Optional, Sequence
+from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.estimate import LiveEstimate, stacked, unstacked
+from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations, misfit_covariance, stacked, unstacked
+from mlsm_manager.joint_solver.fixes import Fix, Fixes
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.live_window import LiveWindow
+from mlsm_manager.joint_solver.live_loops import Bend, ClosedLoop, confirmed, with_newest
+from mlsm_manager.joint_solver.live_window import LiveWindow, superfluous
+from mlsm_manager.joint_solver.loops import Loop
 from mlsm_manager.joint_solver.map_support import misfit_variances
-from mlsm_manager.joint_solver.motion_models import OdometryModel
-from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, State
+from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
+from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.odometry_log import GrowingArray
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
+from mlsm_manager.joint_solver.prior_mixture import Gaussian, PriorTerm
 from mlsm_manager.joint_solver.run_log import RunLog, parts_of
 from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.scan_matching.scan import Scan
@@ -58,6 +62,19 @@ class SolvedNodes:
         self._nodes.replace_from(0, state.nodes)
         self._run[:] = state.run
 
+    @property
+    def misfits_until(self) -> np.ndarray:
+        """(n,) m^2, sum of the misfits until each node, those of whole turns; 0 beyond the turns that are judged."""
+        known = np.cumsum(np.append(0.0, self.misfits.values))
+        return known[np.minimum(np.arange(len(self)), len(known) - 1)]
+
+    def know_better(self, left: np.ndarray) -> None:
+        """Take away from the variance of the first nodes' places all but the share `left` (n,)."""
+        misfits = self.misfits_until
+        misfits[: len(left)] *= left
+        self.misfits.replace_from(0, np.diff(misfits)[: len(self.misfits)])
+        self.covariances.values[: len(left)] *= left[:, np.newaxis, np.newaxis]
+
     def stored(self) -> Dict[str, np.ndarray]:
         """Return copies of all that `restore` needs, by name."""
         return {
@@ -78,18 +95,24 @@ class SolvedNodes:
         self.misfits.replace_from(0, stored["misfits"])
 
 
+ODOMETRY = "odometry"
+"""Name under which the name of a run's model is stored."""
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
 _UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
+_PULLED_STEPS = 5  # with the pull of loops: comparisons meet by then
+_FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
+_CONVINCING = 10.0  # of log likelihood, by which a path with a loop must fit better
 
 
 class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
-    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan of the log. state: of all nodes.
+    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan of the log,
+    None for old ones. state: of all nodes.
     submaps: which scans are compared with each other. search: what came of the search for the newest scans in the map
-    after scans that heard nothing; None where none was needed.
+    after scans that heard nothing; None where none was needed. closed: the loop that was closed with the newest scan.
     """
 
     def __init__(
@@ -106,21 +129,26 @@ class LiveSolver:
         self.parameters = parameters
         self.log = RunLog(sonar_in_base)
         self.odometry = parameters.odometry
-        self.estimates: List[LiveEstimate] = []
+        self.estimates: List[Optional[LiveEstimate]] = []
         self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean)
         self._start, self._known = start, known
         self.submaps = Submaps(np.empty(0))
+        self.fixes = Fixes()
         self.search: Optional[PlaceCandidate] = None
+        self.closed: Optional[ClosedLoop] = None
+        self._may_bend = known is None
+        self._loops: Tuple[Loop, ...] = ()
         self._by_parts = parameters.node_search
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
         return {
-            "odometry": _name_of(self.odometry),
+            ODOMETRY: name_of(self.odometry),
             **self._nodes.stored(),
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             _SUBMAPS: self.submaps.numbers,
+            **self.fixes.stored(),
             **({} if self._by_parts is None else self._by_parts.stored()),
             **stacked(self.estimates, _ESTIMATE),
         }
@@ -137,8 +165,8 @@ class LiveSolver:
 
         Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
         """
-        if not np.array_equal(stored["odometry"], _name_of(parameters.odometry)):
-            name = stored["odometry"].tobytes().decode("ascii", "replace")
+        if not np.array_equal(stored[ODOMETRY], name_of(parameters.odometry)):
+            name = stored[ODOMETRY].tobytes().decode("ascii", "replace")
             raise ValueError(
                 f"it was stored with another odometry profile: {name}, not {type(parameters.odometry).__name__}"
             )
@@ -148,8 +176,10 @@ class LiveSolver:
         )
         for scan in scans:
             solver._append(scan)
+        solver._may_bend = False  # the map that was stored with it is not drawn anew
         solver._nodes.restore(stored, solver.log.scan_count)
         solver.submaps = Submaps(stored[_SUBMAPS])
+        solver.fixes = Fixes.of_arrays(stored)
         if solver._by_parts is not None:
             solver._by_parts = solver._by_parts.resumed(solver.log, parameters, stored)
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
@@ -163,30 +193,81 @@ class LiveSolver:
         """The unknowns as they are known now; a view that the next scan makes invalid."""
         return self._nodes.state
 
+    def begun_with(self, parameters: SolverParameters) -> "LiveSolver":
+        """Return a solver with other parameters that begins where this one began and has taken no scan."""
+        return LiveSolver(parameters, self.log.sonar_in_base, self._start, self._known)
+
     @property
     def solution(self) -> Solution:
         """The run as it is known now; its state is a view that the next scan makes invalid."""
-        return Solution(self.log, self.parameters, self.state, self.submaps, self._known)
+        term = PriorTerm.of_array(self.estimates[-1].prior_term) if self.estimates else None
+        return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
 
-    def add(self, scan: Scan) -> LiveEstimate:
+    @property
+    def odometry_told(self) -> str:
+        """What the echoes tell of the odometry; empty where its profile was named."""
+        told = self._told
+        return "" if told is None else self.odometry.mixture.line(told)
+
+    @property
+    def reported_deviation(self) -> float:
+        """Relative standard deviation of reported distances as the likeliest odometry has it, before any echo."""
+        told = self._told
+        if told is None:
+            return self.odometry.distance_deviation
+        return float(self.odometry.mixture.likeliest(told).deviations[0])
+
+    @property
+    def _told(self) -> Optional[Gaussian]:
+        """What the echoes alone tell of the unknowns of a mixture of priors; None without a mixture or estimates."""
+        mixture = self.odometry.mixture
+        if mixture is None or not self.estimates:
+            return None
+        newest = self.estimates[-1]
+        return mixture.without(PriorTerm.of_array(newest.prior_term), newest.node, newest.own_covariance)
+
+    def expected_deviations(self, estimates: Sequence[LiveEstimate]) -> np.ndarray:
+        """Return by how much (n,) [m] the positions of `estimates` are uncertain whatever the water tells.
+
+        Compass and lengths make that, and the first turn, whose own motion nothing tells.
+        """
+        begin, lengths = self.estimates[self._parts - 1], np.array([one.length_deviation for one in estimates])
+        moves = np.array([one.T_map_base[:2] - begin.T_map_base[:2] for one in estimates])
+        return np.hypot(begin.stated_deviation, expected_deviations(moves, lengths, self.heading_deviation))
+
+    @property
+    def heading_deviation(self) -> float:
+        """Standard deviation [rad] of the heading before the run."""
+        return float(self.odometry.first_deviations()[YAW])
+
+    @property
+    def distance_deviation(self) -> float:
+        """Relative standard deviation of reported distances as known now; infinite where none are reported."""
+        if self.odometry.mixture is None or not self.estimates:
+            return self.odometry.distance_deviation
+        return float(self.estimates[-1].node_deviations[SCALE])
+
+    def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
 
+        fix: where the scan alone was found in the map, where somebody looked.
         It may be cut into parts (`parts_per_turn`), each then a scan of the log with an estimate of its own.
 
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
-        scans, before, by_parts = self.log.scan_count, self.state.copy(), self._by_parts
+        scans, before, by_parts, loops = self.log.scan_count, self.state.copy(), self._by_parts, self._loops
         try:
             with np.errstate(over="ignore", invalid="ignore"):
                 self._append(scan)
-                self.estimates += self._solved()
+                self.estimates += self._solved(fix)
         except RefusedInput:
             raise
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
             self._nodes.take_back(before)
-            self._by_parts = by_parts
+            self._by_parts, self._loops = by_parts, loops
+            self.fixes.by_node.pop(self.log.scan_count, None)
             self._shorten(scans)
             text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
@@ -213,20 +294,43 @@ class LiveSolver:
             self.log.remove_newest()
         self.submaps.shorten(scans)
 
-    def _solved(self) -> List[LiveEstimate]:
+    def _solved(self, fix: Optional[Fix]) -> List[LiveEstimate]:
         """Return what is known of the scans of the log that have no estimates yet."""
         for node in range(len(self._nodes), self.log.scan_count + 1):
             motion = self.log.node_motion(np.array([node - 1, node]))
             self._nodes.extend(self.odometry.advanced(self.state.nodes[-1:], motion[:1], motion[1:]))
         self.search = None
-        self._search()
+        if fix is None:
+            self._search()
+        else:
+            self._start_at(fix)
         window = self._fitted()
         if self.submaps.is_apart and self._join(window.estimates(1)[0]):
             window = self._fitted()
+        self.closed = None
+        if self._may_close:
+            window = self._closed(window)
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
         self._nodes.covariances.replace_from(window.oldest, covariances)
         variance = self._misfit_variance()
+        self._forget_old()
         return [replace(estimate, misfit_variance=variance) for estimate in estimates]
+
+    def _forget_old(self) -> None:
+        """Forget what no later scan needs, of many scans at once."""
+        old = self.log.scan_count - self.parameters.kept_scans * self._parts
+        if old <= 0 or old % _FORGOTTEN_AT_ONCE:
+            return
+        groups = np.array([max(old - _FORGOTTEN_AT_ONCE, 0), old]) // self.parameters.group_scans
+        self.log.forget(superfluous(self.solution, *groups))
+        self.log.thin_odometry(old)
+        self.estimates[:old] = [None] * old
+
+    def _start_at(self, fix: Fix) -> None:
+        """Put the newest node where its scan was found."""
+        node = self.log.scan_count
+        self.fixes.by_node[node] = fix
+        self.state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([node]))[0, :YAW]
 
     def _misfit_variance(self) -> float:
         """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
@@ -235,14 +339,51 @@ class LiveSolver:
         self._nodes.misfits.replace_from(first, newest)
         return float(self._nodes.misfits.values.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
 
-    def _fitted(self) -> LiveWindow:
-        """Return the newest nodes' problem after they were moved to its solution."""
+    def _fitted(self, bend: Optional[Bend] = None) -> LiveWindow:
+        """Return the newest nodes' problem after they were moved to its solution; loops only pull them near."""
         window = LiveWindow(self.solution, self.estimates, self._nodes.covariances.values, self._start)
         cut = self.parameters.wide_cut
+        for _ in range(_PULLED_STEPS if bend else 0):
+            window.step(cut, bend)
         for _ in range(self.parameters.live_iterations):
             window.step(cut)
             cut = max(self.parameters.cut, _CUT_FACTOR * cut)
         return window
+
+    @property
+    def _may_close(self) -> bool:
+        """Whether loops are looked for: not where parts of a turn hear too little, nor in a map that never moves."""
+        return self._parts == 1 and self._may_bend and not self.submaps.is_apart
+
+    def _closed(self, window: LiveWindow) -> LiveWindow:
+        """Return the problem with the path bent to a place heard before, if the run then fits better."""
+        self._loops = with_newest(self.solution, self._loops)
+        loops = confirmed(self._loops, self.log.scan_count - 1)
+        if not loops:
+            return window
+        oldest, before = window.oldest, window.log_likelihood()
+        covariances = np.append(self._nodes.covariances.values[:oldest], window.covariances_of_oldest(0), axis=0)
+        places = (covariances + misfit_covariance(self._nodes.misfits_until[: oldest + 1]))[:, :2, :2]
+        bend = Bend.of(loops, self.state.copy(), places)
+        found = [self._bent(bend, share) for share in bend.tried]
+        likelihood, share, state = max(found, key=lambda one: one[0])
+        if likelihood < before + _CONVINCING:
+            self._nodes.take_back(bend.start)
+            return window
+        self._nodes.take_back(state)
+        self._nodes.know_better(bend.left(share, np.trace(places, axis1=1, axis2=2))[:oldest])
+        self._loops = ()
+        self.fixes = Fixes()  # in the map as it was
+        seconds = self.log.node_times[-1] - self.log.node_times[loops[-1].older + 1]
+        shift = state.nodes[-1, :2] - bend.start.nodes[-1, :2]
+        self.closed = ClosedLoop(float(seconds), shift, likelihood - before)
+        return self._fitted()
+
+    def _bent(self, bend: Bend, share: float) -> Tuple[float, float, State]:
+        """Return the log likelihood of the run with the path before the window bent by a `share`, that and the fit."""
+        self._nodes.take_back(bend.state(share))
+        window = self._fitted(bend)
+        return window.log_likelihood() - bend.cost(share), share, self.state.copy()
 
     @property
     def found(self) -> str:
@@ -294,6 +435,6 @@ class LiveSolver:
         self.state.nodes[-len(moves) :] += moves
 
 
-def _name_of(odometry: OdometryModel) -> np.ndarray:
+def name_of(odometry: OdometryModel) -> np.ndarray:
     """Return the name of a model (n,) uint8, as a map's file keeps it: models of equal width mean other unknowns."""
     return np.frombuffer(type(odometry).__name__.encode(), dtype=np.uint8)

@@ -5,22 +5,25 @@ from typing import Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons, pairs_of
+from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.map_support import agreement, surfaces_met
+from mlsm_manager.joint_solver.live_loops import Bend
+from mlsm_manager.joint_solver.loops import add_loops
+from mlsm_manager.joint_solver.map_support import Met, agreement
 from mlsm_manager.joint_solver.motion_models import frozen_deviations
 from mlsm_manager.joint_solver.normal_equations import (
     DELAY,
     POSE,
     POSE_COLUMNS,
     RANGE_SCALE,
-    RUN_COLUMNS,
     DenseSolution,
     Layout,
     NormalEquations,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
+from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, PriorTerm
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 from node_support.geometry import composed, inverse
@@ -57,11 +60,11 @@ class FrozenMap:
 def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> FrozenMap:
     """Return the groups of scans nearest to `place_now` (2,) among the first `count` groups of the run."""
     log, scans = solution.log, solution.parameters.group_scans
-    middles = np.arange(count) * scans + scans // 2
-    distances = np.hypot(*(solution.node_places(middles) - place_now).T) + _AGE_DISTANCE * np.arange(count) / max(
-        count, 1
-    )
-    importance = fading(distances, solution.parameters.frozen_groups)
+    known = np.flatnonzero(~log.forgotten[: count * scans : scans])
+    distances = np.hypot(*(solution.node_places(known * scans + scans // 2) - place_now).T)
+    distances = distances + _AGE_DISTANCE * known / max(count, 1)
+    importance = np.zeros(count)
+    importance[known] = fading(distances, solution.parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
     rows = np.concatenate(
         [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
@@ -69,6 +72,26 @@ def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> Fro
     points = solution.placed(rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
     return FrozenMap(points, per_point, numbers, importance[numbers], solution.state.run.copy())
+
+
+_BESIDE = 3.0
+"""m between the places of groups that hear the same."""
+
+
+def superfluous(solution: Solution, first: int, last: int) -> np.ndarray:
+    """Return which scans (scan_count,) bool of groups `first` to before `last` no later scan will be compared with.
+
+    So many older groups lie beside each of these that it is never among the nearest.
+    """
+    scans, parameters = solution.parameters.group_scans, solution.parameters
+    middles = np.arange(last) * scans + scans // 2
+    places, kept = solution.node_places(middles), ~solution.log.forgotten[middles]
+    for group in range(first, last):
+        older = places[:group][kept[:group]] - places[group]
+        kept[group] &= np.count_nonzero(np.hypot(*older.T) < _BESIDE) < parameters.frozen_groups
+    result = np.zeros(solution.log.scan_count, dtype=bool)
+    result[: last * scans] = np.repeat(~kept, scans)
+    return result
 
 
 def fading(distances: np.ndarray, most: int) -> np.ndarray:
@@ -118,14 +141,15 @@ class LiveWindow:
         self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
-        self._anchor = estimates[first - 1] if first else None
         self._motion = self._log.node_motion(np.arange(first, last + 1))
-        self._start, self._known = start, solution.known
+        self._beliefs = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
+        self._known = solution.known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
         self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
         self._met = ()
         self._posts = self._post_comparisons()
+        self._prior = AdaptedPrior(self._odometry.mixture, solution.prior_term)
 
     def _post_comparisons(self) -> PostComparisons:
         """Return those with the frozen groups and with the scans since."""
@@ -151,48 +175,70 @@ class LiveWindow:
         middles = self._frozen.numbers * self._scans_per_group + self._scans_per_group // 2
         return joint_covariance(covariances[np.append(middles, first)])
 
-    def step(self, cut: float) -> None:
-        """Take one Gauss-Newton step with points up to `cut` [m] apart."""
+    def step(self, cut: float, bend: Optional[Bend] = None) -> None:
+        """Take one Gauss-Newton step with points up to `cut` [m] apart; the loops of a bend pull."""
         equations = NormalEquations(self._layout.size, len(self._held_covariance))
         self._add_beliefs(equations)
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._layout, free, self._motion)
+        self._run.fixes.add(equations, self._layout, self._motion.poses, free)
         self._comparisons = self._add_surfaces(equations, cut)
         self._comparisons += self._posts.add(equations, self._layout, self._run, cut)
+        newest = self._layout.node_start(self._layout.last)
+        self._prior.add(equations, newest, self._state.nodes[-1])
+        if bend is not None:
+            add_loops(equations, self._layout, bend.loops, self._state.nodes, bend.start)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
+        self._prior.learn(newest, self._state.nodes[-1], self._own_covariance)
+
+    def _own_covariance(self, columns: np.ndarray) -> np.ndarray:
+        """Return the covariance (k, k) of unknowns (k,) if the frozen map had no error."""
+        return self._solution.covariances(columns[np.newaxis], self._held_covariance)[1][0]
 
     def _add_beliefs(self, equations: NormalEquations) -> None:
-        mean, deviations, run, of_run = self._beliefs()
-        equations.add_prior(0, self._state.nodes[self._layout.first], mean, deviations)
-        equations.add_prior(self._layout.run_start, self._state.run, run, of_run)
-        if self._anchor is not None:
+        layout, (mean, deviations) = self._layout, self._beliefs
+        value = np.append(self._state.nodes[layout.first], self._state.run)
+        if layout.first:
+            mean = np.append(value[POSE], mean[POSE_COLUMNS:])
             own = np.arange(POSE_COLUMNS)
-            held = self._layout.size + len(self._held_covariance) - POSE_COLUMNS + own
-            weight = deviations[POSE] ** -2.0
+            held = layout.size + len(self._held_covariance) - POSE_COLUMNS + own
             cross = np.zeros((POSE_COLUMNS, 2, 2))
-            cross[:, 0, 1] = cross[:, 1, 0] = -weight
+            cross[:, 0, 1] = cross[:, 1, 0] = -(deviations[POSE] ** -2.0)
             equations.add_terms(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
+        equations.add_prior(layout.with_run(np.array([layout.first]))[0], value, mean, deviations)
 
-    def _beliefs(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """Return mean and deviations of the first free node and of the run's unknowns.
+    def _beliefs_before(self, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
+        """Return mean and deviations, (width + 2,) each, of the run's first node and of the run's unknowns."""
+        deviations = self._odometry.first_deviations()
+        if start is not None:
+            deviations[POSE] = start
+        mean = np.append(self._odometry.first_node(), self._parameters.run_mean)
+        return mean, np.append(deviations, self._parameters.run_deviations(self._log))
 
-        Of a frozen node it is what was known when it was the newest: the window's scans are not in that.
+    def _beliefs_of(self, frozen: LiveEstimate) -> Tuple[np.ndarray, np.ndarray]:
+        """Return mean and deviations, (width + 2,) each, of the first free node and of the run's unknowns.
+
+        It is what was known when this node was the newest: the window's scans are not in that. Of unknowns with a
+        mixture of priors it is what was known without that, which the newest node has.
         """
-        if self._anchor is None:
-            deviations = self._odometry.first_deviations()
-            if self._start is not None:
-                deviations[POSE] = self._start
-            return self._odometry.first_node(), deviations, self._parameters.run_mean, self._parameters.run_deviations
-        pose = self._state.nodes[self._layout.first, POSE]
-        mean = np.concatenate([pose, self._anchor.node[POSE_COLUMNS:]])
-        deviations = frozen_deviations(self._anchor.node_deviations)
-        of_run = self._anchor.run_deviations
+        node, deviations, mixture = frozen.node.copy(), frozen.node_deviations, self._odometry.mixture
+        if mixture is not None:
+            known = mixture.without(PriorTerm.of_array(frozen.prior_term), node, frozen.own_covariance)
+            columns = list(mixture.columns)
+            forgotten = mixture.walks**2 * float(self._motion.times[-1] - self._motion.times[0])
+            node[columns], deviations[columns] = known.mean, np.sqrt(np.diag(known.covariance) + forgotten)
+        of_run = frozen.run_deviations
         of_run[DELAY] *= _FORGOTTEN_DELAY
-        return mean, deviations, self._anchor.run, of_run
+        return np.append(node, frozen.run), np.append(frozen_deviations(deviations), of_run)
 
     def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
         """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
+        met, parameters = self._surfaces_met(cut), self._parameters
+        return sum(add_comparisons(equations, self._layout, *some, parameters, cut) for some in met)
+
+    def _surfaces_met(self, cut: float) -> Met:
+        """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed."""
         parameters = self._parameters
         rows = self._log.rows(self._recent, self._layout.last)
         recent = self._run.placed(rows)
@@ -210,7 +256,7 @@ class LiveWindow:
             met.insert(0, (to_known, sources, known))
             summed.insert(1, met[0])
         self._met = tuple(met)
-        return sum(add_comparisons(equations, self._layout, *some, parameters, cut) for some in summed)
+        return summed
 
     def _compared(
         self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
@@ -230,6 +276,14 @@ class LiveWindow:
         for column, most in _MOST_RUN_STEP.items():
             self._state.run[column] += np.clip(step[run_start + column], -most, most)
 
+    def log_likelihood(self) -> float:
+        """Return that of the free nodes: of echoes on surfaces, less that of odd motions."""
+        equations = NormalEquations(self._layout.size, len(self._held_covariance))
+        self._add_beliefs(equations)
+        self._odometry.add_steps(equations, self._layout, self._state.nodes[self._layout.first :], self._motion)
+        met = self._surfaces_met(self._parameters.cut)
+        return sum(support(*some, self._parameters) for some in met) - 0.5 * equations.cost
+
     @property
     def oldest(self) -> int:
         """The oldest free node."""
@@ -238,26 +292,25 @@ class LiveWindow:
     def covariances_of_oldest(self, count: int) -> np.ndarray:
         """Return the pose covariances (count + 1, 3, 3) of the oldest free nodes, the next ones to be frozen."""
         columns = self._layout.pose_columns(self._layout.first + np.arange(count + 1))
-        return np.stack([self._solution.covariance(own, self._held_covariance) for own in columns])
+        return self._solution.covariances(columns, self._held_covariance)[0]
 
     def estimates(self, count: int) -> List[LiveEstimate]:
         """Return what is known of the newest `count` nodes, oldest first."""
-        return [self._estimate(node) for node in range(self._layout.last - count + 1, self._layout.last + 1)]
+        nodes = self._layout.last + np.arange(1 - count, 1)
+        covariances = self._solution.covariances(self._layout.with_run(nodes), self._held_covariance)
+        return [self._estimate(*each) for each in zip(nodes, *covariances)]
 
-    def _estimate(self, number: int) -> LiveEstimate:
-        """Return what is known of node `number`, at the end of the scan before it."""
-        own = self._layout.node_start(number) + np.arange(self._layout.width)
-        unknowns = np.append(own, self._layout.run_start + np.arange(RUN_COLUMNS))
+    def _estimate(self, number: int, covariance: np.ndarray, own_covariance: np.ndarray) -> LiveEstimate:
+        """Return what is known of node `number`, at the end of the scan before it; covariances: as LiveEstimate's."""
         T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
         T_map_base = T_odom_base + node[POSE]
-        share, distance = agreement(self._met, number - 1, self._parameters)
+        share, distance, surfaces = agreement(self._met, number - 1, self._parameters)
         return LiveEstimate(
             time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
             T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
-            covariance=self._solution.covariance(unknowns, self._held_covariance),
-            own_covariance=self._solution.covariance(unknowns, np.zeros_like(self._held_covariance)),
-            world_scale_deviation=self._parameters.world_scale_deviation,
+            covariance=covariance, own_covariance=own_covariance,
+            world_scale_deviation=self._parameters.world_scale_deviation(self._log),
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
-            agreement=share, distance=distance, surfaces=surfaces_met(self._met, number - 1),
+            agreement=share, distance=distance, surfaces=surfaces, prior_term=self._prior.term.array,
         )  # fmt: skip

@@ -5,7 +5,7 @@ much better than the present one, and neighbouring scans agree.
 """
 
 from dataclasses import dataclass
-from typing import List, Optional
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -16,12 +16,14 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, Freedom, PlaceCandidate, best_place
 from mlsm_manager.joint_solver.solution import Solution
 
-_APART = 20  # scans: newer ones are compared anyway, and tie a scan to where it is
+APART = 20
+"""Scans: newer ones are compared anyway, and tie a scan to where it is."""
 _DRIFT = 5.0  # m, deviation: of a scan against one that is so much older
 _GAIN = 0.25  # by which the share of points on surfaces must exceed the one at the present place
 _SAME = 1.0  # m: so near to a scan's points lie those of the older one that it lies on
 _ALIKE = 2.5  # m by which neighbouring scans may differ
-_NEIGHBOURS = 3  # scans before and after that are asked, and how many, the scan included, must agree
+NEIGHBOURS = 3
+"""Scans before and after that are asked, and how many, the scan included, must agree."""
 _DEVIATION = 0.5  # m: of a place that is found
 
 
@@ -51,16 +53,18 @@ def loops_of(solution: Solution) -> List[Loop]:
     if parameters.parts_per_turn > 1:
         return []
     points = solution.placed(log.rows(0, log.scan_count))
-    found = [_loop(points, scan, parameters) for scan in range(_APART, log.scan_count)]
+    found = [_loop(points, scan, parameters) for scan in range(APART, log.scan_count)]
     return agreed([loop for loop in found if loop is not None])
 
 
-def agreed(loops: List[Loop]) -> List[Loop]:
+def agreed(loops: Sequence[Loop]) -> List[Loop]:
     """Return those of `loops` (one per scan at most) that enough neighbouring scans confirm."""
-    return [loop for loop in loops if sum(_confirms(other, loop) for other in loops) >= _NEIGHBOURS]
+    return [loop for loop in loops if sum(_confirms(other, loop) for other in loops) >= NEIGHBOURS]
 
 
-def add_loops(equations: NormalEquations, layout: Layout, loops: List[Loop], nodes: np.ndarray, start: State) -> None:
+def add_loops(
+    equations: NormalEquations, layout: Layout, loops: Sequence[Loop], nodes: np.ndarray, start: State
+) -> None:
     """Add that the scans of `loops` are moved by their shifts against `start`, in which these were found.
 
     nodes: (n, width) as they are now.
@@ -79,16 +83,26 @@ def add_loops(equations: NormalEquations, layout: Layout, loops: List[Loop], nod
 
 def _confirms(other: Loop, loop: Loop) -> bool:
     near = np.hypot(*(other.place.shift - loop.place.shift)) <= _ALIKE
-    return abs(other.scan - loop.scan) <= _NEIGHBOURS and near
+    return abs(other.scan - loop.scan) <= NEIGHBOURS and near
 
 
 def _loop(points: PlacedPoints, scan: int, parameters: SolverParameters) -> Optional[Loop]:
-    own, older = np.flatnonzero(points.scans == scan), points.scans <= scan - _APART
+    own = np.flatnonzero(points.scans == scan)
     if len(own) < FEWEST_POINTS:
         return None
     sources = points.selected(own[:: max(1, len(own) // MOST_POINTS)])
-    middle, radius = sources.places.mean(axis=0), np.ptp(sources.places, axis=0).max() + REACH * _DRIFT
-    targets = points.selected(older & (np.abs(points.places - middle).max(axis=1) < radius))
+    return loop_of(sources, points.selected(points.scans <= scan - APART), scan, parameters)
+
+
+def reach_of(sources: PlacedPoints) -> Tuple[np.ndarray, float]:
+    """Return the middle (2,) of a scan's points, and how far from it [m] they may lie once the scan is moved."""
+    return sources.places.mean(axis=0), float(np.ptp(sources.places, axis=0).max() + REACH * _DRIFT)
+
+
+def loop_of(sources: PlacedPoints, older: PlacedPoints, scan: int, parameters: SolverParameters) -> Optional[Loop]:
+    """Return where the points of a scan lie on `older` ones, if that is certain and far from where they are."""
+    middle, radius = reach_of(sources)
+    targets = older.selected(np.abs(older.places - middle).max(axis=1) < radius)
     surfaces = Surfaces(targets, parameters)
     if not len(targets) or surfaces.shares(sources, sources.places[np.newaxis])[0] > 1.0 - _GAIN:
         return None

@@ -5,7 +5,7 @@ from typing import Sequence, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.comparisons import Pairs
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -94,30 +94,23 @@ def misfit_variances(solution: Solution, first: int) -> np.ndarray:
     return misfit * (_SPEED * np.diff(times)) ** 2
 
 
-def agreement(met: Met, scan: int, parameters: SolverParameters) -> Tuple[float, float]:
-    """Return the share of a scan's comparisons in which its point lies on its neighbour's surface, and the mean
-    distance [m] from it; 0 without any.
+def agreement(met: Met, scan: int, parameters: SolverParameters) -> Tuple[float, float, np.ndarray]:
+    """Return the share of a scan's comparisons in which its point lies on its neighbour's surface, the mean distance
+    [m] from it, and the sum (2, 2) of the outer products of these surfaces' normals; 0 without any.
     """
     near = weight = distance = 0.0
+    surfaces = np.zeros((2, 2))
     for pairs, sources, targets in met:
         own = sources.scans[pairs.rows] == scan
         i, j = pairs.rows[own], pairs.neighbours[own]
-        residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
+        importance, normals = pairs.importance[own], targets.normals[j]
+        residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], normals)
         variance = parameters.variances(sources.slants[i], targets.slants[j])
-        distance += float((pairs.importance[own] * np.abs(residual)).sum())
-        near += float(pairs.importance[own][residual**2 < _ON_PLANE**2 * variance].sum())
-        weight += float(pairs.importance[own].sum())
-    return (near / weight, distance / weight) if weight else (0.0, 0.0)
-
-
-def surfaces_met(met: Met, scan: int) -> np.ndarray:
-    """Return the sum (2, 2) of the outer products of the normals of all surfaces that a scan was compared with."""
-    total = np.zeros((2, 2))
-    for pairs, sources, targets in met:
-        own = sources.scans[pairs.rows] == scan
-        normals = targets.normals[pairs.neighbours[own]]
-        total += np.einsum("n,na,nb->ab", pairs.importance[own], normals, normals)
-    return total
+        distance += float((importance * np.abs(residual)).sum())
+        near += float(importance[residual**2 < _ON_PLANE**2 * variance].sum())
+        weight += float(importance.sum())
+        surfaces += np.einsum("n,na,nb->ab", importance, normals, normals)
+    return (near / weight, distance / weight, surfaces) if weight else (0.0, 0.0, surfaces)
 
 
 def _share(solution: Solution, turn: int) -> float:

@@ -4,18 +4,20 @@ Here are the interface, the terms that models share, and the models of odometrie
 the velocity is unknown are in velocity_models.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Dict, NamedTuple, Optional, Protocol
 
 import numpy as np
 
 from mlsm_manager.joint_solver.normal_equations import POSE, YAW, Layout, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
+from mlsm_manager.joint_solver.prior_mixture import PriorComponent, PriorMixture
 from mlsm_manager.scan_matching.prediction import Fading
 
 FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
 HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 DRIFT_STATES = 5
+DRIFT_SCALE = 3  # row of a drift
 DIRECTION, SCALE, CURRENT_X, CURRENT_Y = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw
 _CURRENT = slice(5, 7)
 _CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far below any effect
@@ -43,6 +45,11 @@ class OdometryModel(Protocol):
     """
 
     width: int
+
+    @property
+    def mixture(self) -> Optional[PriorMixture]:
+        """Priors of some unknowns of a node, of which one holds for the whole run; None where there is one only."""
+        return None
 
     @property
     def calibrated(self) -> Dict[str, int]:
@@ -114,6 +121,17 @@ class Transition(NamedTuple):
         return self.matrix @ known_pose @ self.matrix.T + self.noise
 
 
+class Change(NamedTuple):
+    """How an unknown goes on from each of n - 1 nodes: which share of it is kept, and the variance of what is added."""
+
+    kept: np.ndarray
+    variance: np.ndarray
+
+
+Changes = Dict[int, Change]
+"""Of unknowns, by their columns of a node."""
+
+
 @dataclass(frozen=True)
 class Compass:
     """How wrong the reported heading may be: standard deviations [rad], how long an error lasts [s].
@@ -125,6 +143,11 @@ class Compass:
     heading_deviation: float
     heading_correlation_time: float
     heading_walk: float
+
+    def change(self, durations: np.ndarray) -> Change:
+        """Return how the correction of the reported heading changes: an error that lasts, and a walk."""
+        kept = np.exp(-durations / self.heading_correlation_time)
+        return Change(kept, self.heading_deviation**2 * (1.0 - kept**2) + self.heading_walk**2 * durations)
 
 
 @dataclass(frozen=True)
@@ -142,6 +165,24 @@ class DvlOdometry:
     direction_walk: float
     scale: float
     scale_deviation: float
+
+
+class OdometryDoubt(NamedTuple):
+    """Of an odometry that is a DVL's or not. dvl_share: the probability that it is.
+
+    scale_deviation, current_deviation [m/s]: if it is not. no_current: m/s, stands for none. scale_told, current_told:
+    standard deviations from which on the echoes are asked. scale_walk [1/sqrt(s)], current_walk [m/s/sqrt(s)]: how
+    fast what the echoes told is forgotten.
+    """
+
+    dvl_share: float
+    scale_deviation: float
+    current_deviation: float
+    no_current: float
+    scale_told: float
+    current_told: float
+    scale_walk: float
+    current_walk: float
 
 
 @dataclass(frozen=True)
@@ -210,15 +251,16 @@ class DvlFactors(OdometryModel):
         starts = layout.node_start(np.arange(layout.first, layout.last))
         durations = motion.durations
         self._add_positions(equations, starts, nodes, np.diff(motion.positions), durations)
-        add_compass(equations, starts, nodes, durations, self._parameters.compass)
-        walk = self._parameters.direction_walk**2 * durations
-        add_walk(equations, starts, self.width, nodes[:, DIRECTION], DIRECTION, walk)
-        self._add_scale(equations, starts, nodes, durations)
+        add_changes(equations, starts, nodes, self._changes(durations))
 
-    def _add_scale(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
-    ) -> None:
-        add_walk(equations, starts, self.width, nodes[:, SCALE], SCALE, np.zeros(len(starts)))
+    def _changes(self, durations: np.ndarray) -> Changes:
+        """Return how the errors of the odometry change from node to node."""
+        own = self._parameters
+        return {
+            YAW: own.compass.change(durations),
+            DIRECTION: walk(own.direction_walk, durations),
+            SCALE: walk(0.0, durations),
+        }
 
     def _add_positions(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, step: np.ndarray, durations: np.ndarray
@@ -281,18 +323,10 @@ class ThrusterFactors(DvlFactors):
         slopes[:2, _CURRENT] = to_base
         return Drift(values, slopes)
 
-    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        super().add_steps(equations, layout, nodes, motion)
-        starts = layout.node_start(np.arange(layout.first, layout.last))
-        walk = self._own.current_walk**2 * motion.durations
-        for column in (CURRENT_X, CURRENT_Y):
-            add_walk(equations, starts, self.width, nodes[:, column], column, walk)
-
-    def _add_scale(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
-    ) -> None:
-        walk = self._own.scale_walk**2 * durations
-        add_walk(equations, starts, self.width, nodes[:, SCALE], SCALE, walk)
+    def _changes(self, durations: np.ndarray) -> Changes:
+        own, current = self._own, walk(self._own.current_walk, durations)
+        changed = {SCALE: walk(own.scale_walk, durations), CURRENT_X: current, CURRENT_Y: current}
+        return {**super()._changes(durations), **changed}
 
     def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
         return as_complex(nodes[:, _CURRENT]) * durations
@@ -301,34 +335,55 @@ class ThrusterFactors(DvlFactors):
         return (CURRENT_X + axis,)
 
 
-def add_walk(
-    equations: NormalEquations, starts: np.ndarray, width: int, values: np.ndarray, column: int, variance: np.ndarray
-) -> None:
-    """Add that unknown `column` of nodes changes by nothing but for `variance` (n - 1,) from node to node.
+class AutoFactors(ThrusterFactors):
+    """As ThrusterFactors, of an odometry of which nobody knows whether it is a DVL's or reckoned from thrusters.
 
-    starts: (n - 1,) columns of all nodes but the last. values: (n,) of the unknown.
+    Scale and current do not walk within the window of the live solver, nor within a run that is refined.
     """
-    add_forgetting(equations, starts, width, values, column, np.ones(len(starts)), variance)
+
+    def __init__(self, dvl: DvlOdometry, doubt: OdometryDoubt) -> None:
+        own = {field.name: getattr(dvl, field.name) for field in fields(DvlOdometry)}
+        own["scale_deviation"] = doubt.scale_deviation
+        super().__init__(
+            ThrusterOdometry(**own, scale_walk=0.0, current_deviation=doubt.current_deviation, current_walk=0.0)
+        )
+        self._distance_deviation = dvl.scale_deviation
+        still, flowing = doubt.no_current, doubt.current_deviation
+        share = (1.0 - doubt.dvl_share) / 2.0
+        components = (
+            PriorComponent("DVL", doubt.dvl_share, np.array([dvl.scale_deviation, still, still])),
+            PriorComponent("THRUSTERS", share, np.array([doubt.scale_deviation, still, still])),
+            PriorComponent("THRUSTERS in a current", share, np.array([doubt.scale_deviation, flowing, flowing])),
+        )
+        self._mixture = PriorMixture(
+            (SCALE, CURRENT_X, CURRENT_Y),
+            np.array([dvl.scale, 0.0, 0.0]),
+            components[-1].deviations,
+            np.array([doubt.scale_told, doubt.current_told, doubt.current_told]),
+            np.array([doubt.scale_walk, doubt.current_walk, doubt.current_walk]),
+            components,
+        )
+
+    @property
+    def distance_deviation(self) -> float:
+        return self._distance_deviation
+
+    @property
+    def mixture(self) -> PriorMixture:
+        return self._mixture
 
 
-def add_forgetting(
-    equations: NormalEquations, starts: np.ndarray, width: int, values: np.ndarray, column: int, kept: np.ndarray,
-    variance: np.ndarray,
-) -> None:  # fmt: skip
-    """Add that of an unknown the share `kept` (n - 1,) is left at the next node, but for `variance` (n - 1,)."""
-    columns = np.column_stack([starts + width + column, starts + column])
-    jacobian = np.column_stack([np.ones(len(starts)), -kept])
-    weight = 1.0 / np.maximum(variance, _CONSTANT_DEVIATION**2)
-    equations.add(columns, jacobian, values[1:] - kept * values[:-1], weight)
+def walk(deviation: float, durations: np.ndarray) -> Change:
+    """Return the change of an unknown that walks by `deviation` [1/sqrt(s)]."""
+    return Change(np.ones(len(durations)), deviation**2 * durations)
 
 
-def add_compass(
-    equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray, compass: Compass
-) -> None:
-    """Add how the correction of the reported heading changes: an error that lasts, and a walk.
-
-    starts: (n - 1,) columns of all nodes but the last. nodes: (n, width). durations: (n - 1,) s between them.
-    """
-    kept = np.exp(-durations / compass.heading_correlation_time)
-    variance = compass.heading_deviation**2 * (1.0 - kept**2) + compass.heading_walk**2 * durations
-    add_forgetting(equations, starts, nodes.shape[1], nodes[:, YAW], YAW, kept, variance)
+def add_changes(equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, changes: Changes) -> None:
+    """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width)."""
+    columns, values = np.array(list(changes))[:, np.newaxis], nodes[:, list(changes)].T
+    kept, variances = (np.stack(each) for each in zip(*changes.values()))
+    places = np.stack([starts + nodes.shape[1] + columns, starts + columns], axis=-1)
+    jacobian = np.stack([np.ones_like(kept), -kept], axis=-1)
+    weight = 1.0 / np.maximum(variances, _CONSTANT_DEVIATION**2)
+    residual = values[:, 1:] - kept * values[:, :-1]
+    equations.add(places.reshape(-1, 2), jacobian.reshape(-1, 2), residual.ravel(), weight.ravel())

@@ -40,27 +40,29 @@ class Layout:
     """Where the free unknowns stand: those of nodes `first` to `last` (both included), then those of the run.
 
     Nodes before `first` are frozen. Several of them share one group, whose pose stands after the free unknowns.
-    group_of_node: (first,) which one; -1 for a node that nothing depends on.
+    group_of_node: (first,) which one; -1 for a node that nothing depends on. run_start: place of the run's first
+    unknown. size: number of free unknowns.
     """
 
     first: int
     last: int
     width: int
     group_of_node: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    run_start: int = field(init=False)
+    size: int = field(init=False)
 
-    @property
-    def size(self) -> int:
-        """Number of free unknowns."""
-        return self.run_start + RUN_COLUMNS
-
-    @property
-    def run_start(self) -> int:
-        """Place of the run's first unknown."""
-        return self.width * (self.last - self.first + 1)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "run_start", self.width * (self.last - self.first + 1))
+        object.__setattr__(self, "size", self.run_start + RUN_COLUMNS)
 
     def node_start(self, node: np.ndarray) -> np.ndarray:
         """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
+
+    def with_run(self, nodes: np.ndarray) -> np.ndarray:
+        """Return the columns (n, width + 2) of all unknowns of free `nodes` (n,), each followed by those of the run."""
+        own = self.node_start(nodes)[:, np.newaxis] + np.arange(self.width)
+        return np.column_stack([own, np.tile(self.run_start + np.arange(RUN_COLUMNS), (len(own), 1))])
 
     def pose_columns(self, nodes: np.ndarray) -> np.ndarray:
         """Return the columns (..., 3) of poses of nodes (...); -1 for a frozen one without group or before the run."""
@@ -105,11 +107,10 @@ class NormalEquations:
         )
         self.cost += float(np.sum(weight * residual**2))
 
-    def add_prior(self, start: int, value: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> None:
-        """Add that the unknowns from column `start` on, at `value` (m,), are `mean` (m,) but for `deviation` (m,)."""
-        columns = start + np.arange(len(value))[:, np.newaxis]
+    def add_prior(self, columns: np.ndarray, value: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> None:
+        """Add that unknowns in `columns` (m,), at `value` (m,), are `mean` (m,) but for `deviation` (m,)."""
         weight = np.maximum(deviation, _HELD_DEVIATION) ** -2.0
-        self.add(columns, np.ones((len(value), 1)), value - mean, weight)
+        self.add(columns[:, np.newaxis], np.ones((len(value), 1)), value - mean, weight)
 
     def add_terms(self, columns: np.ndarray, information: np.ndarray, gradient: np.ndarray) -> None:
         """Add m sums: columns (m, c) as in `add`, information (m, c, c), gradient (m, c)."""
@@ -166,16 +167,19 @@ class DenseSolution:
         """Return the inverse of the information times `right` (size, k)."""
         return scipy.linalg.cho_solve(self._factor, right)
 
-    def covariance(self, columns: np.ndarray, held_covariance: np.ndarray) -> np.ndarray:
-        """Return the covariance (k, k) of unknowns `columns` (k,), where held ones err by `held_covariance`.
+    def covariances(self, columns: np.ndarray, held_covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the covariances (b, k, k) of b sets of unknowns, `columns` (b, k), where held ones err by
+        `held_covariance`, and the same if these had no error.
 
         That is what Schmidt (1966) calls considering the parameters that are not estimated.
         """
-        unit = np.zeros((len(self.step), len(columns)))
-        unit[columns, np.arange(len(columns))] = 1.0
+        sets, each = columns.shape
+        unit = np.zeros((len(self.step), columns.size))
+        unit[columns.ravel(), np.arange(columns.size)] = 1.0
         gain = self.solve(unit)
-        by_held = gain.T @ self._to_held
-        return gain[columns] + by_held @ held_covariance @ by_held.T
+        own = gain.reshape(-1, sets, each)[columns, np.arange(sets)[:, np.newaxis]]
+        by_held = (gain.T @ self._to_held).reshape(sets, each, -1)
+        return own + by_held @ held_covariance @ by_held.transpose(0, 2, 1), own
 
 
 class SparseSolution:

@@ -9,6 +9,7 @@ from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse
 
 _FIRST_CAPACITY = 256
+_GROWTH = 5  # quarters: memory of a long run is dearer than copying
 _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
 
 
@@ -18,8 +19,8 @@ class GrowingArray:
     values: (n, ...) view of those that were appended, valid until the next change.
     """
 
-    def __init__(self, *shape: int) -> None:
-        self._rows = np.empty((_FIRST_CAPACITY, *shape))
+    def __init__(self, *shape: int, kind: type = float) -> None:
+        self._rows = np.empty((_FIRST_CAPACITY, *shape), dtype=kind)
         self.values = self._rows[:0]
 
     def __len__(self) -> int:
@@ -34,12 +35,17 @@ class GrowingArray:
         """Keep the first `count` rows."""
         self.values = self.values[:count]
 
+    def keep(self, chosen: np.ndarray) -> None:
+        """Keep the chosen rows, (n,) bool, in little more memory than they need."""
+        self._rows = self.values[chosen]
+        self.values = self._rows[:]
+
     def extend(self, rows: np.ndarray) -> None:
         """Append rows (m, ...)."""
         before = len(self.values)
         count = before + len(rows)
         if count > len(self._rows):
-            larger = np.empty((max(count, 2 * len(self._rows)), *self._rows.shape[1:]))
+            larger = np.empty((max(count, len(self._rows) * _GROWTH // 4), *self._rows.shape[1:]), self._rows.dtype)
             larger[:before] = self.values
             self._rows = larger
         self._rows[before:count] = rows
@@ -99,6 +105,14 @@ class OdometryLog:
         self._times.shorten(count)
         self._poses.shorten(count)
         self._ahead.shorten(count)
+
+    def thin(self, until: float) -> None:
+        """Keep about one pose in a second of those before `until` [s]."""
+        times = self._times.values
+        seconds = np.floor(times / _WINDOW)
+        kept = (np.diff(seconds, prepend=-np.inf) > 0.0) | (times >= until)
+        for array in (self._times, self._poses, self._ahead):
+            array.keep(kept)
 
     @property
     def end(self) -> float:

@@ -22,9 +22,18 @@ _STOP_SIGMA = 0.1
 class JointSolverParameters(ParameterSet):
     """What the joint solver needs to know of a sonar and of how a vehicle goes, by the names in the yaml files."""
 
+    range_scale_deviation: float = parameter(
+        0.02, "standard deviation of a common relative error of all ranges: speed of sound between cold fresh and warm "
+        "salt water", low=0.0, high=0.5, tunable=False,
+    )  # fmt: skip
     sonar_delay_deviation: float = parameter(
-        0.0, "how far the beams' stamps may be off, all by the same", unit="s", low=0.0, high=5.0, tunable=False
-    )
+        1.0, "how far the beams' stamps may be off, all by the same: many are taken when a beam has arrived", unit="s",
+        low=0.0, high=5.0, tunable=False,
+    )  # fmt: skip
+    plateau_scale_deviation: float = parameter(
+        0.05, "least range_scale_deviation where echoes are plateaus", low=0.0, high=0.5, tunable=False,
+        expert="plateaus lengthen with range, and their middle moves outwards by some percent of it; 0 once calibrated",
+    )  # fmt: skip
     echo_deviation: float = parameter(
         0.5, "standard deviation of a point square-on to its surface: half an echo's length",
         unit="m", low=0.01, high=10.0, tunable=False,
@@ -84,9 +93,6 @@ class SolverParameters(JointSolverParameters):
     """
 
     range_scale_error: float = parameter(0.0, "true range over reported range, minus 1", low=-0.5, high=1.0)
-    range_scale_deviation: float = parameter(
-        0.02, "its standard deviation: speed of sound between cold fresh and warm salt water", low=0.0, high=0.5
-    )
     sonar_delay: float = parameter(0.0, "seconds by which a beam is later than its stamp", unit="s", low=-5.0, high=5.0)
     beam_half_width: float = parameter(
         0.06, "angle within which a beam may have heard a point: twice the half-power half width of common heads",
@@ -109,6 +115,10 @@ class SolverParameters(JointSolverParameters):
     tolerance: float = parameter(
         0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
+    kept_scans: int = parameter(
+        1000, "newest scans of which all is kept; of older ones only what a scan may be compared with", low=500,
+        high=10**9,
+    )  # fmt: skip
     odometry: OdometryModel = field(default_factory=_none_given)
     node_search: Optional[NodeSearch] = None
 
@@ -145,26 +155,28 @@ class SolverParameters(JointSolverParameters):
         """(2,) the run's unknowns, error of the range scale and delay [s], as expected before the run."""
         return np.array([self.range_scale_error, self.sonar_delay])
 
-    @property
-    def run_deviations(self) -> np.ndarray:
-        """(2,) their standard deviations.
+    def run_deviations(self, log: RunLog) -> np.ndarray:
+        """Return (2,) their standard deviations for the echoes of a run.
 
         Where the odometry reports no distances, the sonar's ranges are the only measure of lengths, and nothing in the
         run tells how far they are off: their scale is held, see `world_scale_deviation`.
         """
-        return np.array([0.0 if self._only_ranges else self.range_scale_deviation, self.sonar_delay_deviation])
+        return np.array([0.0 if self._only_ranges else self._scale_deviation(log), self.sonar_delay_deviation])
 
-    @property
-    def world_scale_deviation(self) -> float:
-        """Standard deviation of a scale of ranges and motions together that nothing in the run can tell.
+    def world_scale_deviation(self, log: RunLog) -> float:
+        """Return the standard deviation of a scale of ranges and motions together that nothing in a run can tell.
 
         It is in the stated covariances only.
         """
-        return self.range_scale_deviation if self._only_ranges else 0.0
+        return self._scale_deviation(log) if self._only_ranges else 0.0
 
     @property
     def _only_ranges(self) -> bool:
         return bool(np.isinf(self.odometry.distance_deviation))
+
+    def _scale_deviation(self, log: RunLog) -> float:
+        of_plateaus = self.plateau_scale_deviation if log.has_plateaus else 0.0
+        return max(self.range_scale_deviation, of_plateaus)
 
     def variances(self, slant: np.ndarray, other_slant: np.ndarray) -> np.ndarray:
         """Return the variances (m,) [m^2] of distances of points from surfaces, with slants (m,) [m] of both.

@@ -5,72 +5,48 @@ from typing import Union
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compiled_placement import placed_rows
+from mlsm_manager.joint_solver.compiled_placement import Heard, path_rows, placed_rows
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, State
-from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog, as_complex, stretched
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.surface_points import SurfacePoints
-from mlsm_manager.scan_matching.scan import Track
 
 _HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
 
 
-class NodePath:
-    """The path between nodes: the model's reference path, turned and scaled, stretched from node to node."""
-
-    def __init__(self, odometry: OdometryModel, timeline: OdometryLog, times: np.ndarray, nodes: np.ndarray) -> None:
-        """times: (n,) s of the nodes, n > 1. nodes: (n, width)."""
-        self._odometry, self._timeline, self._times, self._nodes = odometry, timeline, times, nodes
-        motion = timeline.motion(times)
-        self._places = as_complex(motion.poses[:, :2] + nodes[:, :2])
-        self._reference = odometry.reference(motion)
-        gain = odometry.gain(nodes)
-        self._gain, self._last_gain = (gain[:-1] + gain[1:]) / 2.0, gain[-1:]
-
-    @property
-    def table(self) -> np.ndarray:
-        """(n, 8): times of the nodes, places x y, yaw, reference path x y, and the gain x y from each to the next."""
-        gain = np.append(self._gain, self._last_gain)
-        columns = (self._times, self._places, self._nodes[:, YAW], self._reference, gain)
-        parts = [(one.real, one.imag) if np.iscomplexobj(one) else (one,) for one in columns]
-        return np.column_stack([part for pair in parts for part in pair])
-
-    def at(self, times: np.ndarray) -> np.ndarray:
-        """Return T_map_base (m, 3) at any `times` (m,) [s]; before the first node and after the last as it goes on."""
-        first, last = self._times[0], self._times[-1]
-        inside = np.clip(times, first, last)
-        legs = np.clip(np.searchsorted(self._times, inside, side="right") - 1, 0, len(self._times) - 2)
-        near = self._timeline.motion(inside)
-        reference = self._odometry.reference(near)
-        poses = self._poses_of(near, reference, legs)
-        if np.array_equal(inside, times):
-            return poses
-        motion, after = self._timeline.motion(times), times > last
-        gain, yaw = np.where(after, self._last_gain, self._gain[0]), self._nodes[np.where(after, -1, 0), YAW]
-        beyond = stretched(self._odometry.reference(motion) - reference, gain, yaw)
-        turn = motion.poses[:, 2] - near.poses[:, 2]
-        return poses + np.column_stack([beyond.real, beyond.imag, turn])
-
-    def _poses_of(self, motion: Motion, reference: np.ndarray, legs: np.ndarray) -> np.ndarray:
-        """Return the poses (m, 3) at times between nodes `legs` (m,) and the next; `reference`: (m,) of the times."""
-        share = (motion.times - self._times[legs]) / (self._times[legs + 1] - self._times[legs])
-        yaw = (1.0 - share) * self._nodes[legs, YAW] + share * self._nodes[legs + 1, YAW]
-        from_node = reference - self._reference[legs]
-        bow = from_node - share * (self._reference[legs + 1] - self._reference[legs])
-        bow = stretched(bow, self._gain[legs], yaw)
-        place = (1.0 - share) * self._places[legs] + share * self._places[legs + 1] + bow
-        return np.column_stack([place.real, place.imag, motion.poses[:, 2] + yaw])
-
-
 def solved_path(
-    track: Track, odometry: OdometryModel, node_times: np.ndarray, nodes: np.ndarray, times: np.ndarray
+    log: OdometryLog, odometry: OdometryModel, node_times: np.ndarray, nodes: np.ndarray, times: np.ndarray
 ) -> np.ndarray:
-    """Return T_map_base (m, 3) at `times` (m,): the path through the nodes.
+    """Return T_map_base (m, 3) at any `times` (m,) [s]; before the first node and after the last as it goes on.
 
-    node_times: (n,) s. nodes: (n, width).
+    node_times: (n,) s, n > 1. nodes: (n, width).
     """
-    return NodePath(odometry, OdometryLog.of(track), node_times, nodes).at(times)
+    if not len(times):
+        return np.empty((0, 3))
+    first, last = np.searchsorted(node_times, [times.min(), times.max()])
+    near = slice(max(min(first, len(node_times) - 1) - 1, 0), last + 1)
+    node_times, nodes = node_times[near], nodes[near]
+    known = log.between(min(times.min(), node_times[-1]), max(times.max(), node_times[0]))
+    return path_rows(times, _legs(log, odometry, node_times, nodes), _knots(odometry, known))
+
+
+def _legs(log: OdometryLog, odometry: OdometryModel, times: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the nodes (n, 8) as compiled loops take them; times: (n,) s. nodes: (n, width).
+
+    Between two of them the path is the model's reference path, turned and scaled by the mean of their gains, and
+    stretched to lead from one to the other. The last gain is that with which it goes on.
+    """
+    motion = log.motion(times)
+    places, reference, gain = motion.poses[:, :2] + nodes[:, :2], odometry.reference(motion), odometry.gain(nodes)
+    gain[:-1] = (gain[:-1] + gain[1:]) / 2.0
+    return np.column_stack([times, places, nodes[:, YAW], reference.real, reference.imag, gain.real, gain.imag])
+
+
+def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
+    """Return poses of the odometry (k, 4) as compiled loops take them: a reference path is even between them."""
+    reference = odometry.reference(known)
+    return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])
 
 
 @dataclass(frozen=True)
@@ -113,27 +89,19 @@ class PlacedPoints:
 def placed(
     log: RunLog, odometry: OdometryModel, state: State, points: SurfacePoints, scans: np.ndarray
 ) -> PlacedPoints:
-    """Return points that `scans` (n,) heard in the map. NodePath says where the vehicle was between two nodes."""
+    """Return points that `scans` (n,) heard in the map, from the path between the two nodes of each."""
     if not len(points):
         return _NO_POINTS
     times = points.times + state.run[DELAY]
     nodes = np.unique(np.concatenate([scans, scans + 1]))
-    path = NodePath(odometry, log.odometry, log.node_times[nodes], state.nodes[nodes])
     known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)
-    rows = placed_rows(
-        times, np.searchsorted(nodes, scans), points.ranges, points.bearings, points.normals, log.sonar_in_base,
-        float(state.run[RANGE_SCALE]), path.table, _knots(odometry, known), _HALF_SECOND,
-    )  # fmt: skip
+    heard = Heard(times, np.searchsorted(nodes, scans), points.ranges, points.bearings, points.normals)
+    path = _legs(log.odometry, odometry, log.node_times[nodes], state.nodes[nodes]), _knots(odometry, known)
+    rows = placed_rows(heard, log.sonar_in_base, float(state.run[RANGE_SCALE]), *path, _HALF_SECOND)
     return PlacedPoints(
         scans=scans, places=rows[:, 0:2], arms=rows[:, 2:4], normals=rows[:, 4:6], slants=points.slants,
         qualities=points.qualities, shares=rows[:, 10], by_run=rows[:, 6:10].reshape(-1, 2, 2),
     )  # fmt: skip
-
-
-def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
-    """Return poses of the odometry (k, 4) as `placed_rows` takes them: a reference path is even between them."""
-    reference = odometry.reference(known)
-    return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])
 
 
 _NO_POINTS = PlacedPoints(

@@ -5,7 +5,8 @@ from typing import Iterator, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, Pairs, add_comparisons
+from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.solution import Solution
@@ -39,7 +40,7 @@ class PostComparisons:
             self._lists = Neighbours(points, self._parameters.group_scans)
         near = _NEAR_IN_TIME * self._parameters.parts_per_turn
         pairs, count = post_pairs(self._lists, sources, points, cut, near), 0
-        pairs = replace(pairs, importance=pairs.importance * self._importance[pairs.neighbours])
+        pairs = pairs.weighted(self._importance)
         for each, heard, met in along_and_across(pairs, sources, points):
             count += add_comparisons(equations, layout, each, heard, met, self._parameters, cut)
         return count

@@ -6,11 +6,12 @@ from typing import List, Optional
 import numpy as np
 
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, post_points
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, echo_count, post_points
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
 _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
+_POINTS_OF_PLATEAU = 2.0  # per echo: plateaus have 3 to 4 at a spacing of 1 m, peaks 1.0 to 1.3
 
 
 class PointTable:
@@ -52,6 +53,14 @@ class PointTable:
         for array in (*self._points.values(), self._scans):
             array.shorten(self._starts[-1])
 
+    def forget(self, scans: np.ndarray) -> None:
+        """Forget the points of `scans` (n,) bool, one for each scan so far."""
+        counts = self.counts
+        kept = np.repeat(~scans, counts)
+        for array in (*self._points.values(), self._scans):
+            array.keep(kept)
+        self._starts = [0, *np.cumsum(np.where(scans, 0, counts)).tolist()]
+
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
         return np.arange(self._starts[first], self._starts[last])
@@ -68,7 +77,7 @@ class PointTable:
 class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
-    sonar_in_base: (2,) m. posts: echoes of what is small.
+    sonar_in_base: (2,) m. posts: echoes of what is small. Points of scans may be forgotten; the nodes stay.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -78,11 +87,18 @@ class RunLog:
         self._node_times = GrowingArray()
         self._surfaces, self.posts = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []
+        self._forgotten = GrowingArray(kind=bool)
+        self._points_and_echoes = GrowingArray(2)
 
     @property
     def scan_count(self) -> int:
         """Number of scans so far."""
         return self._surfaces.scan_count
+
+    @property
+    def forgotten(self) -> np.ndarray:
+        """(scan_count,) bool, scans whose points are forgotten; a view."""
+        return self._forgotten.values
 
     @property
     def node_times(self) -> np.ndarray:
@@ -93,6 +109,12 @@ class RunLog:
     def point_counts(self) -> np.ndarray:
         """(scan_count,) int, number of points on surfaces of each scan."""
         return self._surfaces.counts
+
+    @property
+    def has_plateaus(self) -> bool:
+        """Whether most echoes are so long that they are drawn as several points."""
+        points, echoes = self._points_and_echoes.values.sum(axis=0)
+        return bool(points > _POINTS_OF_PLATEAU * echoes)
 
     def append(self, scan: Scan, lookahead: float) -> None:
         """Append a scan and the odometry of its track up to `lookahead` seconds after its end.
@@ -108,8 +130,10 @@ class RunLog:
             text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
             raise RefusedInput("scans out of order", text)
         self._odometry_lengths.append(len(self.odometry))
+        self._forgotten.extend([False])
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
+        self._points_and_echoes.extend(np.array([[len(scan.points), echo_count(scan, self.sonar_in_base)]]))
         self._surfaces.append(points)
         self.posts.append(posts)
 
@@ -118,8 +142,23 @@ class RunLog:
         self._surfaces.remove_newest()
         self.posts.remove_newest()
         self.odometry.shorten(self._odometry_lengths.pop())
+        self._points_and_echoes.shorten(self.scan_count)
+        self._forgotten.shorten(self.scan_count)
         # Without scans no node is known: the next scan begins the run.
         self._node_times.shorten(self.scan_count + 1 if self.scan_count else 0)
+
+    def forget(self, scans: np.ndarray) -> None:
+        """Forget the points of `scans` (n,) bool, those of each scan so far."""
+        self.forgotten[: len(scans)] |= scans
+        self._surfaces.forget(self.forgotten)
+        self.posts.forget(self.forgotten)
+
+    def thin_odometry(self, scan: int) -> None:
+        """Keep only about one pose of the odometry in a second before `scan` began."""
+        before = len(self.odometry)
+        self.odometry.thin(self.node_times[scan])
+        gone = before - len(self.odometry)
+        self._odometry_lengths = [max(length - gone, 0) for length in self._odometry_lengths]
 
     def since(self, scan: int) -> "RunLog":
         """Return a log of `scan` and all later ones, the first of which is number 0 there. It shares the odometry."""
@@ -127,6 +166,8 @@ class RunLog:
         later.odometry = self.odometry
         later._node_times.extend(self.node_times[scan:])
         later._surfaces, later.posts = self._surfaces.since(scan), self.posts.since(scan)
+        later._forgotten.extend(self.forgotten[scan:])
+        later._points_and_echoes.extend(self._points_and_echoes.values[scan:])
         return later
 
     def rows(self, first: int, last: int) -> np.ndarray:

@@ -1,16 +1,18 @@
 """A run as far as it is solved: what was measured, the unknowns, and what follows from both."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, Optional, Protocol
+from typing import List, Optional, Protocol, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Pairs
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
+from mlsm_manager.joint_solver.fixes import Fixes
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import NodePath, PlacedPoints, placed
+from mlsm_manager.joint_solver.placement import PlacedPoints, placed, solved_path
+from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 from mlsm_manager.joint_solver.run_log import RunLog
 from node_support.geometry import inverse, transformed
 
@@ -95,7 +97,8 @@ class Solution:
     """What is passed, solved, drawn, stored and judged.
 
     state: the unknowns of the run in `log`. submaps: which of its scans are compared with each other. known: surfaces
-    that were in the map before the run.
+    that were in the map before the run. prior_term: what a mixture of priors added to the newest node; None before.
+    fixes: of single scans.
     """
 
     log: RunLog
@@ -103,6 +106,8 @@ class Solution:
     state: State
     submaps: Submaps = field(default_factory=lambda: Submaps(np.empty(0)))
     known: Optional[KnownSurfaces] = None
+    prior_term: Optional[PriorTerm] = None
+    fixes: Fixes = field(default_factory=Fixes)
 
     @property
     def odometry(self) -> OdometryModel:
@@ -126,8 +131,8 @@ class Solution:
         """Return where `nodes` (...) of the run are, (..., 2) m in map."""
         return self.log.node_poses(nodes)[..., :2] + self.state.nodes[nodes, :2]
 
-    def points(self, cloud: TimedPoints) -> np.ndarray:
-        """Return the points (n, >= 2) of a cloud in map.
+    def heard(self, cloud: TimedPoints) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the points (n, >= 2) of a cloud in map, and where the sonar was when it heard each, (n, 2) m.
 
         Ranges and stamps are corrected as the run's unknowns say. Before the first node and after the last one the
         motion goes on.
@@ -135,18 +140,9 @@ class Solution:
         seen = transformed(inverse(self.log.odometry.at(cloud.times)), cloud.points)
         sonar = self.log.sonar_in_base
         seen[:, :2] = sonar + (1.0 + self.state.run[RANGE_SCALE]) * (seen[:, :2] - sonar)
-        return transformed(self.path(cloud.times + self.state.run[DELAY]), seen)
-
-    def origins(self, cloud: TimedPoints) -> np.ndarray:
-        """Return where the sonar was in map when it heard each point of a cloud, (n, 2) m."""
         path = self.path(cloud.times + self.state.run[DELAY])
-        return transformed(path, np.broadcast_to(self.log.sonar_in_base, (len(path), 2)))
+        return transformed(path, seen), transformed(path, np.broadcast_to(sonar, (len(path), 2)))
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
-        if not len(times):
-            return np.empty((0, 3))
-        node_times = self.log.node_times
-        first, last = np.searchsorted(node_times, [times.min(), times.max()])
-        near = slice(max(min(first, len(node_times) - 1) - 1, 0), last + 1)
-        return NodePath(self.odometry, self.log.odometry, node_times[near], self.state.nodes[near]).at(times)
+        return solved_path(self.log.odometry, self.odometry, self.log.node_times, self.state.nodes, times)

@@ -101,6 +101,12 @@ def points_per_echo(times: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     return result
 
 
+def echo_count(scan: Scan, sonar_in_base: np.ndarray) -> float:
+    """Return how many echoes the points of a scan belong to."""
+    ranges = np.hypot(*sights(scan, sonar_in_base).T)
+    return float((1.0 / points_per_echo(scan.times, ranges)).sum())
+
+
 def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return unit normals (n, 2) of the lines that points (n, 2) lie on, and how certain these are (n,), 0 to 1.
 

@@ -8,12 +8,13 @@ from mlsm_manager.joint_solver.motion_models import (
     DRIFT_STATES,
     FIXED_DEVIATION,
     HELD_DEVIATION,
+    Change,
+    Changes,
     Compass,
     Drift,
     OdometryModel,
-    add_compass,
-    add_forgetting,
-    add_walk,
+    add_changes,
+    walk,
 )
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
@@ -120,8 +121,8 @@ class HeadingFactors(OdometryModel):
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
         starts = layout.node_start(np.arange(layout.first, layout.last))
         self._add_positions(equations, starts, nodes, motion)
-        self._add_yaw(equations, starts, nodes, motion.durations)
-        self._add_speeds(equations, starts, nodes, motion.durations)
+        add_changes(equations, starts, nodes, self._changes(motion.durations))
+        self._add_speeds_ahead(equations, starts, nodes, motion.durations)
 
     def _first_heading(self) -> float:
         return self._compass.heading_deviation
@@ -132,18 +133,19 @@ class HeadingFactors(OdometryModel):
             -durations / self._speeds.slip_correlation_time
         )
 
-    def _add_yaw(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
-    ) -> None:
-        add_compass(equations, starts, nodes, durations, self._compass)
+    def _changes(self, durations: np.ndarray) -> Changes:
+        """Return how the errors of the compass, the speed aside and the speed of travel change from node to node."""
+        return {YAW: self._compass.change(durations), **self._changes_of_speeds(durations)}
 
-    def _add_speeds(
+    def _changes_of_speeds(self, durations: np.ndarray) -> Changes:
+        own, (_, slipping) = self._speeds, self._kept(durations)
+        aside = Change(slipping, own.slip_deviation**2 * (1.0 - slipping**2))
+        return {TRAVEL: walk(own.travel_walk, durations), ASIDE: aside}
+
+    def _add_speeds_ahead(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
     ) -> None:
-        own, (kept, slipping) = self._speeds, self._kept(durations)
-        add_walk(equations, starts, self.width, nodes[:, TRAVEL], TRAVEL, own.travel_walk**2 * durations)
-        variance = own.slip_deviation**2 * (1.0 - slipping**2)
-        add_forgetting(equations, starts, self.width, nodes[:, ASIDE], ASIDE, slipping, variance)
+        own, (kept, _) = self._speeds, self._kept(durations)
         columns = starts[:, np.newaxis] + np.array([self.width + AHEAD, AHEAD, TRAVEL])
         jacobian = np.column_stack([np.ones(len(starts)), -kept, kept - 1.0])
         residual = nodes[1:, AHEAD] - kept * nodes[:-1, AHEAD] - (1.0 - kept) * nodes[:-1, TRAVEL]
@@ -212,13 +214,16 @@ class UnaidedFactors(HeadingFactors):
     def _first_heading(self) -> float:
         return FIXED_DEVIATION * 10.0
 
-    def _add_yaw(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
-    ) -> None:
+    def _changes(self, durations: np.ndarray) -> Changes:
         own = self._own
         kept = np.exp(-durations / own.turn_rate_correlation_time)
-        variance = own.turn_rate_deviation**2 * (1.0 - kept**2)
-        add_forgetting(equations, starts, self.width, nodes[:, TURN_RATE], TURN_RATE, kept, variance)
+        turn_rate = Change(kept, own.turn_rate_deviation**2 * (1.0 - kept**2))
+        return {TURN_RATE: turn_rate, **self._changes_of_speeds(durations)}
+
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        super().add_steps(equations, layout, nodes, motion)
+        own, durations = self._own, motion.durations
+        starts = layout.node_start(np.arange(layout.first, layout.last))
         places = np.array([self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE])
         one, half = np.ones(len(starts)), durations / 2.0
         residual = np.diff(nodes[:, YAW]) - half * (nodes[1:, TURN_RATE] + nodes[:-1, TURN_RATE])

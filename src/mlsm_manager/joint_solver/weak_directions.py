@@ -125,39 +125,24 @@ def discounted(
     compared scan. normal_deviation: rad, of the surfaces' normals.
 
     Along the weakest direction of a scan, information counts only as far as it exceeds (2 normal_deviation)^2 times the
-    information across it.
+    information across it. The rest is taken out as if the scan might lie anywhere along that direction beside the other
+    one: then nothing is said of a turn or a scale of both together, which no comparison can tell.
     """
     if not len(scans):
         return information, gradient
     _, own = np.unique(scans, return_inverse=True)
     values, vectors = np.linalg.eigh(_by_translation(information, places[:2], own))
     errors = (_MOST * normal_deviation) ** 2 * values[:, 1]
-    lost = np.minimum(1.0, errors / np.maximum(values[:, 0], _NOTHING))[own, np.newaxis]
-    directions = vectors[own, :, 0]
-    across, gradient_across = information.copy(), gradient[..., np.newaxis].copy()
-    for values in (across, across.transpose(0, 2, 1), gradient_across):
-        _take_out(directions, places, values)
-    return _between(information, across, lost[..., np.newaxis]), _between(gradient, gradient_across[..., 0], lost)
-
-
-def _between(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.ndarray:
-    """Return first + share * (second - first), in place of `second`: whole runs have 100 MB of them."""
-    second -= first
-    second *= share
-    second += first
-    return second
+    lost = np.minimum(1.0, errors / np.maximum(values[:, 0], _NOTHING))[own]
+    moves = np.zeros_like(gradient)
+    moves[:, places[:2]] = vectors[own, np.newaxis, :, 0]
+    by_move = np.einsum("gab,gb->ga", information, moves)
+    share = lost / np.maximum(np.einsum("ga,ga->g", by_move, moves), _NOTHING)
+    gradient = gradient - (share * np.einsum("ga,ga->g", gradient, moves))[:, np.newaxis] * by_move
+    return information - (share[:, np.newaxis] * by_move)[:, :, np.newaxis] * by_move[:, np.newaxis], gradient
 
 
 def _by_translation(information: np.ndarray, places: np.ndarray, own: np.ndarray) -> np.ndarray:
     """Return the information (s, 2, 2) on translations of s scans; own: (g,) which of them a pair compares."""
     parts = information[:, places[:, np.newaxis, :, np.newaxis], places[:, np.newaxis]].sum(axis=(1, 2))
     return np.stack([np.bincount(own, part) for part in parts.reshape(-1, 4).T], axis=1).reshape(-1, 2, 2)
-
-
-def _take_out(directions: np.ndarray, places: np.ndarray, values: np.ndarray) -> None:
-    """Take the part along `directions` (g, 2) out of all translations, which `values` (g, c, k) are of, in place."""
-    along_x, along_y = directions[:, :1], directions[:, 1:]
-    for x, y in places:
-        along = along_x * values[:, x] + along_y * values[:, y]
-        values[:, x] -= along_x * along
-        values[:, y] -= along_y * along

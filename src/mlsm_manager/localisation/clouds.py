@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Optional, Sequence, Tuple
+from typing import Deque, Optional, Protocol, Sequence, Tuple
 
 import numpy as np
 
@@ -44,6 +44,16 @@ class MapCloud:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+class Placement(Protocol):
+    """Places clouds as it is known now: the joint solver's Solution, or a run in a map that had another odometry."""
+
+    def path(self, times: np.ndarray) -> np.ndarray:
+        """Return T_map_base (m, 3) at `times` (m,) [s]."""
+
+    def heard(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the points (n, 4) of a cloud in map, and where the sonar was when it heard each, (n, 2) m."""
 
 
 @dataclass(frozen=True)

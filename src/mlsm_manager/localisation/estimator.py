@@ -30,7 +30,7 @@ class MapSettings:
     """The grids of the map that is shown and of the map that is matched with.
 
     resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
-    of blocks to reserve memory for. fewest_blocks: of a map that can be matched with.
+    of blocks to reserve memory for.
     carver: what marks free space and takes blocks away that beams go through; None where that is not wanted.
     """
 
@@ -38,12 +38,11 @@ class MapSettings:
     match_resolution: float
     limit: float
     expected_blocks: int
-    fewest_blocks: int
     carver: Optional[Carver] = None
 
 
 class Estimator(ABC):
-    """Finds the poses of scans and draws the map: `ScanByScan` with a matcher, `Joint` with a solver over many scans.
+    """Finds the poses of scans and draws the map: `Joint` with a solver over many scans, or the thesis's way.
 
     Scans are inserted into the map that is matched with, clouds into the map that is shown. While `matching` is off
     both are placed by the odometry as corrected so far. An estimator may change the poses of earlier scans with each
@@ -96,6 +95,11 @@ class Estimator(ABC):
     def solver(self) -> Optional[LiveSolver]:
         """The joint solver of the current run; None where none runs."""
         return None
+
+    @property
+    def odometry(self) -> str:
+        """What was found out about the odometry, as text for people; empty where nothing had to be."""
+        return ""
 
     def verdicts(self) -> List[Verdict]:
         """Return what the run says of itself, without any truth."""

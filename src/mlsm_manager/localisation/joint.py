@@ -1,11 +1,12 @@
 """The joint solver as an estimator: scans in, a map drawn from keyframes and the vehicle's place in it out."""
 
 from time import perf_counter
-from typing import List, Mapping, Optional, Sequence
+from typing import List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.fixes import Fix
+from mlsm_manager.joint_solver.live_solver import ODOMETRY, LiveSolver, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
@@ -21,18 +22,37 @@ from mlsm_manager.localisation.joint_session import (
 )
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.keyframe_map import JointMaps
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
+from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
-from mlsm_manager.scan_matching.scan_path import POSE
+from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.free_space import CarveReport
-from mlsm_manager.surface_map.insertion import InsertReport
+from mlsm_manager.surface_map.insertion import InsertReport, admitted
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, transformed
+
+_KNOWN_SCALE = 0.05
+"""Standard deviation of the odometry's scale below which a scan's place is known to about the cut of the solver."""
+_SURE = 0.5
+"""Of an echo's deviation: a fix that is less sure says no more than the comparisons of the same echoes do."""
+_EXPECTED = 100.0
+"""m: where a place is expected less surely, or overflows after a damaged odometry, no scan is searched."""
+_SCANS_BEFORE_VELOCITIES = 2
+"""Of a run without reported positions, before it tells its velocity: a dead reckoning made from that changes the
+positions that are reported, and proves nothing."""
+
+
+class Assumed(NamedTuple):
+    """What is assumed of an odometry."""
+
+    parameters: SolverParameters
+    errors: OdometryErrors
 
 
 class Joint(Estimator):
@@ -47,10 +67,13 @@ class Joint(Estimator):
 
     def __init__(
         self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher, sonar_in_base: Sequence[float],
-        parameters: SolverParameters,
+        parameters: SolverParameters, without_positions: Optional[Assumed] = None,
     ) -> None:  # fmt: skip
-        """`sonar_in_base`: (2,) m; `mount` changes it from the next run on."""
-        self.parameters = parameters
+        """`sonar_in_base`: (2,) m; `mount` changes it from the next run on.
+
+        without_positions: assumed where the odometry turns out to report no positions; None where its kind was named.
+        """
+        self._usual, self._without_positions = Assumed(parameters, errors), without_positions
         self._session: Optional[JointSession] = None
         super().__init__(settings, errors, matcher, sonar_in_base)
 
@@ -65,6 +88,8 @@ class Joint(Estimator):
         self._end_session()
         super().forget_place()
         self._found_at = -np.inf
+        self._motion = ReportedMotion()
+        self.parameters, self.errors = self._usual
 
     @property
     def lookahead(self) -> float:
@@ -81,11 +106,25 @@ class Joint(Estimator):
         return self._session.solver if self._session is not None else None
 
     @property
+    def odometry(self) -> str:
+        """What was found out about an odometry whose kind was not named, as text for people; empty where it was."""
+        if self._without_positions is None or self._session is None:
+            return ""
+        if self.parameters is self._without_positions.parameters:
+            return "HEADING, because positions never change"
+        return self._session.solver.odometry_told
+
+    @property
     def target(self) -> BlockSource:
-        """The map in which a lost vehicle is searched: without scans that lie apart, where it would find itself."""
-        if self._session is None or np.isinf(self._session.apart_from):
+        """The map in which a lost vehicle is searched: without the newest scan and those that lie apart.
+
+        Where the vehicle was put wrongly it would find itself.
+        """
+        session = self._session
+        if session is None:
             return super().target
-        return self._maps.matched.drawn_until(self._session.apart_from, self._session)
+        before_newest = session.solver.log.node_times[-2]
+        return self._maps.matched.drawn_until(min(session.apart_from, before_newest), session)
 
     @property
     def shown(self) -> MultiLevelSurfaceMap:
@@ -114,6 +153,7 @@ class Joint(Estimator):
         if run is None:
             return ""
         try:
+            self._assume_as(run)
             session = self._maps.resumed(run, self.parameters)
         except ValueError as error:
             self._take(layers)
@@ -121,6 +161,12 @@ class Joint(Estimator):
         self._session = session
         self._know(run.scans[-1], session)
         return ""
+
+    def _assume_as(self, run: StoredRun) -> None:
+        """Assume that a stored run's odometry is of the kind that it was found to be."""
+        other = self._without_positions
+        if other is not None and np.array_equal(run.solver.get(ODOMETRY, ()), name_of(other.parameters.odometry)):
+            self.parameters, self.errors = other
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
         maps = JointMaps.of_layers(self.settings, layers)
@@ -186,8 +232,9 @@ class Joint(Estimator):
         if session is None or cloud.end > session.known_until:
             return self._wait(cloud)
         self._maps.shown.add(cloud)
-        drawn = self._maps.shown.draw(session, session.settled_until)
-        return CloudUpdate(drawn.report, False, 0, drawn.carved)
+        carved = self._maps.shown.draw(session, session.settled_until)
+        _, report = admitted(session.heard(cloud)[0], self.settings.limit)
+        return CloudUpdate(report, False, 0, carved)
 
     def _insert(self, points: np.ndarray) -> InsertReport:
         return self._maps.shown.insert(points)
@@ -197,17 +244,64 @@ class Joint(Estimator):
 
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
+        self._learn_odometry(scan)
         session = self._session
         if session is None:
             known = self.matched.blocks.mean[:, :2]
             correction = self.correction.copy()
             session = JointSession.begun(self.parameters, self._sonar_in_base, correction, self._start, known)
-        session.add(scan)
+        session.add(scan, self._fix(scan))
         return self._taken(scan, session, start)
+
+    def _learn_odometry(self, scan: Scan) -> None:
+        """Solve the run anew if the odometry reports positions, or none, otherwise than was assumed."""
+        other, session = self._without_positions, self._session
+        if other is None:
+            return
+        self._motion.learn(scan.track)
+        wanted = other if self._motion.kind is OdometryKind.HEADING else self._usual
+        if wanted.parameters is self.parameters:
+            return
+        if wanted is self._usual and session is not None and session.solver.log.scan_count > _SCANS_BEFORE_VELOCITIES:
+            return
+        self.parameters, self.errors = wanted
+        if session is None:
+            return
+        if session.solver.log.scan_count <= self.parameters.free_scans:
+            self._session = session.solved_with(self.parameters)
+        else:
+            # So long the vehicle stood still: where it is in the map is known.
+            self._end_session()
+            self._start = np.sqrt(np.diag(self.belief.covariance)[POSE])
+
+    def _fix(self, scan: Scan) -> Optional[Fix]:
+        """Return where the scan alone lies in the map while distances are hardly known, if it is found there.
+
+        None where echoes are plateaus: a single scan of these is metres less certain than its fit says.
+        """
+        session, belief = self._session, self.belief
+        if session is None or belief is None or scan.reference_time <= belief.time or session.solver.log.has_plateaus:
+            return None
+        if not _KNOWN_SCALE < session.solver.distance_deviation < np.inf:
+            return None
+        expected = predicted(belief, scan.track, scan.reference_time, self.errors)
+        expected = updated_by_heading(expected, scan.reference_pose[2], self.errors.heading_deviation)
+        if not np.trace(expected.covariance[POSITION, POSITION]) < _EXPECTED**2:
+            return None
+        result = self.matcher.match(scan, self.matched, prior_of(expected, scan.reference_pose))
+        covariance = result.covariance[POSITION, POSITION]
+        sure = np.linalg.eigvalsh(covariance)[-1] < (_SURE * self.parameters.echo_deviation) ** 2
+        if not (result.accepted and sure):
+            return None
+        return Fix.without_prior(
+            result.pose[POSITION], covariance, expected.theta[POSITION], expected.covariance[POSITION, POSITION]
+        )
 
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
+        if session.solver.closed is not None:
+            self._maps.redraw(session)
         self._maps.matched.add(MapCloud.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
@@ -225,7 +319,10 @@ class Joint(Estimator):
         times = path_times(scan.start, scan.reference_time)
         self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
         points = transformed(self.correction, scan.points)
-        self._maps.matched.insert_cloud(points, scan.times, self._origins(scan.times))
+        self._maps.matched.insert(points)
+        origins = self._origins(scan.times)
+        if origins is not None:
+            self._maps.matched.carve(points, scan.times, origins)
         return ScanUpdate(scan, None, True, self.belief)
 
     def _end_session(self, until: float = np.inf) -> None:

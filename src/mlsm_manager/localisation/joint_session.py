@@ -6,6 +6,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
+from mlsm_manager.joint_solver.fixes import Fix
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
@@ -23,6 +24,8 @@ from node_support.geometry import composed, inverse, transformed, wrapped
 
 _LONGEST_PAUSE = 2.0
 """Usual durations of a scan between two scans: fewer may be a turn that was lost."""
+_MOST_STORED = 500
+"""Scans of a run that are stored with each save: some hours, and some tens of megabytes."""
 _MOST_SCANS = 30
 """For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
 _AGREES = 0.5
@@ -40,23 +43,27 @@ _PATH_POINTS = 17
 class JointSession:
     """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
-    scans: all that it took, as they came, and scans without echoes for pauses.
+    scans: all that it took, as they came, and scans without echoes for pauses; none after a long run.
     """
 
     solver: LiveSolver
     T_map_odom: np.ndarray
     scans: List[Scan] = field(default_factory=list)
+    _taken: int = 0
     _shares: Dict[int, float] = field(default_factory=dict)
 
-    def add(self, scan: Scan) -> LiveEstimate:
+    def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
         for silent in _scans_of_pause(scan, self.solver.log.node_times):
             self._add(silent)
-        return self._add(scan)
+        return self._add(scan, fix)
 
-    def _add(self, scan: Scan) -> LiveEstimate:
-        estimate = self.solver.add(_moved(scan, self.T_map_odom))
+    def _add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
+        estimate = self.solver.add(_moved(scan, self.T_map_odom), fix)
+        self._taken += 1
         self.scans.append(scan)
+        if self._taken > _MOST_STORED:
+            self.scans.clear()
         return estimate
 
     @classmethod
@@ -70,7 +77,7 @@ class JointSession:
     ) -> "JointSession":
         """Return a run that goes on after `scans`; see LiveSolver.resumed."""
         moved = [_moved(scan, T_map_odom) for scan in scans]
-        return cls(LiveSolver.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans))
+        return cls(LiveSolver.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans), len(scans))
 
     @classmethod
     def begun(
@@ -85,6 +92,18 @@ class JointSession:
         surfaces = KnownSurfaces(known) if len(known) else None
         return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
+    def solved_with(self, parameters: SolverParameters) -> "JointSession":
+        """Return a run of the same scans with other parameters."""
+        other = JointSession(self.solver.begun_with(parameters), self.T_map_odom)
+        for scan in self.scans:
+            other._add(scan)
+        return other
+
+    @property
+    def may_be_stored(self) -> bool:
+        """Whether `scans` are all that were taken: not after a long run."""
+        return len(self.scans) == self._taken
+
     def verdicts(self) -> List[Verdict]:
         """Return how the newest scans agree with the map and each other, and how far the newest place is known."""
         parts = self.solver.parameters.parts_per_turn
@@ -97,10 +116,15 @@ class JointSession:
             *self._going_on(turns.times),
             recent_agreement(heard.times, heard.agreements, _CHECKED_SCANS),
             # from the second turn on: the first one alone does not tell its own speed
-            *(position_uncertainty(turns.times[-1:], turns.radii[-1:]) for _ in turns.times[1:2]),
-            *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.parameters.odometry.distance_deviation),
+            *(self._uncertainty(estimates[-1]) for _ in turns.times[1:2]),
+            *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.distance_deviation),
             *in_submaps(turns.times, turns.apart),
         ]
+
+    def _uncertainty(self, newest: LiveEstimate) -> Verdict:
+        solver = self.solver
+        expected = solver.expected_deviations([newest])
+        return position_uncertainty(np.array([newest.time]), np.array([newest.stated_deviation]), expected)
 
     def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:
         """Ask whether the newest turns, which ended at `times` (n,) [s], lie on those before them.
@@ -123,7 +147,8 @@ class JointSession:
         """Whether the map hangs on scans of an unknown velocity, none of which agrees with another yet."""
         if not np.isinf(self.solver.odometry.distance_deviation):
             return False
-        return all(estimate.agreement < _AGREES for estimate in self.solver.estimates[:_CHECKED_SCANS])
+        first = self.solver.estimates[:_CHECKED_SCANS]
+        return all(estimate is not None and estimate.agreement < _AGREES for estimate in first)
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""
@@ -134,13 +159,9 @@ class JointSession:
         """Learn the odometry up to `time` [s], which `track` holds."""
         self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
 
-    def points(self, cloud: MapCloud) -> np.ndarray:
-        """Return the points (n, 4) of a cloud in map, as they are known now."""
-        return self.solver.solution.points(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
-
-    def origins(self, cloud: MapCloud) -> np.ndarray:
-        """Return where the sonar was in map when it heard the points of a cloud, (n, 2) m."""
-        return self.solver.solution.origins(cloud)
+    def heard(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the points (n, 4) of a cloud in map, and where the sonar was when it heard each, (n, 2) m."""
+        return self.solver.solution.heard(replace(cloud, points=transformed(self.T_map_odom, cloud.points)))
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
@@ -255,7 +276,7 @@ def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float)
     if not estimate.comparisons:
         return ScanUpdate(scan, None, True, belief, provisional=session.is_provisional)
     result = _match(scan, estimate, belief, session, seconds)
-    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional)
+    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=_loop(solver))
 
 
 def _match(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSession, seconds: float) -> MatchResult:
@@ -268,6 +289,10 @@ def _match(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSes
         iterations=session.solver.parameters.live_iterations, seconds=seconds, beam_times=times,
         beam_poses=session.path(times),
     )  # fmt: skip
+
+
+def _loop(solver: LiveSolver) -> str:
+    return "" if solver.closed is None else solver.closed.line()
 
 
 def _fix_covariance(estimate: LiveEstimate) -> np.ndarray:

@@ -3,16 +3,21 @@
 from collections import deque
 from dataclasses import dataclass
 from threading import RLock
-from typing import Deque, List, Optional, Tuple
+from typing import Deque, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.placement import Placement
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
-from mlsm_manager.surface_map.free_space import BeamFindings, Carver, CarveReport, FirstEchoes, pairs_of_groups
+from mlsm_manager.surface_map.free_space import (
+    BeamFindings,
+    Carver,
+    CarveReport,
+    FirstEchoes,
+    note_free,
+    pairs_of_groups,
+)
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Overlay
 
@@ -21,6 +26,10 @@ _STRAYED = 0.5
 MOST_FOLLOWED = 2
 """The beams of so many moving keyframes are followed with each scan: those that moved farthest, and a new one before
 them. More would take over a fifth of the time of a scan. What settles is followed in any case."""
+
+
+Beams = Tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Of a keyframe: points (n, 4) in map, the times (n,) [s] of their beams, and where the sonar was then, (n, 2) m."""
 
 
 @dataclass(frozen=True)
@@ -66,17 +75,32 @@ class KeyframeCarving:
         """Take what was known to be free. Raises ValueError for another resolution."""
         self._free.insert_blocks(free)
 
+    @property
+    def settled(self) -> MultiLevelSurfaceMap:
+        """What settled keyframes know to be free."""
+        return self._free
+
+    @property
+    def follows(self) -> bool:
+        """Whether the beams of keyframes that may still move are followed."""
+        return self._most_followed > 0
+
     def carve(
-        self, surface_map: MultiLevelSurfaceMap, points: np.ndarray, times: np.ndarray, origins: np.ndarray
-    ) -> Optional[CarveReport]:
+        self, surface_map: MultiLevelSurfaceMap, points: np.ndarray, times: np.ndarray, origins: np.ndarray,
+        also_free: Sequence[MultiLevelSurfaceMap] = (),
+    ) -> Optional[CarveReport]:  # fmt: skip
         """Carve for ever along the beams of points (n, 4) in the map, taken at `times` (n,) s from `origins` (n, 2) m.
 
-        Return None where nothing is to be carved.
+        also_free: where else what was not known to be free is noted. Return None where nothing is to be carved.
         """
         if self._carver is None:
             return None
-        beams = FirstEchoes.of_level(points, times, origins)
-        return self._carver.carve(surface_map, self._free, beams, points)
+        findings = self._carver.findings(surface_map, FirstEchoes.of_level(points, times, origins), points)
+        removed = self._carver.charge(surface_map, findings)
+        noted = note_free(self._free, findings.free)
+        for free in also_free:
+            free.insert_blocks(noted)
+        return CarveReport(len(findings.free), len(findings.rows), removed)
 
     def forget_oldest(self) -> None:
         """Forget what the oldest keyframe said, because it is settled."""
@@ -88,25 +112,18 @@ class KeyframeCarving:
         while len(self._looks) > count:
             self._looks.pop()
 
-    def look(
-        self,
-        surface_map: MultiLevelSurfaceMap,
-        clouds: List[MapCloud],
-        points: List[np.ndarray],
-        placement: Placement,
-        scans: int = 1,
-    ) -> None:
-        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map as `points`.
+    def look(self, surface_map: MultiLevelSurfaceMap, keyframes: Sequence[Beams], scans: int = 1) -> None:
+        """Follow the beams of moving keyframes that are new or have moved; all of them are in the map.
 
-        points: of each cloud, (n, 4) in map. scans: how many came since the last look.
+        scans: how many came since the last look.
         """
         if self._carver is None or not self._most_followed:
             return
-        self._looks.extend([None] * (len(clouds) - len(self._looks)))
+        points = [there for there, _, _ in keyframes]
+        self._looks.extend([None] * (len(keyframes) - len(self._looks)))
         for number in self._strayed(points, surface_map.resolution, self._most_followed * scans):
-            cloud, there = clouds[number], points[number]
-            beams = FirstEchoes.of_level(there, cloud.times, placement.origins(cloud))
-            self._looks[number] = _Look(there, self._carver.findings(surface_map, beams, there))
+            beams = FirstEchoes.of_level(*keyframes[number])
+            self._looks[number] = _Look(points[number], self._carver.findings(surface_map, beams, points[number]))
         self._hit_cells, self._hit_by = _newest_hits(points, surface_map.resolution)
 
     def outworn(self, surface_map: MultiLevelSurfaceMap) -> np.ndarray:

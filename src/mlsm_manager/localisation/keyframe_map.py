@@ -1,35 +1,23 @@
 """Maps drawn from keyframes: clouds whose places may still change are kept as points and drawn anew when they do."""
 
 from collections import deque
-from dataclasses import dataclass
-from typing import Deque, Dict, List, Mapping, Optional
+from typing import Deque, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.localisation.clouds import MapCloud
+from mlsm_manager.localisation.clouds import MapCloud, Placement
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
-from mlsm_manager.localisation.placement import Placement
 from mlsm_manager.localisation.resumption import StoredRun
+from mlsm_manager.localisation.stretches import Stretches
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.free_space import Carver, CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
-
-_MOST_STORED = 500
-"""Scans of a run that are stored with each save: some hours, and some tens of megabytes."""
-
-
-@dataclass(frozen=True)
-class Drawn:
-    """report: of the newest cloud. carved: what clouds that are settled now carved; None where nothing was."""
-
-    report: InsertReport
-    carved: Optional[CarveReport]
 
 
 class KeyframeMap:
@@ -46,13 +34,15 @@ class KeyframeMap:
         expected_blocks: int = 0,
         carver: Optional[Carver] = None,
         most_followed: int = MOST_FOLLOWED,
+        stretches: Optional[Stretches] = None,
     ) -> None:
         """`carver`: what marks free space and takes blocks away, None for nothing. most_followed: see KeyframeCarving.
 
-        The rest as MultiLevelSurfaceMap.
+        stretches: what keeps settled keyframes for `redraw`; None for none. The rest as MultiLevelSurfaceMap.
         """
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks)
         self._free = KeyframeCarving(resolution, limit, carver, most_followed)
+        self._stretches = stretches
         self._moving: Deque[MapCloud] = deque()
         self._overlay = Overlay(self._map)
         self._above = self._new().blocks
@@ -87,26 +77,18 @@ class KeyframeMap:
 
     def insert(self, points: np.ndarray) -> InsertReport:
         """Insert points (n, 4) in map whose places will not change."""
-        return self.insert_cloud(points, np.empty(0), None).report
-
-    def insert_cloud(self, points: np.ndarray, times: np.ndarray, origins: Optional[np.ndarray]) -> Drawn:
-        """Insert points (n, 4) in map whose places will not change, of beams taken at `times` (n,) s.
-
-        origins: (n, 2) m, where they were heard from; None where that is not known, and nothing is carved.
-        """
         self._overlay.take_off()
         report = self._map.insert(points)
+        if self._stretches is not None:
+            self._stretches.insert(points)
         if self._due is None:
             self._overlay.lay(self._above)
-        return Drawn(report, None if origins is None else self.carve(points, times, origins))
+        return report
 
     def carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
-        """Carve for ever along the beams of a cloud that was inserted; see insert_cloud.
-
-        Return None where nothing is to be carved.
-        """
+        """Carve for ever along the beams of points (n, 4) that were inserted; see KeyframeCarving.carve."""
         self._overlay.take_off()
-        carved = self._free.carve(self._map, points, times, origins)
+        carved = self._free.carve(self._map, points, times, origins, self._also_free)
         if self._due is None:
             self._overlay.lay(self._above)
         return carved
@@ -115,21 +97,23 @@ class KeyframeMap:
         """Add a keyframe; it is in the map from the next `draw` on."""
         self._moving.append(cloud)
 
-    def draw(self, placement: Placement, settled_until: float) -> Drawn:
+    def draw(self, placement: Placement, settled_until: float) -> Optional[CarveReport]:
         """Draw all keyframes where they are now; those that end by `settled_until` [s] stay as they are drawn.
 
-        The others are where `placement` says when somebody looks at the map.
+        The others are where `placement` says when somebody looks at the map. Return what those that are settled now
+        carved; None where nothing was.
         """
         self._overlay.take_off()
-        self._due, drawn = None, Drawn(InsertReport(0, 0, 0), None)
+        carved = []
         while self._moving and self._moving[0].end <= settled_until:
-            drawn = self._settled(self._moving.popleft(), placement, drawn.carved)
-        if not self._moving:
-            self._above = self._new().blocks
-            return drawn
-        self._due = placement
-        self._left_out += 1
-        return Drawn(self._map.report(placement.points(self._moving[-1])), drawn.carved)
+            carved.append(self._settle_oldest(placement))
+        if self._moving:
+            self._due = placement
+            self._left_out += 1
+        else:
+            self._due, self._above = None, self._new().blocks
+        carved = [report for report in carved if report is not None]
+        return sum(carved, CarveReport(0, 0, 0)) if carved else None
 
     def settle(self, placement: Placement, until: float = np.inf) -> None:
         """Draw all keyframes that end by `until` [s] for the last time, and forget those after it."""
@@ -138,6 +122,21 @@ class KeyframeMap:
             self._moving.pop()
         self._free.keep_oldest(len(self._moving))
         self.draw(placement, np.inf)
+        self._stretches = None
+
+    def redraw(self, placement: Placement) -> None:
+        """Draw also what is settled anew, where the path is now; without stretches that stays where it is."""
+        self._overlay.take_off()
+        if self._stretches is not None:
+            self._stretches.redraw(self._map, self._free.settled, placement)
+        self._free.keep_oldest(0)
+        self._due = placement if self._moving else None
+
+    @property
+    def _also_free(self) -> Sequence[MultiLevelSurfaceMap]:
+        """Nobody looks at the free space of a map whose moving keyframes are not followed."""
+        shows = self._stretches is not None and self._free.follows
+        return (self._stretches.free,) if shows else ()
 
     def drawn_until(self, time: float, placement: Placement) -> MultiLevelSurfaceMap:
         """Return a map of its own without the keyframes that end after `time` [s]."""
@@ -147,28 +146,32 @@ class KeyframeMap:
         copy.insert_blocks(self._map.blocks)
         for cloud in self._moving:
             if cloud.end <= time:
-                copy.insert(placement.points(cloud))
+                copy.insert(placement.heard(cloud)[0])
         return copy
 
-    def _settled(self, cloud: MapCloud, placement: Placement, before: Optional[CarveReport]) -> Drawn:
-        """Draw the oldest keyframe for ever; `before`: what older ones carved."""
+    def _settle_oldest(self, placement: Placement) -> Optional[CarveReport]:
+        """Draw the oldest keyframe for ever, and return what it carved; None where nothing is to be carved."""
+        cloud = self._moving.popleft()
         self._free.forget_oldest()
-        points = placement.points(cloud)
-        report = self._map.insert(points)
-        carved = self._free.carve(self._map, points, cloud.times, placement.origins(cloud))
-        return Drawn(report, carved if before is None or carved is None else before + carved)
+        points, origins = placement.heard(cloud)
+        self._map.insert(points)
+        if self._stretches is not None:
+            self._stretches.add(cloud.end, points, placement)
+        return self._free.carve(self._map, points, cloud.times, origins, self._also_free)
 
     def _draw_what_is_due(self) -> None:
         """Draw the keyframes that may still move, if that was put off."""
         if self._due is None:
             return
-        (placement, self._due), clouds, above = (self._due, None), list(self._moving), self._new()
-        everything = placement.points(MapCloud.joined(clouds))
-        points = np.split(everything, np.cumsum([len(cloud) for cloud in clouds])[:-1])
-        above.insert(everything)
+        placement, self._due, above = self._due, None, self._new()
+        together = MapCloud.joined(self._moving)
+        points, origins = placement.heard(together)
+        above.insert(points)
         self._above = above.blocks
         self._overlay.lay(self._above)
-        self._free.look(self._map, clouds, points, placement, self._left_out)
+        ends = np.cumsum([len(cloud) for cloud in self._moving])
+        keyframes = zip(*(np.split(each, ends[:-1]) for each in (points, together.times, origins)))
+        self._free.look(self._map, list(keyframes), self._left_out)
         self._left_out = 0
         self._overlay.hide(self._free.outworn(self._map))
 
@@ -181,8 +184,9 @@ class JointMaps:
 
     def __init__(self, settings: MapSettings) -> None:
         own = settings
-        self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.carver)
-        self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.carver, most_followed=0)
+        shown, matched = (Stretches(resolution) for resolution in (own.resolution, own.match_resolution))
+        self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.carver, stretches=shown)
+        self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.carver, most_followed=0, stretches=matched)
 
     @classmethod
     def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks]) -> "JointMaps":
@@ -199,7 +203,7 @@ class JointMaps:
 
     def stored(self, session: JointSession) -> Dict[str, np.ndarray]:
         """Return the run with what the maps hold of it, as arrays to be stored; nothing after a long run."""
-        if len(session.scans) > _MOST_STORED:
+        if not session.may_be_stored:
             return {}
         return StoredRun(
             session.T_map_odom, session.solver.log.sonar_in_base, session.scans, session.solver.stored(),
@@ -225,6 +229,11 @@ class JointMaps:
         self.shown.draw(session, session.settled_until)
         self.matched.draw(session, session.settled_until)
         return session
+
+    def redraw(self, session: JointSession) -> None:
+        """Draw both maps anew after the path of a run bent to a loop."""
+        self.shown.redraw(session)
+        self.matched.redraw(session)
 
     def settle(self, session: JointSession, until: float = np.inf) -> None:
         """Draw all keyframes of a run that end by `until` [s] for the last time; those after it are forgotten."""

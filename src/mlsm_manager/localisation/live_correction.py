@@ -81,6 +81,13 @@ class LiveCorrection:
         with self._lock:
             return self._sample(time, odometry)
 
+    def standing_sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        """Return what `sample` does for an odometry without times, in which no error can go on after a belief."""
+        with self._lock:
+            if self._state is not None:
+                self._state[RATE], self._fading = 0.0, None
+            return self._sample(time, odometry)
+
     def _sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
         odometry = np.asarray(odometry, dtype=np.float64)
         if self._samples and time <= self._samples[-1][0]:

@@ -96,6 +96,12 @@ class Localiser:
         with self._lock:
             self.estimator.mount(sonar_in_base)
 
+    @property
+    def odometry(self) -> str:
+        """What was found out about the odometry, as text for people; empty where nothing had to be."""
+        with self._lock:
+            return self.estimator.odometry
+
     def verdicts(self) -> List[Verdict]:
         """Return what the run says of itself, without any truth."""
         with self._lock:
@@ -151,7 +157,7 @@ class Localiser:
             return self.last_correction
         scan_time, came_at = self._came
         since = min(max(self._clock() - came_at, 0.0), self._live.blend_time)
-        return self._live.sample(scan_time + since, odometry)
+        return self._live.standing_sample(scan_time + since, odometry)
 
     @property
     def last_correction(self) -> np.ndarray:

@@ -9,9 +9,11 @@ import numpy as np
 from mlsm_manager.joint_solver.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import (
+    AutoFactors,
     Compass,
     DvlFactors,
     DvlOdometry,
+    OdometryDoubt,
     OdometryModel,
     ThrusterFactors,
     ThrusterOdometry,
@@ -33,11 +35,24 @@ _NO_COMPASS = 1e-5
 # rad/sqrt(s): the solver needs some freedom of the heading from scan to scan; of an unknown turn rate, besides it.
 _LEAST_WALK = 1e-6
 _TURN_NOISE = 3.5e-4
+# Data sheets are usually right; the speed at a thrust is known to a third. 10 % of the scale, and half the speed of a
+# slow current, are some turns' worth of echoes.
+_DOUBT = OdometryDoubt(
+    dvl_share=0.8,
+    scale_deviation=0.3,
+    current_deviation=0.1,
+    no_current=0.003,
+    scale_told=0.1,
+    current_told=0.05,
+    scale_walk=0.1 / np.sqrt(600.0),
+    current_walk=0.002,
+)
 
 
 class OdometryKind(Enum):
     """What a vehicle knows of its own motion."""
 
+    AUTO = "AUTO"
     DVL = "DVL"
     THRUSTERS = "THRUSTERS"
     HEADING = "HEADING"
@@ -54,10 +69,10 @@ class OdometryChoice(OdometryErrors):
     """What the odometry measures and how wrong it may be."""
 
     odometry: OdometryKind = parameter(
-        OdometryKind.DVL,
-        "what the joint solver takes from the odometry. DVL: positions that are right to some percent. THRUSTERS: "
-        "positions whose scale is unknown and walks, in a current. HEADING: the heading alone; HOVERING: "
-        "also, of a vehicle that stops and strafes. NONE: nothing", tunable=False,
+        OdometryKind.AUTO,
+        "what the joint solver takes from the odometry. AUTO: what tf and the echoes tell. DVL: positions that are "
+        "right to some percent. THRUSTERS: positions whose scale is unknown and walks, in a current. HEADING: the "
+        "heading alone; HOVERING: also, of a vehicle that stops and strafes. NONE: nothing", tunable=False,
     )  # fmt: skip
     odometry_scale: float = parameter(
         0.0, "true distance over reported distance, minus 1, as known beforehand", low=-0.9, high=9.0, tunable=False
@@ -149,6 +164,10 @@ def _dvl(own: OdometryChoice) -> OdometryModel:
     return DvlFactors(DvlOdometry(**_positions(own)))
 
 
+def _auto(own: OdometryChoice) -> OdometryModel:
+    return AutoFactors(DvlOdometry(**_positions(own)), _DOUBT)
+
+
 def _thrusters(own: OdometryChoice) -> OdometryModel:
     scale_walk = min(own.scale_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0)
     current = {"current_deviation": own.current_deviation, "current_walk": own.current_walk}
@@ -165,6 +184,7 @@ def _none(own: OdometryChoice) -> OdometryModel:
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {
+    OdometryKind.AUTO: _auto,
     OdometryKind.DVL: _dvl,
     OdometryKind.THRUSTERS: _thrusters,
     OdometryKind.HEADING: _heading,
@@ -209,16 +229,19 @@ _UNREPORTED = (
     _POSTS,
 )
 
+_POSITIONS = (
+    _JOINT,
+    Setting("scale_deviation", 0.01, "a DVL's data sheet, speed of sound included"),
+    Setting("direction_deviation", 0.1, "rad: the angle at which it is mounted, set by eye to 6 degrees"),
+    Setting("speed_deviation", 0.025, "m/s: noise of its velocities"),
+    Setting("rate_correlation_time", 12.0, "s: as long that noise lasts"),
+    Setting("motion_correlation_time", 10000.0, "s: scale and mounting hardly change during a mission"),
+    *_COMPASS,
+)
+
 PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
-    OdometryKind.DVL: (
-        _JOINT,
-        Setting("scale_deviation", 0.01, "a DVL's data sheet, speed of sound included"),
-        Setting("direction_deviation", 0.1, "rad: the angle at which it is mounted, set by eye to 6 degrees"),
-        Setting("speed_deviation", 0.025, "m/s: noise of its velocities"),
-        Setting("rate_correlation_time", 12.0, "s: as long that noise lasts"),
-        Setting("motion_correlation_time", 10000.0, "s: scale and mounting hardly change during a mission"),
-        *_COMPASS,
-    ),
+    OdometryKind.AUTO: _POSITIONS,
+    OdometryKind.DVL: _POSITIONS,
     OdometryKind.THRUSTERS: (
         _JOINT,
         Setting("scale_deviation", 0.3, "the speed at a thrust is known to a third"),

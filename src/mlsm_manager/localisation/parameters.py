@@ -8,15 +8,11 @@ import numpy as np
 
 from mlsm_manager.joint_solver.parameters import JointSolverParameters, SolverParameters
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
-from mlsm_manager.localisation.joint import Joint
+from mlsm_manager.localisation.joint import Assumed, Joint
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
-from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind
-from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.scan_matching.distribution_matcher import (
-    DistributionMatcher,
-    DistributionMatcherParameters,
-    relocaliser,
-)
+from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind, profile_values
+from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
+from mlsm_manager.scan_matching.distribution_matcher import EVERYWHERE, NEARBY, DistributionMatcher, MatcherLimits
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Matcher
 from mlsm_manager.surface_map.export.pictures import ColorBy
@@ -24,6 +20,7 @@ from mlsm_manager.surface_map.free_space import Carver, CarvingParameters
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_processing.beams.parameters import beam_width_parameter
 
 # A block takes 112 bytes with its part of the index: 1.8 GB, more than a vehicle's computer can spare.
 MAX_PREALLOCATED_CELLS = 16_000_000
@@ -33,7 +30,6 @@ class EstimatorName(Enum):
     """How scans find their poses."""
 
     JOINT = "JOINT"
-    SCAN_BY_SCAN = "SCAN_BY_SCAN"
     THESIS = "THESIS"
 
 
@@ -42,10 +38,10 @@ class EstimatorParameters(OdometryChoice, JointSolverParameters):
     """Which estimator finds the poses, and what the joint one needs to know."""
 
     estimator: EstimatorName = parameter(
-        EstimatorName.SCAN_BY_SCAN,
+        EstimatorName.JOINT,
         "JOINT: the newest scans find their poses together, none is rejected; `odometry` says what "
-        "the motion is known from. SCAN_BY_SCAN: each alone, against the map of those before. THESIS: the same by the "
-        "matcher of the thesis, to compare with", tunable=False,
+        "the motion is known from. THESIS: each alone, against the map of those before, as in the thesis, to compare "
+        "with", tunable=False,
     )  # fmt: skip
 
     def check(self) -> None:
@@ -75,6 +71,7 @@ class MapParameters(ParameterSet):
     match_resolution: float = parameter(
         0.5, "side of a cell of the map that scans are matched with", unit="m", low=0.01, high=100.0, tunable=False
     )
+    beam_width: float = beam_width_parameter()
     map_limit: float = parameter(
         10000.0, "points farther than this from the map's origin are left out", unit="m", low=1.0, high=1e6,
         tunable=False, expert="farther away only a wrong tf puts points",
@@ -84,7 +81,7 @@ class MapParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class LocaliserParameters(
-    ThesisMatcherParameters, DistributionMatcherParameters, EstimatorParameters, CarvingParameters, MapParameters
+    ThesisMatcherParameters, EstimatorParameters, CarvingParameters, MapParameters
 ):  # fmt: skip
     """All that a localiser is made from."""
 
@@ -97,13 +94,20 @@ class LocaliserParameters(
 
     def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
         given = self.map_settings(), self.part(OdometryErrors), matcher, sonar_in_base
-        return Joint(*given, self.solver_parameters()) if self.estimator is EstimatorName.JOINT else ScanByScan(*given)
+        if self.estimator is EstimatorName.THESIS:
+            return ThesisEstimator(*given)
+        found = self.odometry is OdometryKind.AUTO
+        return Joint(*given, self.solver_parameters(), self._without_positions() if found else None)
+
+    def _without_positions(self) -> Assumed:
+        """Return what is assumed of an odometry that reports headings only."""
+        other = self.changed(profile_values(OdometryKind.HEADING))
+        return Assumed(other.solver_parameters(), other.part(OdometryErrors))
 
     def solver_parameters(self) -> SolverParameters:
         """Return what these mean for the joint solver."""
         return SolverParameters(
             **{field.name: getattr(self, field.name) for field in fields(JointSolverParameters)},
-            range_scale_deviation=self.range_scale_deviation,
             odometry=self.odometry_model(),
             node_search=self.node_search(self.parts_per_turn),
         )
@@ -117,19 +121,23 @@ class LocaliserParameters(
 
     def localiser_settings(self) -> LocaliserSettings:
         """Return the settings that a localiser can take over while it runs."""
-        anywhere = relocaliser(self.part(DistributionMatcherParameters))
-        return LocaliserSettings(self.build_matcher(), anywhere, self.blend_time, self.chosen_map_input)
+        return LocaliserSettings(
+            self.build_matcher(), self._searching(EVERYWHERE), self.blend_time, self.chosen_map_input
+        )
 
     def build_matcher(self) -> Matcher:
         """Return what places a single scan: in JOINT only those that begin a run in a map."""
         if self.estimator is EstimatorName.THESIS:
             return ThesisMatcher(self.part(ThesisMatcherParameters))
-        return DistributionMatcher(self.part(DistributionMatcherParameters))
+        return self._searching(NEARBY)
+
+    def _searching(self, limits: MatcherLimits) -> DistributionMatcher:
+        return DistributionMatcher(limits, self.beam_width, self.range_scale_deviation)
 
     def map_settings(self) -> MapSettings:
         """Return what the grids are made from."""
         return MapSettings(
-            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.min_points, self.carver
+            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.carver
         )  # fmt: skip
 
     @property
@@ -161,12 +169,12 @@ class MlsmNodeParameters(ParameterSet):
         MatchInput.ECHOES, "points that are matched: sonar/scan/echoes or sonar/scan/cleaned", tunable=False
     )
     map_input: MapInput = parameter(
-        MapInput.CLEANED,
+        MapInput.MATCHED,
         "points that make the map that is shown and saved: sonar/scan/cleaned, or those that are matched",
         tunable=False,
     )  # fmt: skip
     start_matching: bool = parameter(
-        False, "match from the start; the topic startMatching turns it on and off", tunable=False
+        True, "match from the start; the topic startMatching turns it on and off", tunable=False
     )
     size_x_meters: float = parameter(
         120.0, "extent to reserve memory for; the map grows beyond it when it must", unit="m", low=0.0, high=100000.0,

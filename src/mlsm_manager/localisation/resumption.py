@@ -180,7 +180,7 @@ def resumed_if_it_fits(session: JointSession, scan: Scan, surface_map: MultiLeve
         agreement = longer.add(scan).agreement
     except RefusedInput:
         return None
-    points = longer.points(MapCloud.of_scan(scan))[:, :2]
+    points = longer.heard(MapCloud.of_scan(scan))[0][:, :2]
     near = _share_near_blocks(points, surface_map)
     if near * agreement < _LEAST_SHARE:
         return None

@@ -20,6 +20,7 @@ class ScanUpdate:
 
     result: None when it was not matched. accepted: whether it was put into the map. belief: after the scan.
     found: how the vehicle was found again with it after a silence of the sonar; empty where it was not.
+    loop: what place was found that was heard long before, and how far the vehicle was moved; empty where none was.
     forgotten: turns of the head that lay apart from the map and are left out of it, because the run began anew.
     provisional: whether the map hangs on scans of an unknown velocity, none of which agrees with another yet.
     """
@@ -31,6 +32,7 @@ class ScanUpdate:
     found: str = ""
     provisional: bool = False
     forgotten: int = 0
+    loop: str = ""
 
 
 @dataclass(frozen=True)
@@ -77,6 +79,9 @@ def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     if update.found:
         health.count("times found again after a silence")
         health.show("found again", update.found)
+    if update.loop:
+        health.count("loops closed")
+        health.show("loop", update.loop)
     if not update.accepted:
         health.problem("matches rejected", f"{result.status.name}, {result.reason}; map and correction are kept")
 

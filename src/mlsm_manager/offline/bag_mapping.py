@@ -19,20 +19,13 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
-from mlsm_manager.offline.suited_parameters import (
-    OdometryFound,
-    echo_shape_of,
-    echo_sigma,
-    may_strafe,
-    odometry_of,
-    suited,
-    with_odometry,
-)
+from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
 
@@ -66,21 +59,26 @@ class MappedBag:
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
-    if options.odometry is None:
+    named = options.odometry not in (None, OdometryKind.AUTO)
+    if not named:
         odometry = odometry_of(recording.track)
-    parameters = _suited_parameters(recording, odometry, options)
-    recording = recording.corrected(parameters.part(BeamCorrection))
+    recording = recording.corrected(options.parameters.part(BeamCorrection))
+    extractor = EchoExtractor(options.parameters.echoes())
     with _bar(len(recording.beams), "beam", "echoes") as bar:
-        scans = whole_turns(options.bags[0], recording, parameters.echoes(), bar.update)
+        scans = whole_turns(options.bags[0], recording, extractor, bar.update)
+    extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
+    parameters = with_odometry(extracting, odometry.kind, options.fixed)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)
     replayed = _replayed(recording, scans, parameters)
-    if options.odometry is None and odometry.kind is OdometryKind.HEADING and may_strafe(replayed.solver):
+    if not named and odometry.kind is OdometryKind.HEADING and may_strafe(replayed.solver):
         other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
-        changed = _suited_parameters(recording, other, options)
+        changed = with_odometry(extracting, other.kind, options.fixed)
         again = _replayed(recording, scans, changed)
         if again.solver is not None and strafes(replayed.solver, again.solver):
             odometry, parameters, replayed = other, changed, again
+    if replayed.solver is not None and replayed.solver.odometry_told:
+        odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.solver.odometry_told}")
     _tell_of_refused(replayed, options)
     refined, refitted = None, []
     if options.refine:
@@ -95,12 +93,6 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
     return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
-
-
-def _suited_parameters(recording: Recording, odometry: OdometryFound, options: Namespace) -> ReplayParameters:
-    parameters = with_odometry(options.parameters, odometry.kind, options.fixed)
-    beams = [placed.beam for placed in recording.beams]
-    return suited(parameters, echo_shape_of(beams), options.fixed, echo_sigma(beams))
 
 
 def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:

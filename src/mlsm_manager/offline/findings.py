@@ -6,12 +6,11 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, PartResult, solved_part
-from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
+from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns, expected_deviations
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import RUN_COLUMNS
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
@@ -46,37 +45,38 @@ class Calibration:
     deviations: np.ndarray
 
     @classmethod
-    def expected(cls, parameters: SolverParameters) -> "Calibration":
+    def expected(cls, solver: LiveSolver) -> "Calibration":
         """Return what was known before the run."""
-        odometry, columns = parameters.odometry, list(parameters.odometry.calibrated.values())
-        deviations = np.append(parameters.run_deviations, odometry.first_deviations()[columns])
+        odometry, parameters = solver.odometry, solver.parameters
+        columns = list(odometry.calibrated.values())
+        deviations = np.append(parameters.run_deviations(solver.log), odometry.first_deviations()[columns])
         values = np.append(parameters.run_mean, odometry.first_node()[columns])
         return cls((*_OF_RUN, *odometry.calibrated), values, np.maximum(deviations, HELD_DEVIATION))
 
     @classmethod
-    def found(cls, parameters: SolverParameters, known: Union[LiveEstimate, PartResult]) -> "Calibration":
+    def found(cls, solver: LiveSolver, known: Union[LiveEstimate, PartResult]) -> "Calibration":
         """Return what an estimate during a run, or the fit of a part of it, knows."""
         variances = np.diag(known.covariance)
-        return cls._of(parameters, known.run, known.node, variances[-RUN_COLUMNS:], variances)
+        return cls._of(solver, known.run, known.node, variances[-RUN_COLUMNS:], variances)
 
     @classmethod
     def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
         """Return what the fit of a whole run found; scale and direction are those of the last node."""
         of_run, of_node = np.diag(batch.run_covariance), np.diag(solver.estimates[-1].covariance)
-        return cls._of(solver.parameters, batch.state.run, batch.state.nodes[-1], of_run, of_node)
+        return cls._of(solver, batch.state.run, batch.state.nodes[-1], of_run, of_node)
 
     @classmethod
     def _of(
-        cls, parameters: SolverParameters, run: np.ndarray, node: np.ndarray, of_run: np.ndarray, of_node: np.ndarray
+        cls, solver: LiveSolver, run: np.ndarray, node: np.ndarray, of_run: np.ndarray, of_node: np.ndarray
     ) -> "Calibration":
         """Return that of the unknowns of run (2,) and node, with their variances.
 
         A range scale that the run could not tell is as uncertain as before.
         """
-        calibrated = parameters.odometry.calibrated
+        calibrated = solver.odometry.calibrated
         columns = list(calibrated.values())
         deviations = np.sqrt(np.append(of_run, of_node[columns]))
-        deviations[0] = np.hypot(deviations[0], parameters.world_scale_deviation)
+        deviations[0] = np.hypot(deviations[0], solver.parameters.world_scale_deviation(solver.log))
         return cls((*_OF_RUN, *calibrated), np.append(run, node[columns]), deviations)
 
     @property
@@ -97,6 +97,7 @@ class Calibration:
         value["range_scale"] = before.range_scale * (1.0 + value.pop("range_scale_error"))
         value["sonar_delay"] = before.sonar_delay + value["sonar_delay"]
         value["range_scale_deviation"], value["sonar_delay_deviation"] = self.deviations[:2].tolist()
+        value["plateau_scale_deviation"] = 0.0
         # Within their ranges, so that a run that went astray has a live.yaml too.
         ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in value}
         return parameters.changed(
@@ -157,15 +158,19 @@ def _trust(
     if refined is None:
         path, solution, times = replayed.corrected, solver.solution, np.array([one.time for one in solver.estimates])
         covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
+        expected = solver.expected_deviations(solver.estimates)
     else:
         path, solution, times = refined.poses, refined.solution, refined.batch.node_times
         covariances = refined.batch.pose_covariances[:, :2, :2]
-    start, before = float(solver.log.node_times[0]), Calibration.expected(solver.parameters)
+        places = solution.node_places(np.arange(len(times)))
+        lengths = np.full(len(times), solver.estimates[-1].length_deviation)
+        expected = expected_deviations(places - places[0], lengths, solver.heading_deviation)
+    start, before = float(solver.log.node_times[0]), Calibration.expected(solver)
     verdicts = [
         *_against_odometry_or_before(replayed, path, solution, turns.times),
         recent_agreement(heard.times, heard.agreements),
-        position_uncertainty(times, _radii(covariances)),
-        *surfaces_tell(start, turns.times, turns.surfaces, solver.odometry.distance_deviation),
+        position_uncertainty(times, _radii(covariances), expected),
+        *surfaces_tell(start, turns.times, turns.surfaces, solver.distance_deviation),
         *in_submaps(turns.times, turns.apart),
         as_expected(before.names, before.values, before.deviations, calibration.values),
         *_halves(solver),
@@ -185,12 +190,12 @@ def _against_odometry_or_before(
 
     ends: (n,) s of the turns.
     """
-    odometry = solution.odometry
-    if np.isinf(odometry.distance_deviation):
+    solver = replayed.solver
+    if np.isinf(solver.odometry.distance_deviation):
         return (scans_go_on(ends, shares_heard_before(solution, 0)),)
     return against_odometry(
         replayed.times, replayed.odometry, path,
-        scale_deviation=odometry.distance_deviation, position_walk=odometry.position_walk,
+        scale_deviation=solver.reported_deviation, position_walk=solver.odometry.position_walk,
     )  # fmt: skip
 
 
@@ -203,8 +208,8 @@ def _halves(solver: LiveSolver) -> Tuple[Verdict, ...]:
     middle = solver.log.scan_count // parts // 2
     if middle < _FEWEST_SCANS:
         return ()
-    first = Calibration.found(solver.parameters, solver.estimates[middle * parts - 1])
-    second = Calibration.found(solver.parameters, solved_part(solver, middle * parts))
+    first = Calibration.found(solver, solver.estimates[middle * parts - 1])
+    second = Calibration.found(solver, solved_part(solver, middle * parts))
     return (halves_agree(first.names, first.values, first.deviations, second.values, second.deviations),)
 
 
@@ -221,7 +226,7 @@ class Findings:
         """Return what was found in a run that the joint solver has followed; `further`: what other checks say."""
         solver = replayed.solver
         if refined is None:
-            calibration, closing = Calibration.found(solver.parameters, solver.estimates[-1]), None
+            calibration, closing = Calibration.found(solver, solver.estimates[-1]), None
         else:
             calibration, closing = Calibration.of_batch(solver, refined.batch), refined.closing
         return cls(calibration, _trust(replayed, refined, calibration, further), closing)

@@ -80,12 +80,6 @@ def _write_report(folder: Path, mission: Mission) -> None:
 
 
 _EPILOG = "docs/map_bag.md describes the options, what is written, and how a vehicle is calibrated by it."
-_ESTIMATORS = {
-    "DISTRIBUTIONS": EstimatorName.SCAN_BY_SCAN,
-    "THESIS": EstimatorName.THESIS,
-    "SEGMENTS": EstimatorName.THESIS,
-}
-"""By the names that --matcher takes; the thesis's has two."""
 _USAGE = "map_bag BAG [BAG ...] --out DIR [options]\n       map_bag BAG --inspect [options]"
 
 
@@ -136,7 +130,7 @@ def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
     """Add what says how the poses of scans are found."""
     parser.add_argument(
         "--odometry", choices=[kind.value.lower() for kind in OdometryKind],
-        help="what the vehicle knows of its motion (default: as the recording looks)",
+        help="what the vehicle knows of its motion; auto, the default, is as recording and echoes tell",
     )  # fmt: skip
     parser.add_argument("--refine", action="store_true", help="fit the whole run at once afterwards")
     parser.add_argument(
@@ -149,8 +143,8 @@ def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
         help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
     )  # fmt: skip
     parser.add_argument(
-        "--matcher", choices=list(_ESTIMATORS),
-        help="match each scan alone instead of jointly, by this matcher: DISTRIBUTIONS, or that of the thesis",
+        "--matcher", choices=[EstimatorName.THESIS.value],
+        help="match each scan alone instead of jointly, by the thesis's matcher",
     )  # fmt: skip
 
 
@@ -171,7 +165,7 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     if declared is MotionSource.STANDING and options.odometry == none:
         parser.error("--standing is for a vehicle that did not move; for one that moved, give --unknown-motion instead")
     if declared is MotionSource.UNKNOWN:
-        if options.odometry not in (None, none):
+        if options.odometry not in (None, OdometryKind.AUTO.value.lower(), none):
             parser.error(f"--odometry {options.odometry}: must be {none}, or left out, with --unknown-motion")
         options.odometry = none
 
@@ -184,7 +178,7 @@ def _values(options: argparse.Namespace) -> Dict[str, Any]:
     if remarks + told:
         print(f"map_bag: {OLD_KEYS}: {'; '.join(dict.fromkeys(remarks + told))}", file=sys.stderr)
     if options.matcher:
-        values.update(estimator=_ESTIMATORS[options.matcher].value)
+        values.update(estimator=options.matcher)
     if not options.calibrate:
-        values.update(range_scale_deviation=0.0, sonar_delay_deviation=0.0)
+        values.update(range_scale_deviation=0.0, plateau_scale_deviation=0.0, sonar_delay_deviation=0.0)
     return values

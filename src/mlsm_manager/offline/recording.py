@@ -15,7 +15,7 @@ from recordings.motion.frame_tree import FrameTree
 from recordings.reader import Request, read
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
-from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import EchoExtractor
 from sonar_processing.scans.assembler import RevolutionCollector
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
@@ -76,13 +76,13 @@ class Recording:
         return float(self.track.times[-1] - self.track.times[0])
 
 
-def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[Tuple[Scan, int]]:
+def scans_of(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Scan, int]]:
     """Yield one scan of echoes per turn of the head, with its number of beams.
 
     Its track begins a minute before its end, or where the scan before ended if that was earlier, and reaches 10 s
     beyond, for stamps that are to be moved.
     """
-    collector, extractor, cloud = RevolutionCollector(), EchoExtractor(echoes), SonarToCloudParameters()
+    collector, cloud = RevolutionCollector(), SonarToCloudParameters()
     before = np.inf
     for placed in recording.beams:
         turn = collector.add(placed)
@@ -99,14 +99,14 @@ def scans_of(recording: Recording, echoes: EchoExtractorParameters) -> Iterator[
 
 
 def whole_turns(
-    bag: Path, recording: Recording, echoes: EchoExtractorParameters, on_beams: Callable[[int], None] = lambda _: None
+    bag: Path, recording: Recording, extractor: EchoExtractor, on_beams: Callable[[int], None] = lambda _: None
 ) -> List[Scan]:
     """Return the scans of the recording in `bag`; `on_beams` takes the number of beams of each.
 
     Raises RecordingError where there is none.
     """
     scans = []
-    for scan, beams in scans_of(recording, echoes):
+    for scan, beams in scans_of(recording, extractor):
         scans.append(scan)
         on_beams(beams)
     if not scans:

@@ -8,6 +8,7 @@ import numpy as np
 from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, solved, with_loops_closed
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import solved_path
 from mlsm_manager.joint_solver.solution import Solution
@@ -48,7 +49,8 @@ def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: Ma
     for scan in scans:
         surfaces.add(MapCloud.of_scan(scan))
     surfaces.settle(solution)
-    poses = solved_path(track, solver.odometry, closing.batch.node_times, closing.batch.state.nodes, track.times)
+    whole, batch = OdometryLog.of(track), closing.batch
+    poses = solved_path(whole, solver.odometry, batch.node_times, batch.state.nodes, track.times)
     return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing, solution)
 
 

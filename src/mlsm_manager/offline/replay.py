@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import dataclass
+from time import process_time
 from typing import Callable, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
@@ -27,6 +28,7 @@ class Replayed:
 
     times: (m,) s of the odometry. odometry, corrected: (m, 3) T_odom_base and T_map_base, the second as it was known
     at each moment. updates: of all scans that were taken, oldest first. refused: how many were not, by the reason.
+    seconds: of a core for each scan.
     """
 
     times: np.ndarray
@@ -35,6 +37,7 @@ class Replayed:
     estimator: Estimator
     updates: List[ScanUpdate]
     refused: Mapping[str, int]
+    seconds: List[float]
 
     @property
     def poses(self) -> Dict[str, np.ndarray]:
@@ -85,19 +88,21 @@ def replay(
     localiser, track = parameters.build_localiser(recording.sonar_in_base), recording.track
     if known is not None:
         localiser.restore(known, same_odometry=False)
-    corrections, updates, refused = np.empty((len(track.times), 3)), [], Counter()
+    corrections, updates, refused, seconds = np.empty((len(track.times), 3)), [], Counter(), []
     done = 0
     for scan in scans:
         known = max(done, int(np.searchsorted(track.times, scan.reference_time + localiser.lookahead, side="left")))
         corrections[done:known] = _corrections(localiser, track, done, known)
-        done = known
+        done, start = known, process_time()
         try:
             updates.append(localiser.take_scan(scan).scan)
         except RefusedInput as reason:
             refused[reason.kind] += 1
+        seconds.append(process_time() - start)
         on_scans(1)
     corrections[done:] = _corrections(localiser, track, done, len(track.times))
-    return Replayed(track.times, track.poses, composed(corrections, track.poses), localiser.estimator, updates, refused)
+    corrected = composed(corrections, track.poses)
+    return Replayed(track.times, track.poses, corrected, localiser.estimator, updates, refused, seconds)
 
 
 def _corrections(localiser: Localiser, track: Track, start: int, end: int) -> np.ndarray:

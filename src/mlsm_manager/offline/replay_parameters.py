@@ -1,45 +1,36 @@
 """Parameters of map_bag, and live.yaml: those with which the live nodes do what map_bag did."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Dict, List, Mapping, Tuple, Type
 
 import yaml
 
-from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind
-from mlsm_manager.localisation.parameters import (
-    EstimatorName,
-    LocaliserParameters,
-    MapInput,
-    MatchInput,
-    MlsmCoreParameters,
-)
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.localisation.parameters import LocaliserParameters, MapInput, MatchInput, MlsmCoreParameters
 from node_support.parameters import ParameterSet, with_defaults
 from recordings.reader import ReadingParameters
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
-# The speed of sound between cold fresh and warm salt water; stamps that are taken when a beam arrives.
-_UNKNOWN_SONAR = {"range_scale_deviation": 0.02, "sonar_delay_deviation": 1.0}
-_DVL = {setting.key: setting.value for setting in PROFILES[OdometryKind.DVL] if setting.key != "estimator"}
+_ALL = 10**9  # scans
 
 
 @dataclass(frozen=True)
-@with_defaults(
-    **_UNKNOWN_SONAR,
-    **_DVL,
-    estimator=EstimatorName.JOINT,
-    max_position_deviation=3.0,
-    min_agreement=0.0,
-    min_gain_over_second=0.0,
-    max_jump=6.0,
-)
+@with_defaults(pulse_sigma=0.0, threshold_share=0.5, min_height=2.0)
 class ReplayParameters(LocaliserParameters, ReadingParameters, BeamCorrection, EchoExtractorParameters):
-    """All that --set may change; where a default differs from the live nodes', it is what recordings showed."""
+    """All that --set may change, with the defaults of the live nodes, but for weak and wide echoes.
+
+    These suit recordings of real heads. Live, a compass alone lost its way with them in the simulated harbour.
+    """
 
     def echoes(self) -> EchoExtractorParameters:
         """Return how echoes are found."""
         return self.part(EchoExtractorParameters)
+
+    def solver_parameters(self) -> SolverParameters:
+        """Return what these mean for the joint solver, which keeps all scans: `--refine` fits the whole run."""
+        return replace(super().solver_parameters(), kept_scans=_ALL)
 
 
 NODES: Dict[str, Type[ParameterSet]] = {

@@ -12,8 +12,8 @@ from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.formats import write_ply
 from mlsm_manager.surface_map.map_file import StoredMap, write_map
-from mlsm_manager.surface_map.ply_file import write_ply
 from node_support.files import write_whole
 from node_support.geometry import wrapped
 from recordings.bags.bag import RecordingError

@@ -120,6 +120,6 @@ def _rejection(update: ScanUpdate) -> str:
 def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:
     """Return the points (n, 2) of a scan where the best path says that they are."""
     if mapped.solution is not None:
-        return mapped.solution.points(scan)[:, :2]
+        return mapped.solution.heard(scan)[0][:, :2]
     poses = Track(mapped.run.times, mapped.run.best).at(scan.times)
     return transformed(composed(poses, inverse(scan.track.at(scan.times))), scan.points)[:, :2]

@@ -16,6 +16,7 @@ from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 # A cluster in the same network answers within a second, a busy one within a few.
 CLUSTER_TIMEOUT = 10.0
@@ -59,7 +60,7 @@ class Session:
 def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
     """Return the corrected recording and its scans. Raises RecordingError, and OSError, as `read` does."""
     recording = read(bag).corrected(parameters.part(BeamCorrection))
-    return recording, whole_turns(bag, recording, parameters.echoes())
+    return recording, whole_turns(bag, recording, EchoExtractor(parameters.echoes()))
 
 
 @contextmanager

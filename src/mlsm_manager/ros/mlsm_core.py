@@ -123,8 +123,11 @@ class MlsmCore:
         report_scan(self.health, taken.scan, self._localiser.matching)
         if taken.scan.found:
             rospy.loginfo("%s: found again after a silence of the sonar: %s", self.health.name, taken.scan.found)
+        if taken.scan.loop:
+            rospy.loginfo("%s: %s", self.health.name, taken.scan.loop)
         report_turn(self.health, scan.reference_time - scan.start, self._longest_turn)
         report_verdicts(self.health, self._localiser.verdicts())
+        self.health.show("odometry", self._localiser.odometry or self._live.current.odometry.value)
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
     def _look_for_z_down(self, scan: Scan) -> None:

@@ -1,4 +1,4 @@
-"""The default matcher: a correlative search, then one path for the whole scan among local distributions."""
+"""Finds one scan in a map: a correlative search, then one path for the whole scan among local distributions."""
 
 import time
 from dataclasses import dataclass, replace
@@ -15,8 +15,6 @@ from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, P
 from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion, X, Y
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
 from node_support.geometry import composed, inverse, wrapped
-from node_support.parameters import ParameterSet, parameter
-from sonar_processing.beams.parameters import beam_width_parameter
 
 _WINDOW_DEVIATIONS = 3.0  # of the prior, that the search covers
 # Of a score from 0 to 1 per squared standard deviation of the prior: echoes that travel with the vehicle cannot win.
@@ -27,84 +25,59 @@ _FIELD_CELLS = 2.0  # width of the field in search cells: a basin reaches over t
 _MARGIN = 15.0  # m: neighbours that make the distributions at the edge of the reach
 _APART = 0.5  # of what keeps two candidates of the search apart
 _EXCLUDED = 4.0  # standard deviations at which a covariance claims to exclude a place
-# Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
-# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.
-_EVERYWHERE = {
-    "search_distance": 500.0, "search_angle": np.pi, "search_cell": 1.0, "candidates": 80, "min_gain_over_second": 6.0
-}  # fmt: skip
 
 
 @dataclass(frozen=True)
-class DistributionMatcherParameters(ParameterSet):
-    """Parameters of the matcher of single scans: what it searches, and what any fix must hold to."""
+class MatcherLimits:
+    """Where a scan is searched, and what a fix must hold to. Metres and radians.
 
-    min_points: int = parameter(
-        15, "a scan with fewer points on the map is not matched", low=3, high=10000,
-        expert="fewer do not fix three coordinates against chance",
-    )  # fmt: skip
-    max_position_deviation: float = parameter(
-        0.5, "a fix with a greater standard deviation in its least certain direction is rejected", unit="m", low=0.001,
-        high=100.0,
-    )  # fmt: skip
-    max_jump: float = parameter(
-        4.0, "greatest distance of a fix from the expected pose, in the prior's standard deviations", low=1.0,
-        high=100.0, expert="noise alone jumps farther once in 16,000 fixes",
-    )  # fmt: skip
-    search_distance: float = parameter(
-        3.5, "greatest distance from the expected position at which a scan is searched", unit="m", low=0.0, high=500.0,
-        expert="3.5 m find 99 % of moves of 3 m, in 8 to 35 ms",
-    )  # fmt: skip
-    search_angle: float = parameter(
-        0.384, "greatest angle from the expected heading at which a scan is searched", unit="rad", low=0.0, high=3.1416,
-        expert="22 deg find 99 % of turns of 20 deg",
-    )  # fmt: skip
-    search_cell: float = parameter(
-        0.5, "step of the search", unit="m", low=0.05, high=10.0,
-        expert="a cell of the map, from which the fit reaches the best place",
-    )  # fmt: skip
-    candidates: int = parameter(
-        6, "poses that the search passes on to the refinement", low=1, high=100,
-        expert="the pose with the best score is not always the best fit; each costs a fit",
-    )  # fmt: skip
-    beam_width: float = beam_width_parameter()
-    range_scale_deviation: float = parameter(
-        0.0, "standard deviation of a common relative error of all ranges, as from the speed of sound", low=0.0,
-        high=0.5,
-    )  # fmt: skip
-    max_yaw_deviation: float = parameter(
-        0.1, "a fix with a greater standard deviation of the heading is rejected", unit="rad", low=0.001, high=3.1416,
-        expert="6 deg: at 10 m a point is then a metre off",
-    )  # fmt: skip
-    min_gain_over_second: float = parameter(
-        3.0, "least lead in log-likelihood [nat] of the best pose over the second-best; 0: no check", low=0.0,
-        high=100.0, expert="the best place is e^3, 20 times, as likely as the second-best",
-    )  # fmt: skip
-    min_significance: float = parameter(
-        5.0, "least lead of the matched share of points over that of random poses, in standard deviations", low=0.0,
-        high=100.0, expert="chance alone leads by so much once in millions of scans",
-    )  # fmt: skip
-    min_agreement: float = parameter(
-        0.8, "least share of echoes that the map explains times share of the map that no echo contradicts", low=0.0,
-        high=1.0, expert="a wrong place seldom explains so much; boats and tide explain less at the right one",
-    )  # fmt: skip
-    max_steps: int = parameter(
-        40, "Gauss-Newton steps from each candidate, at most", low=1, high=1000,
-        expert="a fit that has not ended by then does not end",
-    )  # fmt: skip
+    search_distance, search_angle: greatest difference from the expected pose. search_cell: step of the search.
+    candidates: poses that it passes on to the refinement. max_steps: Gauss-Newton steps from each of them.
+    min_points: of a scan, on the map. max_jump: of a fix from the expected pose, in the prior's standard deviations.
+    max_position_deviation, max_yaw_deviation: of a fix, in its least certain direction.
+    min_gain_over_second: lead in log-likelihood [nat] of the best pose over any other.
+    min_significance: lead of the matched share of points over that of random poses, in standard deviations.
+    min_agreement: share of echoes that the map explains times share of the map that no echo denies.
+    """
+
+    # 3.5 m and 22 deg find 99 % of moves of 3 m and 20 deg, in 8 to 35 ms.
+    search_distance: float = 3.5
+    search_angle: float = 0.384
+    search_cell: float = 0.5  # a cell of the map, from which the fit reaches the best place
+    candidates: int = 6  # the pose with the best score is not always the best fit; each costs a fit
+    max_steps: int = 40  # a fit that has not ended by then does not end
+    min_points: int = 15  # fewer do not fix three coordinates against chance
+    max_jump: float = 4.0  # noise alone jumps farther once in 16,000 fixes
+    max_position_deviation: float = 0.5
+    max_yaw_deviation: float = 0.1  # 6 deg: at 10 m a point is then a metre off
+    min_gain_over_second: float = 3.0  # the best place is e^3, 20 times, as likely as the second-best
+    min_significance: float = 5.0  # chance alone leads by so much once in millions of scans
+    min_agreement: float = 0.8  # a wrong place seldom explains so much; boats and tide explain less at the right one
+
+
+NEARBY = MatcherLimits()
+# Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
+# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.
+EVERYWHERE = MatcherLimits(
+    search_distance=500.0, search_angle=np.pi, search_cell=1.0, candidates=80, min_gain_over_second=6.0
+)
 
 
 class DistributionMatcher:
     """Searches around the prior, refines the best candidates and judges what comes out."""
 
-    def __init__(self, parameters: DistributionMatcherParameters) -> None:
-        self.parameters = parameters
+    def __init__(self, limits: MatcherLimits, beam_width: float, range_scale_deviation: float) -> None:
+        """beam_width: horizontal, rad. range_scale_deviation: of a common relative error of all ranges."""
+        self.limits = limits
+        self.beam_width = beam_width
+        self.range_scale_deviation = range_scale_deviation
 
     def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
         state = prior_state(prior, scan)
-        motion = PlanarMotion(scan, self.parameters.beam_width / np.sqrt(12.0))
-        fewest = self.parameters.min_points
+        motion = PlanarMotion(scan, self.beam_width / np.sqrt(12.0))
+        fewest = self.limits.min_points
         window = self._window(motion, state)
         blocks = _in_reach(target, motion, state, window)
         if len(scan) < fewest or len(blocks) < fewest:
@@ -121,14 +94,14 @@ class DistributionMatcher:
     def _fits(
         self, motion: PlanarMotion, target: Blocks, state: PriorState, window: SearchWindow
     ) -> Tuple[List[Fit], Refiner]:
-        parameters = self.parameters
-        margin = window.distance + 2.0 * parameters.search_cell
-        field = ScoreField.of_blocks(target, parameters.search_cell, _FIELD_CELLS * parameters.search_cell, margin)
+        limits = self.limits
+        margin = window.distance + 2.0 * limits.search_cell
+        field = ScoreField.of_blocks(target, limits.search_cell, _FIELD_CELLS * limits.search_cell, margin)
         pose_information = np.linalg.inv(np.linalg.inv(state.information)[POSE, POSE])
         penalty = _PRIOR_COST_SHARE * pose_information
-        starts = search(motion, field, state.mean, window, penalty, parameters.candidates)
-        refiner = Refiner(motion, LocalDistributions(target), state, parameters.range_scale_deviation)
-        fits = [refiner.refine(start, parameters.max_steps) for start in starts]
+        starts = search(motion, field, state.mean, window, penalty, limits.candidates)
+        refiner = Refiner(motion, LocalDistributions(target), state, self.range_scale_deviation)
+        fits = [refiner.refine(start, limits.max_steps) for start in starts]
         inflation = max(fits, key=lambda fit: fit.log_likelihood_gain).inflation
         return sorted(fits, key=lambda fit: (not fit.converged, -fit.gain(inflation))), refiner
 
@@ -138,42 +111,42 @@ class DistributionMatcher:
         step = 2.0 * YAW_STEP / seconds
         rates = min(int(np.ceil(deviations[RATE_YAW] / step - 0.5)), _MOST_RATES // 2)
         return SearchWindow(
-            distance=min(float(deviations[POSITION].max()), self.parameters.search_distance),
-            angle=min(float(deviations[YAW]), self.parameters.search_angle),
+            distance=min(float(deviations[POSITION].max()), self.limits.search_distance),
+            angle=min(float(deviations[YAW]), self.limits.search_angle),
             yaw_rates=np.arange(-rates, rates + 1) * step,
         )
 
     def _judge(self, best: Fit, refiner: Refiner, state: PriorState, target: Blocks) -> Tuple[MatchStatus, str]:
-        parameters = self.parameters
+        limits = self.limits
         if not best.converged:
             return MatchStatus.DIVERGED, f"not converged after {best.iterations} iterations"
         used = int(np.count_nonzero(best.inliers))
-        if used < parameters.min_points:
-            return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {parameters.min_points} or more"
+        if used < limits.min_points:
+            return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {limits.min_points} or more"
         certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
-        if certainty < parameters.min_significance:
+        if certainty < limits.min_significance:
             return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
         jump = float(np.sqrt(2.0 * state.prior_cost(best.theta)))
-        if jump > parameters.max_jump:
+        if jump > limits.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
         agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[POSITION], target.mean[:, :2])
-        if agreed < parameters.min_agreement:
+        if agreed < limits.min_agreement:
             return MatchStatus.DIVERGED, f"scan and map agree by only {agreed:.2f}: perhaps another place"
         return self._judge_certainty(best)
 
     def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
-        parameters = self.parameters
+        limits = self.limits
         position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[POSITION, POSITION])[-1]))
-        if position > parameters.max_position_deviation:
+        if position > limits.max_position_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation of {position:.2f} m in the least certain direction"
         yaw = float(np.sqrt(best.covariance[YAW, YAW]))
-        if yaw > parameters.max_yaw_deviation:
+        if yaw > limits.max_yaw_deviation:
             return MatchStatus.AMBIGUOUS, f"heading has a standard deviation of {yaw:.3f} rad"
         return MatchStatus.CONVERGED, ""
 
     def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
         """Reject a fix whose covariance excludes a pose that fits nearly as well."""
-        least = self.parameters.min_gain_over_second
+        least = self.limits.min_gain_over_second
         if least == 0.0:
             return MatchStatus.CONVERGED, ""
         for other in others:
@@ -188,11 +161,6 @@ class DistributionMatcher:
             reason = f"a pose beside it fits nearly as well: its log-likelihood is only {lead:.1f} less"
             return MatchStatus.AMBIGUOUS, reason
         return MatchStatus.CONVERGED, ""
-
-
-def relocaliser(parameters: DistributionMatcherParameters) -> Matcher:
-    """Return the default matcher, made to look everywhere."""
-    return DistributionMatcher(parameters.changed(_EVERYWHERE))
 
 
 def relocalised(scan: Scan, target: BlockSource, matcher: Matcher, errors: OdometryErrors) -> MatchResult:

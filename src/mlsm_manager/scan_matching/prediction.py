@@ -56,31 +56,31 @@ class OdometryErrors(ParameterSet):
     """Errors of the odometry: standard deviations and correlation times."""
 
     scale_deviation: float = parameter(
-        0.2, "standard deviation of the relative error of the distances that the odometry reports", low=0.0, high=2.0,
+        0.01, "standard deviation of the relative error of the distances that the odometry reports", low=0.0, high=2.0,
         tunable=False,
     )  # fmt: skip
     direction_deviation: float = parameter(
-        0.05,
+        0.1,
         "standard deviation of the error of the direction of the reported motion, as from a sensor's mounting angle",
         unit="rad", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
     speed_deviation: float = parameter(
-        0.02, "standard deviation of an error of the speed that does not grow with it, as from a current",
+        0.025, "standard deviation of an error of the speed that does not grow with it, as from a current",
         unit="m/s", low=0.0, high=5.0, tunable=False,
     )  # fmt: skip
     turn_rate_deviation: float = parameter(
-        0.001, "standard deviation of the error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
+        7e-5, "standard deviation of the error of the turn rate", unit="rad/s", low=0.0, high=1.0, tunable=False
     )
     rate_correlation_time: float = parameter(
-        60.0, "correlation time of the errors of speed and turn rate", unit="s", low=0.1, high=1e6, tunable=False,
-        expert="a minute: a current, or the trim of a thruster, changes that slowly",
+        12.0, "correlation time of the errors of speed and turn rate", unit="s", low=0.1, high=1e6, tunable=False,
+        expert="as long the noise of a DVL's velocities lasts",
     )  # fmt: skip
     motion_correlation_time: float = parameter(
-        3600.0, "correlation time of the errors of scale and direction", unit="s", low=0.1, high=1e9, tunable=False,
-        expert="an hour: a mounting angle hardly changes during a dive",
+        10000.0, "correlation time of the errors of scale and direction", unit="s", low=0.1, high=1e9, tunable=False,
+        expert="scale and mounting hardly change during a mission",
     )  # fmt: skip
     heading_deviation: float = parameter(
-        0.0, "standard deviation of a heading that comes from a compass; 0: no compass, the heading drifts",
+        0.0175, "standard deviation of a heading that comes from a compass; 0: no compass, the heading drifts",
         unit="rad", low=0.0, high=1.0, tunable=False,
     )  # fmt: skip
 

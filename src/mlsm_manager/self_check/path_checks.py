@@ -119,13 +119,22 @@ def starts_agree(
     return Verdict("second start", ratio, limit, text, doubtful=far, question=question)
 
 
-def position_uncertainty(times: np.ndarray, deviations: np.ndarray, limit: float = 5.0) -> Verdict:
-    """Return the largest of the path's own 2-D standard deviations (m,) [m] at `times` (m,) [s]."""
-    step, worst = float(np.median(np.diff(times))) if len(times) > 1 else 0.0, float(deviations.max())
-    text = f"position uncertainty reaches {worst:.1f} m (limit {limit:g} m)"
+def position_uncertainty(
+    times: np.ndarray, deviations: np.ndarray, expected: np.ndarray, limit: float = 5.0
+) -> Verdict:
+    """Return by how much the path's own 2-D standard deviations have grown beyond those expected in any water.
+
+    times: (m,) s. deviations, expected: (m,) m. On simulated tours that went well they grew by 3.3 m at most, on lost
+    ones and in open water by 8 m and more.
+    """
+    step = float(np.median(np.diff(times))) if len(times) > 1 else 0.0
+    grown = np.sqrt(np.maximum(deviations**2 - expected**2, 0.0))
+    worst = int(np.argmax(grown))
+    text = f"position uncertainty reaches {deviations[worst]:.1f} m (start, compass and lengths explain "
+    text += f"{expected[worst]:.1f} m, limit {limit:g} m more)"
     question = "How far off may the position be, by the solver's own account?"
-    doubtful = merged(times[deviations > limit], step)
-    return Verdict("position uncertainty", worst, limit, text, doubtful=doubtful, question=question)
+    doubtful = merged(times[grown > limit], step)
+    return Verdict("position uncertainty", float(grown[worst]), limit, text, doubtful=doubtful, question=question)
 
 
 def per_minute(times: np.ndarray, deviations: np.ndarray) -> np.ndarray:

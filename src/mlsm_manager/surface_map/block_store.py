@@ -18,7 +18,7 @@ _MIN_ROWS = 1024  # reserved from the start (96 kB), so that small maps do not g
 
 
 class StoreArrays(NamedTuple):
-    """Views that compiled loops write to. Who changes a row tells `announce` before.
+    """Views that compiled loops read and write. While somebody holds one, a store that grows copies all its rows.
 
     rows: (n, ROW_WIDTH). following: (n,) the row that follows each in its cell. crossed: (n,). heads: (s,) the first
     rows of all cells.
@@ -28,6 +28,20 @@ class StoreArrays(NamedTuple):
     following: np.ndarray
     crossed: np.ndarray
     heads: np.ndarray
+
+
+class Runs(NamedTuple):
+    """All blocks (m) of the cells that something went into, by cell, then by bottom.
+
+    blocks: (m, ROW_WIDTH), of which only those that changed are filled in. row: (m,) number in the store, -1 where new.
+    cell: (m,) index of the cell. crossed: (m,) uint16, see Blocks. changed: (m,) bool.
+    """
+
+    blocks: np.ndarray
+    row: np.ndarray
+    cell: np.ndarray
+    crossed: np.ndarray
+    changed: np.ndarray
 
 
 class BlockStore:
@@ -71,12 +85,7 @@ class BlockStore:
     @property
     def arrays(self) -> StoreArrays:
         """All arrays, good until the store grows."""
-        return StoreArrays(self._rows.values, self._following.values, self._crossed.values, self._index.heads)
-
-    def announce(self, rows: np.ndarray) -> None:
-        """Learn that `rows` (n,) will be written to."""
-        for copy in self._copies:
-            copy.before_change(rows)
+        return StoreArrays(self._rows.values, self._following.values, self._crossed.values, self._index.heads.values)
 
     def slots(self, cells: np.ndarray) -> np.ndarray:
         """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
@@ -96,19 +105,34 @@ class BlockStore:
             return np.empty(0, dtype=np.int64), owners
         return np.concatenate(found_rows).astype(np.int64), np.concatenate(found_owners)
 
-    def release(self, rows: np.ndarray) -> None:
-        """Give back rows (n,), to which no cell may lead afterwards."""
-        self.announce(rows)
-        self._rows.values[rows, COUNT] = 0.0
-        self._free = np.concatenate([self._free, rows])
+    def write(self, slots: np.ndarray, runs: Runs, fused: np.ndarray) -> None:
+        """Put Runs into the cells at `slots` (c,) in place of what they hold; the rows `fused` (f,) are free then."""
+        self._release(fused)
+        new = runs.row < 0
+        runs.row[new] = self._take(int(np.count_nonzero(new)))
+        self._announce(runs.row[runs.changed])
+        _write(runs, self.arrays, slots)
 
     def remove(self, rows: np.ndarray, cells: np.ndarray) -> None:
         """Forget the blocks in `rows` (n,), all of them in cells with keys `cells` (c,), none twice."""
-        self.release(rows)
-        held = self.arrays
-        _unlink_released(held.rows, held.following, held.heads, self._index.slots(cells))
+        self._release(rows)
+        slots = self._index.slots(cells)
+        _unlink_released(self.arrays, slots)
 
-    def take(self, number: int) -> np.ndarray:
+    def _announce(self, rows: np.ndarray) -> None:
+        """Tell the running copies that `rows` (n,) will be written to."""
+        for copy in self._copies:
+            copy.before_change(rows)
+
+    def _release(self, rows: np.ndarray) -> None:
+        """Give back rows (n,), to which no cell may lead afterwards."""
+        if not len(rows):
+            return
+        self._announce(rows)
+        self._rows.values[rows, COUNT] = 0.0
+        self._free = np.concatenate([self._free, rows])
+
+    def _take(self, number: int) -> np.ndarray:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
         reused, self._free = self._free[:number], self._free[number:]
         first, self._used = self._used, self._used + number - len(reused)
@@ -119,23 +143,36 @@ class BlockStore:
 
     def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks at `rows` (n,), none twice."""
-        self.announce(rows)
+        self._announce(rows)
         self._crossed.values[rows] = np.minimum(self._crossed.values[rows] + beams, MOST_CROSSINGS)
 
 
 @compiled()
-def _unlink_released(rows, following_row, heads, slots):
-    """Let the chains of the cells at `slots` (c,) lead past rows without points."""
+def _write(runs, held, slots):
+    """Write Runs, which all have rows, into the chains of the cells at `slots` (c,); held: StoreArrays."""
+    for run in range(len(runs.row)):
+        row, cell = runs.row[run], runs.cell[run]
+        if runs.changed[run]:
+            held.rows[row], held.crossed[row] = runs.blocks[run], runs.crossed[run]
+        if run == 0 or runs.cell[run - 1] != cell:
+            held.heads[slots[cell]] = row
+        is_last = run + 1 == len(runs.row) or runs.cell[run + 1] != cell
+        held.following[row] = NO_BLOCK if is_last else runs.row[run + 1]
+
+
+@compiled()
+def _unlink_released(held, slots):
+    """Let the chains of the cells at `slots` (c,) lead past rows without points; held: StoreArrays."""
     for slot in slots:
-        before, row = NO_BLOCK, heads[slot]
+        before, row = NO_BLOCK, held.heads[slot]
         while row != NO_BLOCK:
-            following = following_row[row]
-            if rows[row, COUNT] > 0.0:
+            following = held.following[row]
+            if held.rows[row, COUNT] > 0.0:
                 before = row
             elif before == NO_BLOCK:
-                heads[slot] = following
+                held.heads[slot] = following
             else:
-                following_row[before] = following
+                held.following[before] = following
             row = following
 
 

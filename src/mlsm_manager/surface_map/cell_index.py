@@ -41,6 +41,8 @@ class CellIndex:
     split in two (extendible hashing, Fagin et al. 1979), so that no insertion waits for the whole table to be moved.
     A hash and not tiles: walls cross a tile in a line and a far point needs one of its own, so that on real scans
     tiles spend more memory on empty cells than the blocks themselves take.
+
+    heads: its values (s,) are the number of the first block of the cell in each place, NO_BLOCK where there is none.
     """
 
     def __init__(self, expected_cells: int) -> None:
@@ -50,18 +52,13 @@ class CellIndex:
         self._depth = np.full(segments, self._bits)
         self._used = np.zeros(segments, dtype=np.int64)
         self._keys = LargeArray(segments * _PLACES, (), np.int64)
-        self._heads = LargeArray(segments * _PLACES, (), np.int32)
+        self.heads = LargeArray(segments * _PLACES, (), np.int32)
         self._clear(np.arange(segments))
 
     @property
     def nbytes(self) -> int:
         """Memory held, bytes."""
-        return len(self._used) * _PLACES * (self._keys.values.itemsize + self.heads.itemsize)
-
-    @property
-    def heads(self) -> np.ndarray:
-        """(s,) the number of the first block of the cell in each place, NO_BLOCK where there is none."""
-        return self._heads.values
+        return len(self._used) * _PLACES * (self._keys.values.itemsize + self.heads.values.itemsize)
 
     def slots(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int64 places in `heads`, making those that are new; keys is (n,) and holds none twice.
@@ -79,7 +76,7 @@ class CellIndex:
     def find(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
         places = self._found(keys)
-        return np.where(places >= 0, self.heads[places], np.int32(NO_BLOCK))
+        return np.where(places >= 0, self.heads.values[places], np.int32(NO_BLOCK))
 
     def _found(self, keys: np.ndarray) -> np.ndarray:
         return _found(np.ascontiguousarray(keys), self._directory, self._bits, self._keys.values)
@@ -93,17 +90,17 @@ class CellIndex:
     def _split(self, segments: np.ndarray) -> None:
         """Give half of the range of hashes of each of `segments` (n,) to a new one, and the keys with it."""
         places = _places_of(segments)
-        keys, heads = self._keys.values[places], self.heads[places]
+        keys, heads = self._keys.values[places], self.heads.values[places]
         taken = keys != _EMPTY
         new = len(self._used) + np.arange(len(segments))
         depth = self._depth[segments] + 1
         self._depth[segments] = depth
         self._depth, self._used = np.append(self._depth, depth), np.append(self._used, np.zeros_like(new))
         self._keys.reserve(len(self._used) * _PLACES)
-        self._heads.reserve(len(self._used) * _PLACES)
+        self.heads.reserve(len(self._used) * _PLACES)
         self._direct(segments, new)
         self._clear(np.append(segments, new))
-        self.heads[self._placed(keys[taken])] = heads[taken]
+        self.heads.values[self._placed(keys[taken])] = heads[taken]
 
     def _direct(self, old: np.ndarray, new: np.ndarray) -> None:
         """Let the directory lead to segments `new` (n,) with the second half of what led to `old` (n,)."""
@@ -117,7 +114,7 @@ class CellIndex:
 
     def _clear(self, segments: np.ndarray) -> None:
         places = _places_of(segments)
-        self._keys.values[places], self.heads[places] = _EMPTY, NO_BLOCK
+        self._keys.values[places], self.heads.values[places] = _EMPTY, NO_BLOCK
         self._used[segments] = 0
 
 

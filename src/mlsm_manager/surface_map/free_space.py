@@ -245,13 +245,18 @@ class Carver:
         return pair[inside], block[inside]
 
 
-def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> None:
-    """Put into `free` which of the blocks, one per cell, are not known well enough to be free at their height."""
+def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> Blocks:
+    """Put into `free` which of the blocks, one per cell, are not known well enough to be free at their height.
+
+    Return these.
+    """
     there, _, owners = free.find(noted.cells)
     gap = np.maximum(there.bottom - noted.height[owners], noted.bottom[owners] - there.height)
     known = np.zeros(len(noted), dtype=bool)
     known[owners[(gap < free.resolution) & (there.count >= _ENOUGH)]] = True
-    free.insert_blocks(noted.take(~known))
+    new = noted.take(~known)
+    free.insert_blocks(new)
+    return new
 
 
 def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:

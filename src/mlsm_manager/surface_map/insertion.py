@@ -2,11 +2,11 @@
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.block_store import BlockStore
+from mlsm_manager.surface_map.block_store import BlockStore, Runs
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, cell_keys
 from mlsm_manager.surface_map.point_groups import VALUES, Groups, finite_within, grouped_points, sorted_by_cell
@@ -39,20 +39,16 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
     """Insert blocks of the store's resolution, which may overlap; return the keys (c,) of their cells, sorted."""
     cells, order, starts = sorted_by_cell(cell_keys(blocks.cells), blocks.bottom)
     owner = np.repeat(np.arange(len(cells)), np.diff(starts))
-    _insert_groups(store, cells, Groups(blocks.rows[order], owner, blocks.crossed[order]), blocks.resolution)
+    _insert_groups(
+        store, cells, Groups(blocks.rows[order].astype(np.float64), owner, blocks.crossed[order]), blocks.resolution
+    )
     return cells
 
 
 def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups, resolution: float) -> None:
     slots = store.slots(cells)
-    held = store.arrays
-    runs, fused = _linked(*groups, held.rows, held.following, held.heads, slots, resolution)
-    if len(fused):
-        store.release(fused)
-    new = runs.row < 0
-    runs.row[new] = store.take(int(np.count_nonzero(new)))
-    store.announce(runs.row[runs.changed])
-    _write(*runs, *store.arrays, slots)
+    runs, fused = _linked(groups, store.arrays, slots, resolution)
+    store.write(slots, runs, fused)
 
 
 @lru_cache(maxsize=None)
@@ -68,41 +64,27 @@ def compile_loops() -> None:
     store.remove(store.rows_in_use, np.zeros(1, dtype=np.int64))
 
 
-class Runs(NamedTuple):
-    """All blocks (m) of the cells that something went into, by cell, then by bottom.
-
-    blocks: (m, ROW_WIDTH), of which only those that changed are filled in. row: (m,) number in the store, -1 where new.
-    cell: (m,) index of the cell. crossed: (m,) uint16, see Groups. changed: (m,) bool.
-    """
-
-    blocks: np.ndarray
-    row: np.ndarray
-    cell: np.ndarray
-    crossed: np.ndarray
-    changed: np.ndarray
-
-
 @compiled()
-def _linked(new_rows, new_cell, new_crossed, rows, following, heads, slots, resolution):
-    """Return the Runs of the cells at `slots` (c,) after the groups went into them, each cell at least one, and the row
+def _linked(groups, held, slots, resolution):
+    """Return the Runs of the cells at `slots` (c,) after the Groups went into them, each cell at least one, and the row
     numbers (f,) of stored blocks that are part of others by then.
 
-    new_rows, new_cell, new_crossed: as Groups has them. rows, following, heads: as StoreArrays has them; numba takes
-    longer to look at a named tuple than at its arrays. A merged block keeps the highest row of its parts. What is new
-    resets its crossings: a beam has just hit it.
+    held: StoreArrays. A merged block keeps the highest row of its parts. What is new resets its crossings: a beam has
+    just hit it.
     """
-    most = len(new_rows) + _stored_count(following, heads, slots)
+    rows, most = held.rows, len(groups.rows) + _stored_count(held.following, held.heads, slots)
     blocks, row, owner = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
     crossed, changed = np.zeros(most, np.uint16), np.empty(most, np.bool_)
     parts, part_rows = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64)
     stored, fused = np.empty(most, np.int64), np.empty(most, np.int64)
     made, gone, group = 0, 0, 0
     for cell in range(len(slots)):
-        held = _stored_by_bottom(rows, following, heads[slots[cell]], stored)
+        old = _stored_by_bottom(rows, held.following, held.heads[slots[cell]], stored)
         reached, length, looked_at = -np.inf, 0, 0
         while True:
-            new_bottom = new_rows[group, BOTTOM] if group < len(new_rows) and new_cell[group] == cell else np.inf
-            old_bottom = rows[stored[looked_at], BOTTOM] if looked_at < held else np.inf
+            is_new = group < len(groups.rows) and groups.cell[group] == cell
+            new_bottom = groups.rows[group, BOTTOM] if is_new else np.inf
+            old_bottom = rows[stored[looked_at], BOTTOM] if looked_at < old else np.inf
             bottom = min(new_bottom, old_bottom)
             if length and (bottom == np.inf or bottom - reached >= resolution):
                 changed[made], owner[made] = length > 1 or part_rows[0] < 0, cell
@@ -113,8 +95,8 @@ def _linked(new_rows, new_cell, new_crossed, rows, following, heads, slots, reso
             if bottom == np.inf:
                 break
             if new_bottom <= old_bottom:
-                parts[length], part_rows[length] = new_rows[group], -1
-                crossed[made] = max(crossed[made], new_crossed[group])
+                parts[length], part_rows[length] = groups.rows[group], -1
+                crossed[made] = max(crossed[made], groups.crossed[group])
                 group += 1
             else:
                 parts[length], part_rows[length] = rows[stored[looked_at]], stored[looked_at]
@@ -186,16 +168,3 @@ def _row_of(rows, fused, gone):
             fused[gone] = row
             gone += 1
     return kept, gone
-
-
-@compiled()
-def _write(blocks, row_of, cell_of, crossed, changed, stored_rows, following, stored_crossed, heads, slots):
-    """Write Runs, which all have rows, into StoreArrays; `slots` (c,) are the cells' places."""
-    for run in range(len(row_of)):
-        row, cell = row_of[run], cell_of[run]
-        if changed[run]:
-            stored_rows[row], stored_crossed[row] = blocks[run], crossed[run]
-        if run == 0 or cell_of[run - 1] != cell:
-            heads[slots[cell]] = row
-        is_last = run + 1 == len(row_of) or cell_of[run + 1] != cell
-        following[row] = NO_BLOCK if is_last else row_of[run + 1]

@@ -1,14 +1,16 @@
 """The Multi Level Surface Map: a grid of cells, each with blocks at several heights (thesis 6.2, 6.5.6)."""
 
-from typing import Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore, RunningCopy
-from mlsm_manager.surface_map.blocks import Blocks, cells_of
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, TOP, Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys
 from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
 from mlsm_manager.surface_map.tiles import TILE_BITS, ChangedTiles
+
+_EXTENT = [0, 1, BOTTOM, TOP]  # columns of a block that tell where it lies
 
 
 class MultiLevelSurfaceMap:
@@ -88,6 +90,12 @@ class MultiLevelSurfaceMap:
         """Return a copy of the blocks in `rows` (n,), which `find` named."""
         return self._store.blocks(rows, self.resolution)
 
+    def replace(self, parts: Sequence[Blocks]) -> None:
+        """Forget all blocks, and insert those of all `parts`."""
+        self.remove(self._store.rows_in_use)
+        for blocks in parts:
+            self.insert_blocks(blocks)
+
     def count_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks in `rows` (n,), none twice."""
         self._store.add_crossings(rows, beams)
@@ -109,10 +117,6 @@ class MultiLevelSurfaceMap:
         self._changed.note(insert_points(self._store, kept, self.resolution))
         return report
 
-    def report(self, points: np.ndarray) -> InsertReport:
-        """Return what `insert` would report of points (n, 4)."""
-        return admitted(points, self.limit)[1]
-
     def insert_blocks(self, blocks: Blocks) -> InsertReport:
         """Insert blocks of the same resolution; each goes where its mean lies, as if its points came with it.
 
@@ -121,11 +125,10 @@ class MultiLevelSurfaceMap:
         """
         if blocks.resolution != self.resolution:
             raise ValueError(f"resolution {blocks.resolution:g} m: must be the map's, {self.resolution:g} m")
-        reach = np.abs(np.column_stack([blocks.mean[:, :2], blocks.bottom, blocks.height])).max(axis=1)
-        kept = blocks.take(reach <= self.limit)
+        kept = blocks.take(np.abs(blocks.rows[:, _EXTENT]).max(axis=1) <= self.limit)
         self._changed.note(insert_blocks(self._store, kept))
-        inserted = int(kept.count.sum())
-        return InsertReport(inserted, 0, int(blocks.count.sum()) - inserted)
+        inserted, everything = (int(some.rows[:, COUNT].sum()) for some in (kept, blocks))
+        return InsertReport(inserted, 0, everything - inserted)
 
     def _in_cells(self, first: np.ndarray, last: np.ndarray) -> Blocks:
         """Return the blocks of cells from `first` to `last`, (2,) each, both included, sorted by row."""

@@ -55,6 +55,8 @@ class Overlay:
 
     def take_off(self) -> None:
         """Give all changed cells what they held before."""
+        if not len(self._cells):
+            return
         self.covered.uncover(self._map)
         self._forget()
 

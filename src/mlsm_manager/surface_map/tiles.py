@@ -6,7 +6,7 @@ are.
 """
 
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import Tuple
 
 import numpy as np
 
@@ -25,20 +25,24 @@ class ChangedTiles:
     """Collects the keys of tiles; tile (i, j) has the key of `cell_keys`."""
 
     def __init__(self) -> None:
-        self._parts: List[np.ndarray] = []
+        self._tiles, self._cells = np.empty(0, dtype=np.int64), []
 
     def note(self, keys: np.ndarray) -> None:
         """Note that cells with `keys` (n,) changed."""
-        tiles = cell_keys(cells_of_keys(keys) >> TILE_BITS)
-        self._parts.append(np.unique(tiles))
-        if len(self._parts) > _MOST_PARTS:
-            self._parts = [np.unique(np.concatenate(self._parts))]
+        self._cells.append(keys)
+        if len(self._cells) > _MOST_PARTS:
+            self._tiles = self._together()
 
     def take(self) -> np.ndarray:
         """Return the (n, 2) int64 tiles that changed since the last call, sorted, none twice."""
-        parts, self._parts = self._parts, []
-        keys = np.unique(np.concatenate(parts)) if parts else np.empty(0, dtype=np.int64)
-        return cells_of_keys(keys)
+        tiles, self._tiles = self._together(), self._tiles[:0]
+        return cells_of_keys(tiles)
+
+    def _together(self) -> np.ndarray:
+        """Return the keys of all tiles noted so far, sorted, and keep no cells any more."""
+        cells, self._cells = self._cells, []
+        tiles = [cell_keys(cells_of_keys(keys) >> TILE_BITS) for keys in cells]
+        return np.unique(np.concatenate([self._tiles, *tiles]))
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from tf2_msgs.msg import TFMessage
 
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.geometry import quaternion_of
+from node_support.geometry import quaternion_of, rotation_matrices
 from node_support.headers import DAY, check_frame, check_stamp
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
@@ -205,12 +205,7 @@ def matrix_of_quaternion(quaternion: np.ndarray, kind: str) -> np.ndarray:
     norm = np.linalg.norm(quaternion)
     if not 0.5 < norm < 2.0:
         raise RefusedInput(kind, f"quaternion {quaternion}, must be of length 1")
-    x, y, z, w = quaternion / norm
-    return np.array([
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ])  # fmt: skip
+    return rotation_matrices((quaternion / norm)[np.newaxis])[0]
 
 
 def pose_from_matrix(matrix: np.ndarray) -> Pose:

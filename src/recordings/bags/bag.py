@@ -10,12 +10,12 @@ from tempfile import TemporaryDirectory
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Tuple, Union
 
 from rosbags.interfaces import Connection
+from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
 from rosbags.rosbag2.storage_mcap import MCAPFile
 from rosbags.typesys.store import Typestore
 
 from recordings.bags.message_types import defined_in, ros2_types
-from recordings.bags.ros1_reader import Ros1Reader
 
 _LONE_FILES = (".mcap", ".db3")
 _TopicCount = Tuple[str, str, int]

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node_support.geometry import FULL_TURN
+from node_support.geometry import rotation_matrices
 
 _NORMS = (0.5, 2.0)  # of quaternions; a norm outside says that something else than a rotation was written
 
@@ -73,16 +73,10 @@ class PoseTrack:
         rotations = self.rotations * [1.0, -1.0, -1.0, 1.0]
         return PoseTrack(self.stamps_ns, translations, rotations, self.is_fixed)
 
-    @property
-    def yaws(self) -> np.ndarray:
-        """(n,) heading, rad, without jumps by whole turns."""
-        matrices = _rotation_matrices(self.rotations)
-        return np.unwrap(np.arctan2(matrices[:, 1, 0], matrices[:, 0, 0]), discont=FULL_TURN / 2)
-
 
 def _matrices(translations: np.ndarray, rotations: np.ndarray) -> np.ndarray:
     matrices = np.zeros((len(translations), 4, 4))
-    matrices[:, :3, :3] = _rotation_matrices(_normalized(rotations))
+    matrices[:, :3, :3] = rotation_matrices(_normalized(rotations))
     matrices[:, :3, 3] = translations
     matrices[:, 3, 3] = 1.0
     return matrices
@@ -106,14 +100,3 @@ def _between(first: np.ndarray, second: np.ndarray, share: np.ndarray) -> np.nda
     left = np.where(apart, np.sin((1.0 - share) * angle) / sine, 1.0)
     right = np.where(apart, np.sin(share * angle) / sine, 0.0)
     return left[:, np.newaxis] * first + right[:, np.newaxis] * second
-
-
-def _rotation_matrices(quaternions: np.ndarray) -> np.ndarray:
-    """Return (n, 3, 3) rotations of unit quaternions (n, 4)."""
-    x, y, z, w = quaternions.T
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.array(rows).transpose(2, 0, 1)

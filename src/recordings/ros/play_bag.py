@@ -1,8 +1,7 @@
 """Plays a bag with a clock that never stops before its end, however slow bag, machine and listeners are."""
 
-import math
 import threading
-from argparse import ArgumentTypeError, Namespace
+from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Sequence, Union
@@ -14,7 +13,7 @@ from geometry_msgs.msg import Quaternion, Vector3
 from rosgraph_msgs.msg import Clock
 
 from node_support import topics
-from node_support.help import CommandLine
+from node_support.help import CommandLine, positive
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, run
 from node_support.timing import Pace
@@ -37,19 +36,12 @@ def play_arguments(arguments: List[str]) -> Namespace:
         "play_bag", description="Play a ROS 1 bag with /clock, once every topic has a subscriber. It is read first."
     )
     parser.add_argument("bag", type=Path, help="bag to play")
-    parser.add_argument("--rate", type=_positive, default=1.0, help="times real time (default: 1)")
+    parser.add_argument("--rate", type=positive, default=1.0, help="times real time (default: 1)")
     parser.add_argument("--topics", nargs="+", help="play only these (default: all)")
     parser.add_argument("--ned", action="store_true", help="the odometry counts x north, y east, z down: turn it up")
     parser.add_argument("--odom-frame", default="odom", help="frame of the odometry that --ned turns (default: odom)")
     parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: base_link)")
     return parser.parse_args(arguments)
-
-
-def _positive(text: str) -> float:
-    value = float(text)
-    if not 0.0 < value < math.inf:
-        raise ArgumentTypeError(f"{text}: must be above 0")
-    return value
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ echoes are looked for.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Optional, Tuple
 
@@ -17,6 +17,7 @@ from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
 from sonar_processing.filters.echo_peaks import Peaks, find_peaks, leading_edges, points_along_runs
+from sonar_processing.filters.echo_shape import EchoShape, EchoStatistics
 from sonar_processing.filters.threshold import otsu_threshold
 
 FEWEST_BEAMS = 10  # Fewer directions tell no quantile over them
@@ -24,11 +25,13 @@ _SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it
 _SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do not count as spread
 _SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included
 _ROWS_MEASURED = 8  # Rows of a cloud that tell the length of a bin; it is the same in all of them
+_EDGE_SIGMA = 0.15  # m: of the filter for plateaus, which closes gaps and leaves an edge where it is
 
 
 class ExtractionMode(Enum):
-    """Which points of an echo are taken."""
+    """Which points of an echo are taken. AUTO: MATCHED_FILTER where echoes have peaks, DENSE where they have not."""
 
+    AUTO = "AUTO"
     MATCHED_FILTER = "MATCHED_FILTER"
     LEADING_EDGE = "LEADING_EDGE"
     DENSE = "DENSE"
@@ -39,12 +42,13 @@ class EchoExtractorParameters(ParameterSet):
     """Parameters of echo_extractor."""
 
     mode: ExtractionMode = parameter(
-        ExtractionMode.MATCHED_FILTER,
-        "which points of an echo are kept: its peak, its beginning, or points all along it",
+        ExtractionMode.AUTO,
+        "which points of an echo are kept: its peak, its beginning, or points all along it; AUTO: peaks, or points all "
+        "along where the sonar sends two strengths only",
     )
     pulse_sigma: float = parameter(
-        0.15, "standard deviation of an echo along range, the width of the matched filter",
-        unit="m", low=0.001, high=10.0,
+        0.15, "standard deviation of an echo along range, the width of the matched filter; 0: measured",
+        unit="m", low=0.0, high=10.0,
     )  # fmt: skip
     ring_quantile: float = parameter(
         0.4, "quantile over the directions that makes the ring of floor echoes: 0.3 among walls, 0.5 in open water; "
@@ -59,27 +63,40 @@ class EchoExtractorParameters(ParameterSet):
         10.0, "least height of an echo above the ring", unit="echo strength", low=0.0, high=255.0
     )
     threshold_share: float = parameter(
-        1.0, "share of Otsu's threshold that an echo must reach; 0.5 keeps weak echoes, and more speckle",
+        1.0, "share of Otsu's threshold that a peak must reach: 1 keeps strong echoes only; DENSE always takes 1",
         low=0.0, high=1.0,
     )  # fmt: skip
     min_range: float = parameter(
         0.5, "nearer echoes are removed: there the head itself rings", unit="m", low=0.0, high=100.0
     )
-    spacing: float = parameter(0.5, "DENSE: distance between the points of an echo", unit="m", low=0.01, high=100.0)
+    spacing: float = parameter(1.0, "DENSE: distance between the points of an echo", unit="m", low=0.01, high=100.0)
 
+    @property
+    def is_settled(self) -> bool:
+        """Whether nothing is left to be found out from the echoes."""
+        return self.mode is not ExtractionMode.AUTO and self.pulse_sigma > 0.0
 
-DEFAULTS = EchoExtractorParameters()
+    def settled(self, heard: EchoStatistics) -> "EchoExtractorParameters":
+        """Return them with what is left open taken from the echoes that were heard."""
+        mode, sigma = self.mode, self.pulse_sigma
+        if mode is ExtractionMode.AUTO:
+            is_plateau = heard.shape is EchoShape.PLATEAU
+            mode = ExtractionMode.DENSE if is_plateau else ExtractionMode.MATCHED_FILTER
+        if not sigma:
+            sigma = _EDGE_SIGMA if mode is ExtractionMode.DENSE else round(heard.sigma, 3)
+        return replace(self, mode=mode, pulse_sigma=sigma)
 
 
 def extract_echoes(
-    strengths: np.ndarray, range_resolution: float, parameters: EchoExtractorParameters = DEFAULTS
+    strengths: np.ndarray, range_resolution: float, parameters: EchoExtractorParameters
 ) -> Tuple[Peaks, float]:
     """Return the echoes of a polar scan, and the height that separated them from speckle.
 
     strengths: (beams, bins), any numeric type, the beams of one turn in any order; range_resolution: length of a bin,
-    m. A height is the strength by which an echo stands out of the ring. Raises RefusedInput for a scan of too few beams
-    to tell a ring from echoes.
+    m. parameters: settled ones. A height is the strength by which an echo stands out of the ring. Raises RefusedInput
+    for a scan of too few beams to tell a ring from echoes.
     """
+    is_dense = parameters.mode is ExtractionMode.DENSE
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
     first_bin = max(math.ceil(parameters.min_range / range_resolution - 0.5), 0)
     smooth = matched_filter(strengths, sigma, first_bin)
@@ -88,11 +105,12 @@ def extract_echoes(
     peaks = find_peaks(response, apart=math.ceil(2.0 * sigma))
     least = np.maximum(parameters.min_contrast * spread, parameters.min_height)
     peaks = peaks.select(peaks.heights >= least[np.rint(peaks.bins).astype(np.int64)])
-    threshold = max(parameters.threshold_share * height_threshold(peaks.heights), parameters.min_height)
+    share = 1.0 if is_dense else parameters.threshold_share
+    threshold = max(share * height_threshold(peaks.heights), parameters.min_height)
     peaks = peaks.select(peaks.heights >= threshold)
     if parameters.mode is ExtractionMode.LEADING_EDGE:
         peaks = leading_edges(response, peaks)
-    elif parameters.mode is ExtractionMode.DENSE:
+    elif is_dense:
         peaks = points_along_runs(response, threshold, parameters.spacing / range_resolution)
     return peaks, threshold
 
@@ -139,12 +157,20 @@ def height_threshold(heights: np.ndarray) -> float:
 
 
 class EchoExtractor:
-    """Works on whole scans; a moving vehicle makes no difference, for every bin brings its own place."""
+    """Works on whole scans; a moving vehicle makes no difference, for every bin brings its own place.
+
+    What the parameters leave open is found out from the beams of all scans with the same bins, the newest included.
+    Other bins, or a time that jumps back, begin anew.
+    """
 
     def __init__(self, parameters: EchoExtractorParameters) -> None:
         self.parameters = parameters
+        self.newest_parameters = parameters
+        """Those of the newest scan, with what was found out."""
         self.newest_threshold: Optional[float] = None
         """The height that parted echoes from speckle in the newest scan."""
+        self._heard: Optional[EchoStatistics] = None
+        self._newest_ns = 0
 
     def __call__(self, cloud: Cloud) -> Cloud:
         """Return the echoes of an organised cloud (rows are beams, columns are bins) as a cloud without order.
@@ -156,12 +182,27 @@ class EchoExtractor:
             raise RefusedInput("clouds refused", "not organised; subscribe the echo extractor to sonar/scan/polar")
         rows = cloud.points.reshape(cloud.height, -1, 4)
         strengths = np.nan_to_num(rows[..., 3], nan=0.0, posinf=0.0, neginf=0.0)
-        echoes, self.newest_threshold = extract_echoes(strengths, bin_length(rows), self.parameters)
+        resolution = bin_length(rows)
+        if not self.parameters.is_settled:
+            self.newest_parameters = self.parameters.settled(self._heard_with(strengths, resolution, cloud.stamp_ns))
+        echoes, self.newest_threshold = extract_echoes(strengths, resolution, self.newest_parameters)
         points = places(rows, echoes.beams, echoes.bins)
         points[:, 3] = echoes.heights
         stamps = cloud.time_stamps.reshape(cloud.height, -1)[echoes.beams, 0]
         found = Cloud(points, stamps, cloud.stamp_ns, cloud.frame_id)
         return found.select(found.valid)
+
+    def _heard_with(self, strengths: np.ndarray, resolution: float, stamp_ns: int) -> EchoStatistics:
+        """Return what was heard since the bins changed or time jumped, the scan included."""
+        if (
+            self._heard is None
+            or stamp_ns < self._newest_ns
+            or not self._heard.has_bins(strengths.shape[1], resolution)
+        ):
+            self._heard = EchoStatistics(strengths.shape[1], resolution)
+        self._newest_ns = stamp_ns
+        self._heard.add(strengths)
+        return self._heard
 
 
 def bin_length(rows: np.ndarray) -> float:

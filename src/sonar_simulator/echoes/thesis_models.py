@@ -40,17 +40,9 @@ class ContactEcho(ABC):
     mirrors = Mirrors()
 
     def __init__(self, parameters: ContactEchoParameters) -> None:
-        self._settings = parameters
-
-    @property
-    def bins(self) -> int:
-        """Number of bins in a beam."""
-        return self._settings.bins
-
-    @property
-    def max_range(self) -> float:
-        """Far end of the last bin, m."""
-        return self._settings.max_range
+        self.parameters = parameters
+        self.bins = parameters.bins
+        self.max_range = parameters.max_range
 
     def pattern(self, fan: BeamPattern) -> RayPattern:
         """Return the rays that the model needs for a head whose beam is `fan`: those of `fan`."""
@@ -74,7 +66,7 @@ class ContactEcho(ABC):
         return np.bincount(cells, minlength=beams * self.bins).reshape(beams, self.bins)
 
     def _write_noise(self, strengths: np.ndarray, nearest: np.ndarray, rng: np.random.Generator) -> None:
-        settings = self._settings
+        settings = self.parameters
         beam = np.repeat(np.flatnonzero(np.isfinite(nearest)), settings.noise_echoes)
         ranges = rng.normal(nearest[beam], settings.noise_range_sd)
         noise = rng.normal(settings.noise_strength_mean, settings.noise_strength_sd, size=len(beam))
@@ -97,9 +89,7 @@ class LaserConeParameters(ContactEchoParameters):
 class LaserCone(ContactEcho):
     """Each contact adds one echo of a fixed strength near its range."""
 
-    def __init__(self, parameters: LaserConeParameters) -> None:
-        super().__init__(parameters)
-        self.parameters = parameters
+    parameters: LaserConeParameters
 
     def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
@@ -130,9 +120,7 @@ class Collision(ContactEcho):
     which some were missing and some were where there was nothing (6.4, "sonar cone bug").
     """
 
-    def __init__(self, parameters: CollisionParameters) -> None:
-        super().__init__(parameters)
-        self.parameters = parameters
+    parameters: CollisionParameters
 
     def pattern(self, fan: BeamPattern) -> RayPattern:
         """Return as many rays as `fan` has, spread over the cone."""

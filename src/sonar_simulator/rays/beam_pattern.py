@@ -72,13 +72,6 @@ class BeamPattern(RayPattern):
         sides = [[math.sin(across), sign * math.cos(across), 0.0] for sign in (1.0, -1.0)]
         return np.array(sides + [[math.sin(up), 0.0, sign * math.cos(up)] for sign in (1.0, -1.0)])
 
-    def directions(self, angles: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, rays, 3) unit vectors in the sonar frame for head `angles` (beams,), rad.
-
-        Angles count counter-clockwise about +z from +x.
-        """
-        return self.sample(len(angles), rng) @ head_turns(angles).transpose(0, 2, 1)
-
 
 @dataclass(frozen=True)
 class FanWithSideLobes(RayPattern):

@@ -56,8 +56,6 @@ class Contacts:
     @staticmethod
     def joined(parts: Sequence["Contacts"]) -> "Contacts":
         """Return the contacts of all parts side by side; the parts have the same beams and materials."""
-        if len(parts) == 1:
-            return parts[0]
         names = ("ranges", "cosines", "material", "directions", "shares", "losses")
         both = {name: np.concatenate([getattr(part, name) for part in parts], axis=1) for name in names}
         return Contacts(materials=parts[0].materials, **both)

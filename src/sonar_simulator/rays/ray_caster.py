@@ -37,15 +37,11 @@ class RayCaster:
         """Finds the nearest surface inside a beam."""
         return NearestSurface(self.world)
 
-    def distances(self, origins: np.ndarray, directions: np.ndarray) -> np.ndarray:
-        """Return (n,) float64 distances, m, inf where nothing is hit. Both sides of a surface are solid.
-
-        origins: (n, 3) in the world frame, m. directions: (n, 3) unit vectors in the world frame.
-        """
-        return self.hits(origins, directions)[0]
-
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return distances as `distances` does, and the (n,) faces of the world that are hit, -1 where none is."""
+        """Return (n,) distances, m, inf where nothing is hit, and the (n,) faces of the world that are hit, else -1.
+
+        Both sides of a surface are solid. origins: (n, 3) in the world frame, m. directions: (n, 3) unit vectors in it.
+        """
         found = self._scene.run(
             np.ascontiguousarray(origins, dtype=np.float32), np.ascontiguousarray(directions, dtype=np.float32),
             query="INTERSECT", output=True,

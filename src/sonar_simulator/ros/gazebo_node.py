@@ -1,5 +1,6 @@
 """The node gazebo_sonar: makes beams of the scans of Gazebo's ray sensors."""
 
+import math
 from typing import Callable, Dict, Optional
 
 import genpy
@@ -45,7 +46,8 @@ def ray_scan(message: AnyMsg, parameters: GazeboSonarParameters) -> RayScan:
 
 def _of_laser_scan(scan: LaserScan, parameters: GazeboSonarParameters) -> Rays:
     layout = ScanLayout(scan.angle_min, scan.angle_max, scan.angle_increment, scan.range_max)
-    return rays_of_scan(layout, np.asarray(scan.ranges), np.asarray(scan.intensities), parameters.vertical_opening)
+    opening = math.radians(parameters.vertical_opening_deg)
+    return rays_of_scan(layout, np.asarray(scan.ranges), np.asarray(scan.intensities), opening)
 
 
 def _of_point_cloud(cloud: PointCloud, parameters: GazeboSonarParameters) -> Rays:
@@ -127,7 +129,8 @@ class GazeboSonar:
             self._filter.add(scan)
             return
         with self.health.timed():
-            ping = self._beams.swept(scan, self._head, self._next_beam, self._parameters.horizontal_opening)
+            opening = math.radians(self._parameters.horizontal_opening_deg)
+            ping = self._beams.swept(scan, self._head, self._next_beam, opening)
         self._next_beam += 1
         self._publish(ping, scan)
 

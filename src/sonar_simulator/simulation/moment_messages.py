@@ -1,11 +1,11 @@
-"""The state at one moment of a simulation as messages, for publishers, and at many moments at once, for bags."""
+"""The state at one moment of a simulation as messages, for publishers and for bags."""
 
 from typing import Any, Callable, List, Tuple
 
 import numpy as np
 
 from node_support import topics
-from node_support.geometry import quaternion_of, quaternions_of
+from node_support.geometry import quaternion_of
 from sonar_simulator.simulation.simulation import Instruments, Moment, Ping
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
 
@@ -50,11 +50,7 @@ def map_origin(T_world_start: np.ndarray, instruments: Instruments) -> np.ndarra
 
 
 class MomentMessages:
-    """Fills in messages of any library, whose fields are named as in their definitions.
-
-    A moment whose numbers are arrays over n moments of a kind, poses (n, 4, 4), makes messages whose numbers are arrays
-    too: (n,) in place of a number, (n, k) in place of k of them.
-    """
+    """Fills in messages of any library, whose fields are named as in their definitions."""
 
     def __init__(self, make: Callable[[str], Any], octets: Callable[[np.ndarray], Any]) -> None:
         """`make` returns an empty message of a type, package/Name; `octets` what a field uint8[] takes."""
@@ -85,7 +81,7 @@ class MomentMessages:
             return [joint]
         heading, depth = self._stamped("sensor_msgs/Imu", stamp, BASE_FRAME), self._make("std_msgs/Float64")
         _turn(heading.orientation, pose)
-        depth.data = -pose[..., 2, 3]
+        depth.data = -pose[2, 3]
         return [(topics.HEADING, heading), (topics.DEPTH, depth), joint]
 
     def transforms(self, transforms: List[Any]) -> Any:
@@ -108,13 +104,13 @@ class MomentMessages:
         message.angle = ping.angle
         message.intensities = self._octets(ping.strengths)
         message.maxrange_meters = max_range
-        message.range_resolution = max_range / ping.strengths.shape[-1]
+        message.range_resolution = max_range / len(ping.strengths)
         message.sensorAngle = tilt
         return message
 
     def _measured(self, moment: Moment, stamp: Any, instruments: Instruments, origin: np.ndarray) -> _Told:
         T_map_base = moment.truth.T_world_base.copy()
-        T_map_base[..., :3, 3] -= origin
+        T_map_base[:3, 3] -= origin
         truth = self._odometry(T_map_base, moment.truth.twist, stamp, MAP_FRAME)
         messages = [(topics.GROUND_TRUTH, truth)]
         if instruments is Instruments.DVL:
@@ -136,7 +132,7 @@ class MomentMessages:
 
     def _joint_state(self, tilt: float, stamp: Any) -> Any:
         message = self._stamped("sensor_msgs/JointState", stamp, "")
-        message.name, message.position = [SERVO_JOINT], np.stack([tilt], axis=-1)
+        message.name, message.position = [SERVO_JOINT], np.array([tilt])
         return message
 
     def _stamped(self, kind: str, stamp: Any, frame: str) -> Any:
@@ -146,19 +142,13 @@ class MomentMessages:
 
 
 def _shift(vector: Any, pose: np.ndarray) -> None:
-    vector.x, vector.y, vector.z = _by_axis(pose[..., :3, 3])
+    vector.x, vector.y, vector.z = pose[:3, 3].tolist()
 
 
 def _turn(quaternion: Any, pose: np.ndarray) -> None:
-    turns = quaternion_of(pose) if pose.ndim == 2 else quaternions_of(pose)
-    quaternion.x, quaternion.y, quaternion.z, quaternion.w = _by_axis(turns)
+    quaternion.x, quaternion.y, quaternion.z, quaternion.w = quaternion_of(pose).tolist()
 
 
 def _move(twist: Any, values: np.ndarray) -> None:
-    twist.linear.x, twist.linear.y, twist.linear.z = _by_axis(values[..., :3])
-    twist.angular.x, twist.angular.y, twist.angular.z = _by_axis(values[..., 3:])
-
-
-def _by_axis(values: np.ndarray) -> Any:
-    """Return the values of each axis, the last of `values`: numbers, or arrays over the moments."""
-    return values.tolist() if values.ndim == 1 else values.T
+    twist.linear.x, twist.linear.y, twist.linear.z = values[:3].tolist()
+    twist.angular.x, twist.angular.y, twist.angular.z = values[3:].tolist()

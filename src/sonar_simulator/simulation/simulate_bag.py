@@ -5,7 +5,7 @@ import sys
 import time
 from argparse import Namespace
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Sequence
 
 import numpy as np
 import yaml
@@ -16,9 +16,9 @@ from node_support.files import package_folder, whole_file
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import ParameterError
-from recordings.bags.bag_writer import BagWriter, PackedMessages
+from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
 from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
-from sonar_simulator.simulation.simulation import Drive, Moment, stacked
+from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup, make_setup
 from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription, tilted
 
@@ -51,36 +51,17 @@ class SimulatedBag:
         told.data = _told(self._settings)
         self._write(_SETTINGS_TOPIC, told, stamp_ns)
 
-    def add(self, moments: Sequence[Moment]) -> None:
-        """Write everything that belongs to moments, one after the other; the transforms of a moment are one message."""
-        kinds: Dict[Tuple[bool, bool], List[int]] = {}
-        for number, moment in enumerate(moments):
-            kinds.setdefault((moment.is_tick, moment.ping is not None), []).append(number)
-        packed: Dict[int, Tuple[List[PackedMessages], int]] = {}
-        for numbers in kinds.values():
-            topics_of_kind = self._packed(stacked([moments[number] for number in numbers]))
-            packed.update((number, (topics_of_kind, place)) for place, number in enumerate(numbers))
-        for number in range(len(moments)):
-            topics_of_kind, place = packed[number]
-            for messages in topics_of_kind:
-                self._bag.append(messages, place)
-
-    def _packed(self, moment: Moment) -> List[PackedMessages]:
-        """Return the messages of moments of a kind, topic by topic."""
-        stamps_ns = np.array([_stamp_ns(seconds) for seconds in moment.time.tolist()])
-        stamp = self._bag.time(stamps_ns)
-        instruments = self._settings.simulator.instruments
+    def add(self, moment: Moment) -> None:
+        """Write everything that belongs to a moment; its transforms are one message."""
+        stamp_ns = _stamp_ns(moment.time)
+        stamp, instruments = self._bag.time(stamp_ns), self._settings.simulator.instruments
         messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments, self._origin)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
-        messages[0][1].transforms.append(self._mounts(moment.tilt, stamp))
-        return [self._bag.pack(_name(topic), message, stamps_ns) for topic, message in messages]
-
-    def _mounts(self, tilts: np.ndarray, stamp: Any) -> Any:
-        """Return the sonar's mount at each of the tilts (n,) as one message."""
-        angles, places = np.unique(tilts, return_inverse=True)
-        poses = np.array([tilted(self._setup.T_base_sonar, angle) for angle in angles])
-        return self._messages.transform(poses[places], stamp, BASE_FRAME, SONAR_FRAME)
+        mount = tilted(self._setup.T_base_sonar, moment.tilt)
+        messages[0][1].transforms.append(self._messages.transform(mount, stamp, BASE_FRAME, SONAR_FRAME))
+        for topic, message in messages:
+            self._write(topic, message, stamp_ns)
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
         self._bag.write(_name(topic), message, stamp_ns)
@@ -102,17 +83,16 @@ def write_bag(
 ) -> int:  # fmt: skip
     """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
 
-    `tell` receives the simulated time [s] from time to time. Raises OSError.
+    `tell` receives the simulated time [s] of each moment. Raises OSError.
     """
     beams = 0
     with whole_file(path) as temporary, BagWriter(temporary, compression) as bag:
         writer = SimulatedBag(bag, setup, settings)
         writer.begin(robot)
-        for moments in setup.simulation.batches(settings.simulator.clock_rate, BEAMS_AT_ONCE):
-            if moments:
-                writer.add(moments)
-                beams += sum(moment.ping is not None for moment in moments)
-                tell(moments[-1].time)
+        for moment in setup.simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
+            writer.add(moment)
+            beams += moment.ping is not None
+            tell(moment.time)
     return beams
 
 
@@ -123,7 +103,6 @@ def _told(settings: Settings) -> str:
     return yaml.safe_dump({**values, **files}, sort_keys=False)
 
 
-COMPRESSIONS = ("none", "lz4", "bz2")
 _EPILOG = """\
 examples:
   simulate_bag --world basin --out basin.bag

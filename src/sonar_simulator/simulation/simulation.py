@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from itertools import chain
 from typing import Iterator, List, Optional, Sequence, Union
 
 import numpy as np
@@ -101,28 +100,6 @@ class Moment:
     ping: Optional[Ping] = None
 
 
-def stacked(moments: Sequence[Moment]) -> Moment:
-    """Return moments of one kind, n > 0, as one whose numbers are arrays over them; all are ticks or none, and the same
-    for pings, which have equally many bins.
-    """
-    first = moments[0]
-    ping = None
-    if first.ping is not None:
-        pings = [moment.ping for moment in moments]
-        ping = Ping(np.array([one.angle for one in pings]), np.array([one.strengths for one in pings]))
-    truth = VehicleState(
-        np.array([moment.truth.T_world_base for moment in moments]),
-        np.array([moment.truth.twist for moment in moments]),
-        np.array([moment.truth.is_still for moment in moments]),
-    )
-    estimate = Estimate(
-        np.array([moment.odometry.T_odom_base for moment in moments]),
-        np.array([moment.odometry.twist for moment in moments]),
-    )
-    times, tilts = np.array([(moment.time, moment.tilt) for moment in moments]).T
-    return Moment(times, truth, estimate, tilts, first.is_tick, ping=ping)
-
-
 class Simulation:
     """Runs once, forwards. Ticks come at a steady rate, pings when the head sends them."""
 
@@ -149,19 +126,15 @@ class Simulation:
         With `beams_at_once` > 1, moments are held back until that many beams can be cast together. This is faster, and
         draws random numbers in a different order.
         """
-        return chain.from_iterable(self.batches(tick_rate, beams_at_once))
-
-    def batches(self, tick_rate: float, beams_at_once: int) -> Iterator[List[Moment]]:
-        """Yield the same moments, those together whose beams are cast together."""
         waiting: List[Moment] = []
         beams = 0
         for moment in self._unheard(tick_rate):
             waiting.append(moment)
             beams += int(moment.head_angle is not None)
             if beams in (0, beams_at_once):
-                yield self._heard(waiting)
+                yield from self._heard(waiting)
                 waiting, beams = [], 0
-        yield self._heard(waiting)
+        yield from self._heard(waiting)
 
     def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
         """Return the state at `time`, not before that of the last call, with a beam still to be simulated."""

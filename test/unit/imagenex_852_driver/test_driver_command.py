@@ -11,18 +11,10 @@ from imagenex_852_driver.protocol.reply import FrameError, ReplyKind
 
 def test_the_bytes_are_those_of_the_thesis_table():
     command = SwitchCommand(
-        max_range=50,
-        reverse=True,
-        start_gain_db=12,
-        absorption_centi_db_per_m=20,
-        train_angle_deg=-30,
-        sector_width_deg=90,
-        step_size_deg=6,
-        pulse_length_us=100,
-        data_points=250,
-        switch_delay_ms=10,
+        max_range=50, reverse=True, start_gain_db=12, absorption_centi_db_per_m=20, train_angle_deg=-30,
+        sector_width_deg=90, step_size_deg=6, pulse_length_us=100, data_points=250, switch_delay_ms=10,
         frequency_khz=850,
-    )
+    )  # fmt: skip
     expected = "fe441032004000000c00143c1e02640000000019000000000501fd"
     assert command.encode() == bytes.fromhex(expected)
 

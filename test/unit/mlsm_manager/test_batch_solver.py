@@ -1,38 +1,35 @@
 """The batch solver: loops that it closes, further fits of a run, and fits of its parts."""
 
-from dataclasses import fields, replace
+from dataclasses import fields
 
 import numpy as np
 import pytest
-from made_harbour import selected, that_heard, tour
+from made_harbour import SONAR_IN_BASE, that_heard, tour
+from made_loops import astray
 from made_models import followed, solver_parameters
 
 from mlsm_manager.joint_solver.batch_solver import LoopClosure, solved, solved_part, with_loops_closed
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.normal_equations import DELAY, RUN_COLUMNS
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
-from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import inverse, transformed
 
 pytestmark = pytest.mark.long
 dear = pytest.mark.newest_only("dear; the first loop is looked for and found with every version")
 
-DEAF = range(15, 25)  # scans that hear nothing, while the odometry goes astray
-RETURNED = slice(26, None)  # nodes of the scans after these
+RETURNED = slice(26, None)  # nodes of the scans after the deaf ones
+RESUMED = 20  # scans
 
 
-def astray(made, drift):
-    """Return the scans of a tour, and its odometry, which drifts by `drift` (2,) [m] while nothing is heard."""
-    start, end = (made.scans[number].reference_time for number in (DEAF[0], DEAF[-1]))
-    share = np.clip((made.odometry.times - start) / (end - start), 0.0, 1.0)[:, np.newaxis]
-    track = Track(made.odometry.times, made.odometry.poses + share * np.append(drift, 0.0))
-    return [_heard_by(scan, number, track) for number, scan in enumerate(made.scans)], track
-
-
-def _heard_by(scan, number, track):
-    points = transformed(track.at(scan.times), transformed(inverse(scan.track.at(scan.times)), scan.points))
-    return selected(replace(scan, points=points, track=track), np.full(len(points), number not in DEAF))
+def not_found_live(scans):
+    """Return a live solver after `scans` that closed no loop itself, because it was stored and resumed on the way."""
+    parameters = solver_parameters(sonar_delay_deviation=1.0)
+    begun = followed(scans[:RESUMED])
+    solver = LiveSolver.resumed(parameters, SONAR_IN_BASE, scans[:RESUMED], begun.stored())
+    for scan in scans[RESUMED:]:
+        solver.add(scan)
+    return solver
 
 
 def errors(solver, batch, track, made):
@@ -45,7 +42,7 @@ def errors(solver, batch, track, made):
 def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift):
     made = tour(40)
     scans, track = astray(made, np.array(drift))
-    solver = followed(scans)
+    solver = not_found_live(scans)
     without = solved(solver)
     found = with_loops_closed(solver, without)
     assert errors(solver, without, track, made).mean() > 5.0

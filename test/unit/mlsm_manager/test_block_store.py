@@ -29,9 +29,9 @@ def test_it_finds_what_a_dict_finds(batches):
     index, expected = CellIndex(0), {}
     for batch in batches:
         slots = index.slots(_keys(batch))
-        assert index.heads[slots].tolist() == [expected.get(cell, NO_BLOCK) for cell in batch]
+        assert index.heads.values[slots].tolist() == [expected.get(cell, NO_BLOCK) for cell in batch]
         numbers = np.arange(len(batch)) + len(expected)
-        index.heads[slots] = numbers
+        index.heads.values[slots] = numbers
         expected.update(zip(batch, numbers.tolist()))
 
 
@@ -44,7 +44,7 @@ def test_a_large_table_grows_in_pieces_and_loses_nothing(at_once):
     for start in range(0, len(keys), at_once):
         part = keys[start : start + at_once]
         slots = index.slots(part)
-        index.heads[slots] = np.arange(start, start + len(part))
+        index.heads.values[slots] = np.arange(start, start + len(part))
         sizes.append(index.nbytes)
     assert index.find(keys).tolist() == list(range(len(keys)))
     growth = np.diff(sizes) / sizes[:-1]

@@ -9,17 +9,19 @@ from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solution_of, solver_parameters
 
-from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, Neighbours, Pairs, summed
-from mlsm_manager.joint_solver.compiled_comparisons import scattered_terms, weighed_pairs
+from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, Neighbours, summed
+from mlsm_manager.joint_solver.compiled_comparisons import Limits, Pairs, Surfaces, scattered_terms, weighed_pairs
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
 from mlsm_manager.joint_solver.odometry_log import as_complex
-from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.placement import PlacedPoints, solved_path
 from mlsm_manager.joint_solver.surface_points import ramp
+from mlsm_manager.joint_solver.weak_directions import discounted
 from node_support.geometry import rotated
 
 SAME = 1e-9
 STEP = 1e-6
+PLACES = 3 * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of the four nodes of a pair
 MODELS = [DVL, THRUSTERS, HEADING, UNAIDED]
 
 
@@ -43,12 +45,15 @@ def some_points(rng, count, scans):
 
 
 def linearised(pairs, sources, targets):
-    """Return residuals (m,) along the targets' normals per unit of range scale, and their derivatives (m, 14)."""
+    """Return residuals (m,) along the targets' normals per unit of range scale, and their derivatives (m, 14).
+
+    The targets' normals turn with them.
+    """
     i, j = pairs.rows, pairs.neighbours
-    normals = targets.normals[j]
-    residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], normals)
+    normals, apart = targets.normals[j], sources.places[i] - targets.places[j]
+    residual = np.einsum("na,na->n", apart, normals)
     late, later = sources.shares[i, np.newaxis], targets.shares[j, np.newaxis]
-    by_source, by_target = by_pose(sources.arms[i], normals), -by_pose(targets.arms[j], normals)
+    by_source, by_target = by_pose(sources.arms[i], normals), -by_pose(targets.arms[j] + apart, normals)
     by_run = np.einsum("nar,na->nr", sources.by_run[i] - targets.by_run[j], normals)
     by_run[:, RANGE_SCALE] -= residual
     parts = [(1.0 - late) * by_source, late * by_source, (1.0 - later) * by_target, later * by_target, by_run]
@@ -101,6 +106,25 @@ def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
     np.testing.assert_allclose(change / STEP, jacobian[:, column], atol=1e-4)
 
 
+@pytest.mark.parametrize("normal_deviation", [0.0, 0.2])
+def test_comparisons_do_not_tell_how_the_whole_map_is_turned(log, normal_deviation):
+    rng, solution, parameters = (
+        np.random.RandomState(2),
+        solution_of(log, MODELS[0], some_state(log)),
+        solver_parameters(),
+    )
+    points, places = solution.placed(log.rows(0, 3)), solution.node_places(np.arange(log.scan_count + 1))
+    rows = np.arange(len(points))
+    pairs = Pairs(rows, rng.permutation(rows), np.ones(len(rows)))
+    scans, others, information, gradient = summed(pairs, points, points, parameters, parameters.cut)
+    left, _ = discounted(information, gradient, scans, PLACES, normal_deviation)
+    turn = np.column_stack([-places[:, 1], places[:, 0], np.ones(len(places))])
+    nodes = np.stack([scans, scans + 1, others, others + 1], axis=1)
+    turned = np.pad(turn[nodes].reshape(len(scans), -1), ((0, 0), (0, 2)), mode="constant")
+    told = np.einsum("gab,gb->ga", left, turned)
+    np.testing.assert_allclose(told, 0.0, atol=SAME * np.abs(information).max() * np.abs(turned).max())
+
+
 def placed_by_numpy(log, odometry, state, rows):
     """Return places, arms, normals and shares of points between two nodes each."""
     points, scans = log.points(rows), log.scans(rows)
@@ -130,6 +154,18 @@ def test_points_lie_on_the_path_whatever_the_odometry_tells(log, odometry, delay
         np.testing.assert_allclose(getattr(found, name), expected, rtol=SAME, atol=close, err_msg=name)
 
 
+@pytest.mark.parametrize("odometry", MODELS, ids=lambda model: type(model).__name__)
+def test_the_path_goes_on_beyond_the_nodes_as_the_odometry_does(log, odometry):
+    nodes, ends = some_state(log, odometry).nodes[1:3], log.node_times[1:3]
+    beyond = ends + np.array([-2.0, 2.0])
+    reference, gain = odometry.reference(log.odometry.motion(np.append(ends, beyond))), odometry.gain(nodes)
+    steps = [gain.mean(), gain[1]] * np.exp(1j * nodes[:, 2]) * (reference[2:] - reference[:2])
+    at_ends, found = (solved_path(log.odometry, odometry, ends, nodes, times) for times in (ends, beyond))
+    np.testing.assert_allclose(as_complex(found - at_ends), steps, atol=1e-9)
+    turns = (log.odometry.at(beyond) - log.odometry.at(ends))[:, 2]
+    np.testing.assert_allclose((found - at_ends)[:, 2], turns, atol=1e-12)
+
+
 def test_no_points_lie_nowhere(log):
     nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.rows(0, 0))
     assert [len(getattr(nothing, field.name)) for field in fields(nothing)] == [0] * len(fields(nothing))
@@ -157,10 +193,8 @@ def test_comparisons_fade_out_with_distance_and_angle(seed, count):
     limits = (parameters.cut, FADING * parameters.cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
     expected = shares * ramp(distance, *limits[:2]) * ramp(cosine, *limits[2:])
     expected = expected * sources.qualities[rows] * targets.qualities[neighbours]
-    found = weighed_pairs(
-        rows, neighbours, distance, shares, sources.normals, sources.qualities, targets.normals, targets.qualities,
-        *limits,
-    )  # fmt: skip
+    own, others = (Surfaces(points.normals, points.qualities) for points in (sources, targets))
+    found = weighed_pairs((rows, neighbours, distance, shares), own, others, Limits(*limits))
     kept = expected > 0.0
     np.testing.assert_array_equal(found[0], rows[kept])
     np.testing.assert_array_equal(found[1], neighbours[kept])

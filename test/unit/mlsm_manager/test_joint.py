@@ -1,19 +1,24 @@
 """The joint estimator: matching on and off, lost and found, and clouds that wait."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
-from mlsm_manager.localisation.odometry_profiles import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import composed, inverse, transformed
 
 SCANS = tour(12).scans
 PARAMETERS = MlsmCoreParameters(
     estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
     speed_deviation=0.025, rate_correlation_time=12.0, heading_deviation=0.0175, size_x_meters=0.0, size_y_meters=0.0,
 )  # fmt: skip
+HEADING = profile_values(OdometryKind.HEADING)
 
 
 def localiser_after(count, **changes):
@@ -76,6 +81,14 @@ def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
     assert (localiser.blocks.mean[:, :2] <= high + 1e-6).all()
 
 
+def test_points_beyond_the_limit_are_counted_before_anybody_looks_at_the_map():
+    limit = float(np.median(np.abs(SCANS[1].points[:, :2]).max(axis=1)))
+    localiser, _ = localiser_after(1, map_limit=limit)
+    (update,) = localiser.take_scan(SCANS[1]).clouds
+    assert update.report.outside == pytest.approx(len(SCANS[1]) / 2, rel=0.1)
+    assert update.report.inserted + update.report.outside == len(SCANS[1])
+
+
 def test_a_long_silence_is_followed_by_the_odometry():
     localiser, _ = localiser_after(3)
     later = SCANS[8].reference_time
@@ -104,7 +117,7 @@ def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
 
 
 def test_late_beams_make_it_wait_for_odometry():
-    assert localiser_after(0)[0].lookahead == 0.0
+    assert localiser_after(0, sonar_delay_deviation=0.0)[0].lookahead == 0.0
     assert localiser_after(0, sonar_delay_deviation=0.1)[0].lookahead == pytest.approx(0.3)
 
 
@@ -128,3 +141,55 @@ def test_a_stored_map_gives_its_free_space_back(run):
     other, _ = localiser_after(0)
     other.restore(stored, same_odometry=False)
     assert len(other.free) == len(localiser.free)
+
+
+def without_positions(scan):
+    """Return a scan of a vehicle that reports its heading only."""
+    track = Track(scan.track.times, scan.track.poses * [0.0, 0.0, 1.0])
+    move = composed(track.at(scan.times), inverse(scan.track.at(scan.times)))
+    return replace(scan, points=transformed(move, scan.points), track=track)
+
+
+def test_where_positions_never_change_the_compass_is_taken_for_all_there_is():
+    found, named = (PARAMETERS.changed(values).build_localiser(SONAR_IN_BASE) for values in ({}, HEADING))
+    for scan in SCANS:
+        found.take_scan(without_positions(scan))
+        named.take_scan(without_positions(scan))
+    assert found.odometry == "HEADING, because positions never change"
+    np.testing.assert_allclose(found.estimator.belief.theta, named.estimator.belief.theta, atol=1e-9)
+    assert found.block_count == named.block_count
+
+
+def test_a_vehicle_that_first_turned_on_the_spot_is_not_taken_for_one_without_positions():
+    localiser = PARAMETERS.build_localiser(SONAR_IN_BASE)
+    localiser.take_scan(without_positions(SCANS[0]))
+    assert localiser.odometry.startswith("HEADING")
+    for scan in SCANS[1:]:
+        localiser.take_scan(scan)
+    assert "HEADING" not in localiser.odometry
+
+
+def test_positions_made_from_estimated_velocities_prove_nothing():
+    localiser = PARAMETERS.build_localiser(SONAR_IN_BASE)
+    for scan in SCANS[:4]:
+        localiser.take_scan(without_positions(scan))
+    localiser.take_scan(SCANS[4])
+    assert localiser.odometry.startswith("HEADING")
+
+
+def test_a_run_that_was_found_to_have_no_positions_goes_on_after_a_restart():
+    localiser = PARAMETERS.build_localiser(SONAR_IN_BASE)
+    for scan in SCANS[:4]:
+        localiser.take_scan(without_positions(scan))
+    again = PARAMETERS.build_localiser(SONAR_IN_BASE)
+    assert again.restore(localiser.stored("map", {}, 0.0, "run"), same_odometry=True) == ""
+    again.take_scan(without_positions(SCANS[4]))
+    assert again.odometry.startswith("HEADING")
+    assert again.estimator.solver.log.scan_count == 5
+
+
+def test_a_named_odometry_is_not_asked_for():
+    localiser = PARAMETERS.changed({"odometry": OdometryKind.DVL}).build_localiser(SONAR_IN_BASE)
+    for scan in SCANS[:3]:
+        localiser.take_scan(without_positions(scan))
+    assert localiser.odometry == ""

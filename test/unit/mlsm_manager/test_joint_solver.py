@@ -11,6 +11,7 @@ from mlsm_manager.joint_solver.batch_solver import solved
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import DIRECTION, DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DELAY
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.placement import solved_path
 from node_support.errors import RefusedInput
 from node_support.geometry import composed
@@ -63,7 +64,7 @@ def test_direction_and_delay_are_found(live, batch):
 
 
 def test_batch_is_closer_to_the_truth_than_live(made, live, batch, ends, path):
-    fitted = solved_path(made.odometry, live.odometry, batch.node_times, batch.state.nodes, ends)
+    fitted = solved_path(OdometryLog.of(made.odometry), live.odometry, batch.node_times, batch.state.nodes, ends)
     assert distances(fitted, made.truth, ends).mean() < min(0.3, distances(path, made.truth, ends).mean())
 
 

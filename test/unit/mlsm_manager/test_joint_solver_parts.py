@@ -17,7 +17,7 @@ from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEqua
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 
 
 @pytest.fixture(scope="module")
@@ -94,7 +94,7 @@ def test_an_error_of_what_is_held_passes_on_to_what_hangs_on_it():
     equations = NormalEquations(1, held=1)
     equations.add(np.array([[0, 1]]), np.array([[1.0, -1.0]]), np.zeros(1), np.array([4.0]))
     solution = DenseSolution(equations)
-    assert solution.covariance(np.array([0]), np.array([[9.0]]))[0, 0] == pytest.approx(0.25 + 9.0)
+    assert solution.covariances(np.array([[0]]), np.array([[9.0]]))[0][0, 0, 0] == pytest.approx(0.25 + 9.0)
 
 
 def wall(count=30):
@@ -125,6 +125,37 @@ def test_a_beam_that_heard_nothing_does_not_change_the_reach():
 def test_points_all_along_one_echo_share_its_weight():
     times, ranges = np.array([2.0, 1.0, 2.0, 2.0, 1.0, 2.0]), np.array([11.0, 5.0, 10.0, 12.0, 40.0, 30.0])
     np.testing.assert_array_equal(points_per_echo(times, ranges), [3.0, 1.0, 3.0, 3.0, 1.0, 1.0])
+
+
+def drawn_along(scan, points):
+    """Return a scan in which each echo is so many points, a metre apart along the beam."""
+    sights = scan.points * [1.0, 1.0, 0.0, 0.0]
+    metre = sights / np.hypot(*sights[:, :2].T)[:, np.newaxis]
+    places = np.concatenate([scan.points + step * metre for step in range(points)])
+    times, moving = np.tile(scan.times, points), np.tile(scan.moving, points)
+    return Scan(places, times, moving, scan.track, scan.reference_time)
+
+
+def test_echoes_that_are_drawn_as_several_points_are_plateaus():
+    scans = heard(3)
+    assert not logged(scans).has_plateaus
+    assert logged([drawn_along(scan, 3) for scan in scans]).has_plateaus
+    assert not logged([]).has_plateaus
+
+
+def test_plateaus_make_the_scale_of_ranges_less_certain_unless_it_is_calibrated():
+    peaks, plateaus = logged(heard(3)), logged([drawn_along(scan, 3) for scan in heard(3)])
+    unknown, calibrated = solver_parameters(), solver_parameters(plateau_scale_deviation=0.0)
+    assert [unknown.run_deviations(log)[0] for log in (peaks, plateaus)] == [0.02, 0.05]
+    assert [calibrated.run_deviations(log)[0] for log in (peaks, plateaus)] == [0.02, 0.02]
+
+
+def test_a_scan_that_is_taken_back_and_a_run_that_begins_later_do_not_count():
+    first, second = heard(2)
+    log = logged([first, drawn_along(second, 6)])
+    assert (log.has_plateaus, log.since(1).has_plateaus) == (True, True)
+    log.remove_newest()
+    assert not log.has_plateaus
 
 
 @given(st.lists(st.tuples(st.integers(0, 3), st.floats(0.0, 50.0)), max_size=20), st.randoms())

@@ -24,11 +24,9 @@ class MovedBy:
 
     shift: float
 
-    def points(self, cloud):
-        return cloud.points + np.array([0.0, self.shift, 0.0, 0.0])
-
-    def origins(self, cloud):
-        return np.tile(ORIGIN + np.array([0.0, self.shift]), (len(cloud), 1))
+    def heard(self, cloud):
+        origins = np.tile(ORIGIN + np.array([0.0, self.shift]), (len(cloud), 1))
+        return cloud.points + np.array([0.0, self.shift, 0.0, 0.0]), origins
 
 
 def patch(number):
@@ -68,7 +66,7 @@ def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
             shown.insert(inserted[-1])
     place = MovedBy(0.3 * last)
     shown.settle(place)
-    assert_same(shown.map.blocks, made_at_once(*inserted, *(place.points(keyframe) for keyframe in keyframes)))
+    assert_same(shown.map.blocks, made_at_once(*inserted, *(place.heard(keyframe)[0] for keyframe in keyframes)))
     assert shown.moving == []
 
 
@@ -84,13 +82,7 @@ def test_a_settled_keyframe_stays_where_it_was_drawn():
     shown.draw(MovedBy(0.0), settled_until=1.0)
     assert len(shown.moving) == 1
     shown.draw(MovedBy(50.0), settled_until=1.0)
-    assert_same(shown.map.blocks, made_at_once(patch(1).points, MovedBy(50.0).points(patch(2))))
-
-
-@pytest.mark.parametrize("settled_until", [NEVER, np.inf])
-def test_the_report_is_that_of_the_newest_keyframe(settled_until):
-    shown = map_of(1, 2)
-    assert shown.draw(MovedBy(2.0 * LIMIT), settled_until).report.outside == len(patch(2))
+    assert_same(shown.map.blocks, made_at_once(patch(1).points, MovedBy(50.0).heard(patch(2))[0]))
 
 
 def with_three_keyframes():
@@ -105,15 +97,15 @@ def with_three_keyframes():
 def test_a_copy_ends_at_a_time_and_leaves_the_map_as_it_was():
     shown, placement = with_three_keyframes(), MovedBy(2.0)
     older = shown.drawn_until(1.0, placement)
-    assert_same(older.blocks, made_at_once(patch(0).points, placement.points(patch(1))))
-    everything = [patch(0).points, placement.points(patch(1)), placement.points(patch(2))]
+    assert_same(older.blocks, made_at_once(patch(0).points, placement.heard(patch(1))[0]))
+    everything = [patch(0).points, placement.heard(patch(1))[0], placement.heard(patch(2))[0]]
     assert_same(shown.map.blocks, made_at_once(*everything))
 
 
 def test_what_is_settled_until_a_time_forgets_the_keyframes_after_it():
     shown = with_three_keyframes()
     shown.settle(MovedBy(2.0), 1.0)
-    assert_same(shown.map.blocks, made_at_once(patch(0).points, MovedBy(2.0).points(patch(1))))
+    assert_same(shown.map.blocks, made_at_once(patch(0).points, MovedBy(2.0).heard(patch(1))[0]))
     assert not shown.moving
 
 
@@ -148,9 +140,9 @@ def test_what_is_settled_is_as_if_every_keyframe_had_carved_once_from_its_last_p
     shown.settle(place)
     occupied, free = MultiLevelSurfaceMap(RESOLUTION, LIMIT), MultiLevelSurfaceMap(RESOLUTION, LIMIT)
     for keyframe in clouds:
-        points = place.points(keyframe)
+        points, origins = place.heard(keyframe)
         occupied.insert(points)
-        beams = FirstEchoes.of_level(points, keyframe.times, place.origins(keyframe))
+        beams = FirstEchoes.of_level(points, keyframe.times, origins)
         CARVER.carve(occupied, free, beams, points)
     assert cells(shown.map.blocks) == cells(occupied.blocks)
     assert cells(shown.free.blocks) == cells(free.blocks)
@@ -196,7 +188,7 @@ def test_it_is_there_again_when_they_turn_out_to_have_looked_beside_it():
 
 def test_it_is_gone_for_ever_when_they_are_settled():
     shown = crossed_wall(7)
-    assert shown.draw(MovedBy(0.0), settled_until=np.inf).carved.removed == 1
+    assert shown.draw(MovedBy(0.0), settled_until=np.inf).removed == 1
     assert cells(shown.map.blocks) == [(40, 0)]
 
 
@@ -211,7 +203,9 @@ def test_a_block_that_is_heard_again_stays():
 
 def test_what_is_inserted_in_between_keeps_the_keyframes_in_the_map():
     shown = carved_map(cloud(1, (10.25, 0.25)), place=MovedBy(0.0))
-    shown.insert_cloud(np.array([[0.25, 9.25, -2.0, 50.0]]), np.array([2.0]), ORIGIN[np.newaxis])
+    points = np.array([[0.25, 9.25, -2.0, 50.0]])
+    shown.insert(points)
+    shown.carve(points, np.array([2.0]), ORIGIN[np.newaxis])
     assert cells(shown.map.blocks) == [(0, 18), (20, 0)]
     assert {(0, 9), (9, 0)} <= set(cells(shown.free.blocks))
 
@@ -219,5 +213,5 @@ def test_what_is_inserted_in_between_keeps_the_keyframes_in_the_map():
 def test_nothing_is_carved_without_a_carver():
     shown = KeyframeMap(RESOLUTION, LIMIT)
     shown.add(cloud(1, (10.25, 0.25)))
-    assert shown.draw(MovedBy(0.0), np.inf).carved is None
+    assert shown.draw(MovedBy(0.0), np.inf) is None
     assert len(shown.free.blocks) == 0

@@ -100,17 +100,24 @@ def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
 
 
 def test_plain_keys_stay_as_they_are_and_those_for_experts_may_stand_under_a_key_of_their_own():
-    assert replay_values({"min_points": 20, "expert": {"free_scans": 30}}) == ({"min_points": 20, "free_scans": 30}, [])
+    assert replay_values({"carve": False, "expert": {"free_scans": 30}}) == ({"carve": False, "free_scans": 30}, [])
 
 
 def test_a_file_of_an_older_version_is_taken_and_its_keys_are_named():
-    old = {"mlsm_core": {"solver_kernel": "NUMPY", "matcher": "DISTRIBUTIONS", "rate_time": 20.0, "free_scans": 30}}
+    old = {
+        "mlsm_core": {
+            "solver_kernel": "NUMPY", "matcher": "DISTRIBUTIONS", "rate_time": 20.0, "free_scans": 30,
+            "estimator": "SCAN_BY_SCAN", "expert": {"min_agreement": 0.0},
+        }
+    }  # fmt: skip
     values, remarks = replay_values(old)
-    assert values == {"free_scans": 30, "rate_correlation_time": 20.0}
+    assert values == {"free_scans": 30, "rate_correlation_time": 20.0, "estimator": "JOINT"}
     assert [remark.split(" (")[0] for remark in remarks] == [
+        "min_agreement -> nothing",
         "solver_kernel -> nothing",
         "matcher -> nothing",
         "rate_time -> rate_correlation_time",
+        "estimator = SCAN_BY_SCAN -> JOINT",
     ]
 
 
@@ -150,12 +157,12 @@ def test_launch_files_load_it_over_the_nodes_own(launch, written):
 
 
 def test_without_it_the_nodes_own_hold():
-    assert launched("mapping.launch")["/mlsm_core/sonar_delay_deviation"] == 0.0
+    assert launched("mapping.launch")["/mlsm_core/sonar_delay_deviation"] == 1.0
 
 
 def test_an_argument_goes_before_it(written):
-    assert launched("mapping.launch", f"parameters:={written}", "estimator:=SCAN_BY_SCAN")["/mlsm_core/estimator"] == (
-        "SCAN_BY_SCAN"
+    assert launched("mapping.launch", f"parameters:={written}", "estimator:=THESIS")["/mlsm_core/estimator"] == (
+        "THESIS"
     )
 
 
@@ -175,6 +182,7 @@ def test_live_yaml_holds_it_on_top_of_what_was_set_before():
     after = ReplayParameters.from_mapping(replay_values(yaml.safe_load(text))[0])
     assert (after.range_scale, after.sonar_delay) == (pytest.approx(0.918), pytest.approx(0.75))
     assert (after.range_scale_deviation, after.sonar_delay_deviation) == (0.008, 0.05)
+    assert after.plateau_scale_deviation == 0.0
     assert (after.odometry_scale, after.odometry_direction) == (0.01, -0.07)
 
 

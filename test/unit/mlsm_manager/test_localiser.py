@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from benchmarks.matchers import BEAM_WIDTH
 from benchmarks.open_water import bubbles, outcome
 from made_scans import SECONDS, drifting, elsewhere, harbour, scan_of, still, wall
 
@@ -9,13 +10,8 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, LocaliserParameters, MlsmCoreParameters
-from mlsm_manager.localisation.scan_by_scan import ScanByScan
-from mlsm_manager.scan_matching.distribution_matcher import (
-    DistributionMatcher,
-    DistributionMatcherParameters,
-    relocalised,
-    relocaliser,
-)
+from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
+from mlsm_manager.scan_matching.distribution_matcher import EVERYWHERE, NEARBY, DistributionMatcher, relocalised
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchStatus
 from node_support.errors import RefusedInput
@@ -46,7 +42,7 @@ def test_the_correction_moves_to_a_fix_within_the_blend_time():
 
 @with_every_estimator
 def test_where_cleaned_clouds_make_the_map_they_wait_for_the_scan_of_their_time(estimator):
-    localiser = MlsmCoreParameters(start_matching=True, estimator=estimator).build_localiser()
+    localiser = MlsmCoreParameters(map_input=MapInput.CLEANED, estimator=estimator).build_localiser()
     localiser.take_scan(drifting(0))
     assert localiser.take_cloud(MapCloud.of_scan(drifting(1))).waiting
     assert localiser.block_count == 0
@@ -94,7 +90,7 @@ def test_a_long_silence_is_followed_by_the_odometry():
 
 
 def test_relocalisation_finds_the_newest_scan_anywhere_in_the_map():
-    localiser, _ = localiser_after(1)
+    localiser, _ = localiser_after(1, estimator=EstimatorName.THESIS)
     localiser.take_scan(scan_of(harbour(), still(), still((40.0, -70.0, 2.5)), start=SECONDS))
     update = localiser.relocalise()
     assert update.accepted, update.result.reason
@@ -124,14 +120,14 @@ def test_matching_is_turned_on_and_off(estimator):
 
 
 def test_other_settings_hold_from_the_next_scan_on():
-    localiser, _ = localiser_after(1)
-    localiser.use(PARAMETERS.changed({"min_points": 10000}).localiser_settings())
-    assert localiser.take_scan(drifting(1)).scan.result.status is MatchStatus.TOO_FEW_POINTS
+    localiser, _ = localiser_after(1, estimator="THESIS")
+    localiser.use(PARAMETERS.changed({"estimator": "THESIS", "error_threshold": 0.0}).localiser_settings())
+    assert localiser.take_scan(drifting(1)).scan.result.status is MatchStatus.DIVERGED
     assert localiser.block_count > 0
 
 
 def test_a_recording_and_a_live_node_that_matches_make_the_same_localiser():
-    live = MlsmCoreParameters(start_matching=True, map_input=MapInput.MATCHED, speed_deviation=0.05).build_localiser()
+    live = MlsmCoreParameters(speed_deviation=0.05).build_localiser()
     recorded, _ = localiser_after(3)
     for turn in range(3):
         live.take_scan(drifting(turn))
@@ -152,20 +148,21 @@ def test_under_an_odometry_without_stamps_a_fix_is_blended_in_and_then_holds():
     localiser = Localiser(PARAMETERS.build_localiser().estimator, PARAMETERS.localiser_settings(), clock)
     np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))
     localiser.take_scan(scan_of(harbour(), still()))
+    np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))
     localiser.take_scan(scan_of(harbour(), still((1.0, 0.0, 0.0)), still(), start=SECONDS))
     found = []
     for clock.now in (100.0, 100.5, 102.0, 5000.0):
         found.append(localiser.standing_correction(np.zeros(3))[0])
-    assert found[0] < found[1] < found[2] == found[3] == pytest.approx(1.0, abs=0.05)
+    assert abs(found[0]) < 1e-9 < found[1] < found[2] == found[3] == pytest.approx(localiser.last_correction[0])
     assert localiser.believed_until == 2 * SECONDS
 
 
-SETTINGS = MapSettings(0.5, 0.5, 1e4, 100, 15)
+SETTINGS = MapSettings(0.5, 0.5, 1e4, 100)
 
 
-def estimator_of(matching=True, **changes):
-    matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
-    estimator = ScanByScan(SETTINGS, OdometryErrors(speed_deviation=0.05), matcher)
+def estimator_of(matching=True):
+    matcher = DistributionMatcher(NEARBY, BEAM_WIDTH, 0.0)
+    estimator = ThesisEstimator(SETTINGS, OdometryErrors(speed_deviation=0.05), matcher)
     estimator.matching = matching
     return estimator
 
@@ -235,7 +232,7 @@ def test_an_empty_scan_is_rejected_and_nothing_breaks():
 
 def found(scan, estimator):
     """Return what the search in the whole map makes of a scan."""
-    matcher = relocaliser(DistributionMatcherParameters())
+    matcher = DistributionMatcher(EVERYWHERE, BEAM_WIDTH, 0.0)
     return relocalised(scan, estimator.matched.blocks, matcher, OdometryErrors())
 
 

@@ -10,9 +10,9 @@ import yaml
 from made_maps import map_with, random_map
 from PIL import Image
 
-from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd
+from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd, write_ply
 from mlsm_manager.surface_map.export.octomap import block_voxels, octree, write_octree
-from mlsm_manager.surface_map.export.pictures import ColorBy, bar_length, block_colors, box_mesh
+from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors, box_mesh
 from mlsm_manager.surface_map.export.rasters import (
     FREE,
     OCCUPIED,
@@ -24,7 +24,6 @@ from mlsm_manager.surface_map.export.rasters import (
     write_map_server,
 )
 from mlsm_manager.surface_map.map_file import ExportError, Layer, StoredMap
-from mlsm_manager.surface_map.ply_file import write_ply
 
 RESOLUTION = 0.5
 
@@ -180,11 +179,6 @@ def test_colours_are_from_0_to_1(occupied, by):
 def test_higher_blocks_have_other_colours():
     low, high = block_colors(_blocks((0.1, 0.1, -5.0), (1.1, 0.1, 0.0)), ColorBy.HEIGHT)
     assert np.abs(low - high).max() > 0.3
-
-
-@pytest.mark.parametrize(("width", "length"), [(100.0, 20.0), (80.0, 20.0), (7.9, 1.0), (8.0, 2.0), (0.3, 0.05)])
-def test_a_scale_bar_has_a_round_length(width, length):
-    assert bar_length(width) == pytest.approx(length)
 
 
 def test_a_box_is_as_large_as_its_block():

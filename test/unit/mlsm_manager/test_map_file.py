@@ -1,7 +1,6 @@
 """Maps as files: what is kept exactly, what is rounded, what no file may hold, and the folder of a user's maps."""
 
 import os
-import re
 import stat
 from dataclasses import replace
 
@@ -13,6 +12,7 @@ from made_maps import content, in_order, map_with, partition, random_map, stored
 
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.export.formats import write_ply
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.map_file import (
     Layer,
@@ -24,7 +24,6 @@ from mlsm_manager.surface_map.map_file import (
     write_map,
 )
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.ply_file import read_ply, write_ply
 
 MUTATIONS = 1000
 
@@ -198,53 +197,6 @@ def test_an_empty_map_is_a_file_without_vertices(tmp_path):
 def test_others_may_read_the_map(tmp_path, blocks):
     write_ply(tmp_path / "basin.ply", blocks)
     assert stat.S_IMODE((tmp_path / "basin.ply").stat().st_mode) == 0o644
-
-
-def test_a_map_comes_back_as_it_was_saved(tmp_path, blocks):
-    write_ply(tmp_path / "basin.ply", blocks)
-    read = read_ply(tmp_path / "basin.ply")
-    np.testing.assert_allclose(read.rows, blocks.rows, rtol=1e-12, atol=1e-12)
-    assert read.resolution == blocks.resolution
-
-
-@pytest.mark.parametrize("resolution", ["nan", "inf", "0", "-1", "half"])
-def test_a_resolution_that_no_map_has_is_refused(tmp_path, blocks, resolution):
-    path = tmp_path / "basin.ply"
-    write_ply(path, blocks)
-    path.write_bytes(path.read_bytes().replace(b"resolution 0.5 m", f"resolution {resolution} m".encode()))
-    with pytest.raises(ValueError, match=re.escape(f"{path}: resolution {resolution} m")):
-        read_ply(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "value", "fault"),
-    [
-        ("x", np.nan, "not finite"),
-        ("intensity", np.inf, "not finite"),
-        ("variance_y", -0.1, "negative variance"),
-        ("count", 0, "no points"),
-        ("z", 100.0, "not between bottom and top"),
-        ("type", 7, "unknown type"),
-    ],
-)
-def test_a_block_that_no_map_holds_is_refused(tmp_path, blocks, name, value, fault):
-    path = tmp_path / "basin.ply"
-    write_ply(path, blocks)
-    vertices = _read_ply(path)[1].copy()
-    vertices[name][3] = value
-    header = path.read_bytes().split(b"end_header\n", 1)[0]
-    path.write_bytes(header + b"end_header\n" + vertices.tobytes())
-    with pytest.raises(ValueError, match=f"1 of {len(blocks)} blocks have .*{fault}"):
-        read_ply(path)
-
-
-@pytest.mark.parametrize("change", [lambda data: data[:-1], lambda data: data + b"x", lambda data: data[5:]])
-def test_a_file_of_another_size_is_refused(tmp_path, blocks, change):
-    path = tmp_path / "basin.ply"
-    write_ply(path, blocks)
-    path.write_bytes(change(path.read_bytes()))
-    with pytest.raises(ValueError, match=r"basin\.ply"):
-        read_ply(path)
 
 
 @pytest.fixture

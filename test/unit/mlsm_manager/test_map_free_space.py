@@ -181,7 +181,7 @@ def test_free_space_begins_at_the_sonar_and_not_at_the_vehicles_origin(estimator
 
 @pytest.mark.parametrize("matching", [False, True])
 def test_a_sonar_that_is_placed_later_counts_from_then_on(matching):
-    localiser = localiser_of(EstimatorName.SCAN_BY_SCAN, start_matching=matching)
+    localiser = localiser_of(EstimatorName.THESIS, start_matching=matching)
     localiser.mount(np.array([8.0, 0.0]))
     localiser.take_scan(scan_of(wall((12.0, -2.0), (12.0, 2.0)), still()))
     assert localiser.free.centers[:, 0].min() == pytest.approx(8.0, abs=0.5)
@@ -231,7 +231,7 @@ def shown_in_order(estimator, cloud_first, carve, scans=9):
     scans: how many of the scans come at all.
     """
     parameters = MlsmCoreParameters(
-        estimator=estimator, start_matching=False, carve=carve,
+        estimator=estimator, start_matching=False, map_input=MapInput.CLEANED, carve=carve,
         crossings_least=2, crossings_per_point=1.0, free_scans=2,
     )  # fmt: skip
     localiser = parameters.build_localiser((0.0, 0.0))

@@ -8,13 +8,12 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_maps import in_order, map_with, partition, random_map, random_points, stored_map
+from made_maps import in_order, map_with, partition, random_points, stored_map
 from programs import ROOT
 
 from mlsm_manager.map_tool import run_map_tool
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map, write_map
 from mlsm_manager.surface_map.operations import LevelTransform, difference, merged, merged_blocks
-from mlsm_manager.surface_map.ply_file import write_ply
 
 
 @pytest.fixture
@@ -61,11 +60,6 @@ def test_export_of_a_slice_has_less_in_it(run, tmp_path):
     run("export a.mlsm all.pgm")
     run("export a.mlsm slice.pgm --slice -1 1")
     assert (tmp_path / "all.pgm").read_bytes().count(b"\0") > (tmp_path / "slice.pgm").read_bytes().count(b"\0") > 0
-
-
-def test_a_ply_of_this_package_is_a_map_too(run, tmp_path):
-    write_ply(tmp_path / "c.ply", random_map().blocks)
-    assert f"{len(random_map())} blocks" in run("info c.ply")
 
 
 def test_crop_keeps_what_lies_in_the_box(run, tmp_path):

@@ -1,13 +1,16 @@
-"""What the default matcher finds, how sure it says it is, when it refuses, and what it is made of."""
+"""What the matcher of single scans finds, how sure it says it is, when it refuses, and what it is made of."""
+
+from dataclasses import replace
 
 import numpy as np
 import pytest
+from benchmarks.matchers import BEAM_WIDTH
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_scans import DEVIATIONS, at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
 from scipy.stats import chi2
 
-from mlsm_manager.scan_matching.distribution_matcher import DistributionMatcher, DistributionMatcherParameters
+from mlsm_manager.scan_matching.distribution_matcher import NEARBY, DistributionMatcher
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.judgement import agreement
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
@@ -17,7 +20,7 @@ FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 
 
 def match(scan, target, expected, deviations=DEVIATIONS, **changes):
-    matcher = DistributionMatcher(DistributionMatcherParameters().changed(changes))
+    matcher = DistributionMatcher(replace(NEARBY, **changes), BEAM_WIDTH, 0.0)
     return matcher.match(scan, target, prior_of_pose(scan, expected, deviations))
 
 

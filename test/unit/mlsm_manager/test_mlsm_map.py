@@ -302,12 +302,6 @@ def test_lattices_whose_gaps_are_the_resolution_or_a_part_of_it(fraction, points
     assert_follows_the_literal_rule(_on_lattice(points, resolution * fraction), resolution, batches)
 
 
-@given(st.lists(st.integers(-12, 12), max_size=60), RESOLUTIONS, BATCHES)
-def test_one_crowded_column(levels, resolution, batches):
-    points = [(0.0, 0.0, level * resolution * 0.5, index) for index, level in enumerate(levels)]
-    assert_follows_the_literal_rule(points, resolution, batches)
-
-
 @pytest.mark.parametrize("batches", [1, 7, 1000])
 def test_a_scan_of_many_points(batches):
     rng = np.random.default_rng(0)

@@ -8,14 +8,14 @@ from made_harbour import ahead, logged, tour
 from made_models import DVL, HEADING, UNAIDED, solution_of, solver_parameters
 from made_posts import heard, true_path
 
-from mlsm_manager.joint_solver.comparisons import Pairs
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import misfit_variances, shares_heard_before
 from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.place_search import searched_node
-from mlsm_manager.joint_solver.placement import NodePath
+from mlsm_manager.joint_solver.placement import solved_path
 from node_support.geometry import transformed
 
 FAR = np.array([3.0, -5.0])
@@ -80,7 +80,7 @@ def test_the_path_of_a_heading_bends_between_nodes_as_the_heading_did(log):
     nodes[:, :2] = 0.2 * ahead_of_nodes - log.odometry.at(times)[:, :2]
     nodes[:, 3] = 0.2
     between = np.linspace(times[0], times[-1], 40)
-    path = NodePath(HEADING, log.odometry, times, nodes).at(between)
+    path = solved_path(log.odometry, HEADING, times, nodes, between)
     np.testing.assert_allclose(path[:, :2], 0.2 * log.odometry.motion(between).ahead, atol=1e-9)
 
 

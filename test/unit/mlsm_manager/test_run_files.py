@@ -16,8 +16,7 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.verdict import Verdict
-from mlsm_manager.surface_map.map_file import Layer, StoredMap
-from mlsm_manager.surface_map.ply_file import read_ply
+from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.geometry import composed, matrices
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.beam import Beam, PlacedBeam
@@ -42,7 +41,7 @@ def test_map_table_and_picture_are_written(tmp_path):
     write_run(tmp_path / "new", "a bag", RUN, Recording([], 0, TRACK, TRUTH))
     trajectories = {"trajectory.csv", "dead_reckoning.tum", "corrected.tum", "truth.tum"}
     assert {path.name for path in (tmp_path / "new").iterdir()} == {"map.mlsm", "map.ply", "map.png", *trajectories}
-    assert len(read_ply(tmp_path / "new/map.ply")) == 1
+    assert len(read_map(tmp_path / "new/map.mlsm")) == 1
     picture = matplotlib.image.imread(str(tmp_path / "new/map.png"))[..., :3]
     for color in ("#999999", "#1f5fa8", "#111111"):
         assert np.isclose(picture, matplotlib.colors.to_rgb(color), atol=0.01).all(axis=2).any(), color

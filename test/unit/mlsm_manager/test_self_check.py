@@ -7,7 +7,6 @@ import pytest
 from map_bag_runs import BASIN
 
 from mlsm_manager.offline.recording import read_recording, scans_of
-from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -24,6 +23,7 @@ from mlsm_manager.self_check.verdict import Verdict, merged
 from node_support.geometry import inverse, transformed
 from recordings.motion.vehicle_motion import MotionNames
 from recordings.reader import Request
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 TIMES = np.arange(0.0, 2000.0, 1.0)
 TURN_SECONDS = 14.0
@@ -111,9 +111,18 @@ def test_a_start_that_is_hardly_left_is_told():
 
 
 def test_a_deviation_that_grows_without_end_is_told():
-    assert not position_uncertainty(TIMES, np.full(len(TIMES), 2.0)).fires
-    growing = position_uncertainty(TIMES, TIMES * 0.01)
-    assert growing.line() == "DOUBTFUL: position uncertainty reaches 20.0 m (limit 5 m)"
+    nothing = np.zeros(len(TIMES))
+    assert not position_uncertainty(TIMES, np.full(len(TIMES), 2.0), nothing).fires
+    growing = position_uncertainty(TIMES, TIMES * 0.01, nothing)
+    meaning = "position uncertainty reaches 20.0 m (start, compass and lengths explain 0.0 m, limit 5 m more)"
+    assert growing.line() == f"DOUBTFUL: {meaning}"
+
+
+def test_a_deviation_that_compass_and_lengths_explain_is_no_doubt():
+    """Far from the start, no position is known better than the heading times the distance."""
+    stated = TIMES * 0.01
+    assert not position_uncertainty(TIMES, np.hypot(stated, 2.0), stated).fires
+    assert position_uncertainty(TIMES, np.hypot(stated, 6.0), stated).fires
 
 
 def test_deviations_are_told_per_minute():
@@ -288,7 +297,7 @@ def test_a_live_vehicle_is_suspected_once_enough_turns_speak_against_it():
 @pytest.mark.parametrize(("z_is_down", "count"), [(False, 0), (True, 1)])
 def test_a_tour_of_the_basin_turned_over_is_suspected(z_is_down, count):
     recording = read_recording(BASIN, Request(motion=MotionNames(z_is_down=z_is_down)))
-    scans = [scan for scan, _ in scans_of(recording, ReplayParameters().echoes())]
+    scans = [scan for scan, _ in scans_of(recording, EchoExtractor(EchoExtractorParameters()))]
     assert len(z_down_signs(LEVEL, scans).lines()) == count
 
 

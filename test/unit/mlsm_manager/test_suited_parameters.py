@@ -13,79 +13,10 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
-from mlsm_manager.offline.suited_parameters import (
-    EchoShape,
-    echo_shape_of,
-    echo_sigma,
-    odometry_of,
-    suited,
-    with_odometry,
-)
+from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Track
 from node_support.health import Health
 from recordings.motion.vehicle_motion import MotionSource
-from sonar_processing.beams.beam import Beam
-from sonar_processing.filters.echo_extractor import ExtractionMode
-
-
-def beams(strengths):
-    return [Beam(10**9, "sonar", 0.0, np.array(strengths, dtype=np.uint8), 0.1)]
-
-
-@pytest.mark.parametrize(
-    ("strengths", "shape"),
-    [
-        *(([0, 0, strongest, strongest, strongest, 0], EchoShape.PLATEAU) for strongest in (1, 127, 255)),
-        ([0, 3, 60, 127, 127, 80, 5, 0], EchoShape.PEAK),
-        ([0, 0, 0], EchoShape.PEAK),
-    ],
-)
-def test_strengths_that_say_something_or_nothing_are_plateaus_and_those_that_differ_are_peaks(strengths, shape):
-    assert echo_shape_of(beams(strengths)) is shape
-
-
-def test_plateaus_are_taken_as_dense_points_with_a_less_certain_range():
-    parameters = suited(ReplayParameters(), EchoShape.PLATEAU, fixed=())
-    assert (parameters.mode, parameters.match_resolution, parameters.range_scale_deviation) == (
-        ExtractionMode.DENSE, 1.0, 0.05,
-    )  # fmt: skip
-
-
-def test_what_the_user_set_is_held():
-    parameters = suited(ReplayParameters(match_resolution=0.7), EchoShape.PLATEAU, fixed=("match_resolution",))
-    assert (parameters.mode, parameters.match_resolution) == (ExtractionMode.DENSE, 0.7)
-
-
-def echoing(sigma, resolution=0.1, noise=0.0, seed=0):
-    rng, bins = np.random.RandomState(seed), np.arange(400)
-    rows = [
-        90.0 * np.exp(-0.5 * ((bins - place) * resolution / sigma) ** 2) + np.abs(rng.normal(0.0, noise, 400))
-        for place in rng.uniform(60.0, 340.0, 120)
-    ]
-    return [Beam(10**9, "sonar", 0.0, row.astype(np.uint8), resolution) for row in rows]
-
-
-@pytest.mark.parametrize("sigma", [0.2, 0.5, 1.0])
-@pytest.mark.parametrize("noise", [0.0, 6.0])
-def test_the_length_of_echoes_is_found(sigma, noise):
-    assert echo_sigma(echoing(sigma, noise=noise)) == pytest.approx(sigma, rel=0.15)
-
-
-@pytest.mark.parametrize("strengths", [[0, 0, 0, 0, 0], [7], [9, 9, 9, 9, 9, 9]])
-def test_without_echoes_the_shortest_pulse_is_taken(strengths):
-    assert echo_sigma(beams(strengths)) == 0.15
-
-
-def test_beams_of_another_range_do_not_matter():
-    other = [Beam(10**9, "sonar", 0.0, np.zeros(50, dtype=np.uint8), 0.5)] * 3
-    assert echo_sigma(other + echoing(0.5)) == echo_sigma(echoing(0.5))
-
-
-def test_peaks_are_filtered_by_their_own_length_unless_it_was_set():
-    assert suited(ReplayParameters(), EchoShape.PEAK, (), 0.7).pulse_sigma == 0.7
-    assert suited(ReplayParameters(), EchoShape.PEAK, ("pulse_sigma",), 0.7).pulse_sigma == 0.15
-    assert suited(ReplayParameters(), EchoShape.PLATEAU, (), 0.7).pulse_sigma == 0.15
-
 
 TIMES = np.linspace(0.0, 100.0, 50)
 
@@ -97,11 +28,11 @@ def track(x=0.0, y=0.0, yaw=0.0):
 @pytest.mark.parametrize(
     ("reported", "kind"),
     [
-        (track(x=TIMES), OdometryKind.DVL),
-        (track(x=TIMES, yaw=TIMES / 50.0), OdometryKind.DVL),
+        (track(x=TIMES), OdometryKind.AUTO),
+        (track(x=TIMES, yaw=TIMES / 50.0), OdometryKind.AUTO),
         (track(x=3.0, yaw=np.sin(TIMES)), OdometryKind.HEADING),
         (track(x=1e-3 * np.sin(TIMES), yaw=np.sin(TIMES)), OdometryKind.HEADING),
-        (track(x=3.0, y=1.0, yaw=0.4), OdometryKind.DVL),
+        (track(x=3.0, y=1.0, yaw=0.4), OdometryKind.AUTO),
     ],
 )
 def test_what_changes_tells_the_odometry(reported, kind):
@@ -121,7 +52,7 @@ def test_every_value_of_a_profile_has_a_reason(kind):
 
 
 def test_the_defaults_on_recordings_are_the_profile_of_a_dvl():
-    assert with_odometry(ReplayParameters(), OdometryKind.DVL, ()) == ReplayParameters()
+    assert with_odometry(ReplayParameters(), OdometryKind.AUTO, ()) == ReplayParameters()
 
 
 def test_what_a_person_set_is_not_changed_by_a_profile():

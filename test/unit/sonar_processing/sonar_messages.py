@@ -15,68 +15,44 @@ def header(stamp_ns=STAMP_NS, frame_id="sonar", as_rosbags=False):
     return SimpleNamespace(stamp=SimpleNamespace(**stamp), frame_id=frame_id)
 
 
+def _made(values, **defaults):
+    return SimpleNamespace(**{**defaults, **values})
+
+
 def scan_line_of(**values):
     """Return a SonarScanLine."""
-    defaults = {
-        "header": header(),
-        "angle": 0.5,
-        "intensities": bytes([1, 2, 255]),
-        "maxrange_meters": 50.0,
-        "range_resolution": 0.25,
-        "gain": 20,
-        "sensorAngle": -0.125,
-    }
-    return SimpleNamespace(**{**defaults, **values})
+    return _made(
+        values, header=header(), angle=0.5, intensities=bytes([1, 2, 255]), maxrange_meters=50.0, range_resolution=0.25,
+        gain=20, sensorAngle=-0.125,
+    )  # fmt: skip
 
 
 def sonar_echo_of(angle=0.5, **values):
     """Return a SonarEcho of ping360_sonar."""
-    defaults = {
-        "header": header(frame_id="sonar_frame"),
-        "angle": angle,
-        "gain": 1,
-        "number_of_samples": 4,
-        "transmit_frequency": 740,
-        "speed_of_sound": 1480,
-        "range": 20,
-        "intensities": bytes([0, 10, 200, 3]),
-    }
-    return SimpleNamespace(**{**defaults, **values})
+    return _made(
+        values, header=header(frame_id="sonar_frame"), angle=angle, gain=1, number_of_samples=4, transmit_frequency=740,
+        speed_of_sound=1480, range=20, intensities=bytes([0, 10, 200, 3]),
+    )  # fmt: skip
 
 
 def ping_360_of(angle=100, **values):
     """Return a SonarPing360 of bluerobotics_sonar."""
-    defaults = {
-        "header": header(frame_id="ping360"),
-        "distance": 1.0,
-        "mode": 1,
-        "gain_setting": 0,
-        "angle": angle,
-        "transmit_duration": 32,
-        "sample_period": 88,
-        "transmit_frequency": 750,
-        "range": 2.0,
-        "profile_data": np.array([5, 6, 7, 8], dtype=np.uint8),
-    }
-    return SimpleNamespace(**{**defaults, **values})
+    return _made(
+        values, header=header(frame_id="ping360"), distance=1.0, mode=1, gain_setting=0, angle=angle,
+        transmit_duration=32, sample_period=88, transmit_frequency=750, range=2.0,
+        profile_data=np.array([5, 6, 7, 8], dtype=np.uint8),
+    )  # fmt: skip
 
 
 def micron_line_of(angle=-180.0, strengths=(1, 2, 3), step=0.05, **values):
     """Return a ScanLine of micron_driver_ros."""
     bins = [SimpleNamespace(distance=step * (i + 1), intensity=one) for i, one in enumerate(strengths)]
-    defaults = {"header": header(frame_id="/Micron"), "angle": angle, "bin_distance_step": step, "bins": bins}
-    return SimpleNamespace(**{**defaults, **values})
+    return _made(values, header=header(frame_id="/Micron"), angle=angle, bin_distance_step=step, bins=bins)
 
 
 def laser_scan_of(ranges=(1.0, np.inf, 3.0), **values):
     """Return a LaserScan."""
-    defaults = {
-        "header": header(),
-        "angle_min": -1.0,
-        "angle_increment": 0.5,
-        "time_increment": 0.1,
-        "range_max": 50.0,
-        "ranges": np.array(ranges, dtype=np.float32),
-        "intensities": [],
-    }
-    return SimpleNamespace(**{**defaults, **values})
+    return _made(
+        values, header=header(), angle_min=-1.0, angle_increment=0.5, time_increment=0.1, range_max=50.0,
+        ranges=np.array(ranges, dtype=np.float32), intensities=[],
+    )  # fmt: skip

@@ -17,7 +17,7 @@ from sonar_messages import scan_line_of
 from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
-from node_support.geometry import pose_matrix, quaternion_of, quaternions_of
+from node_support.geometry import pose_matrix, quaternion_of
 from node_support.ros.transforms import matrix_from_message
 from sonar_processing.cloud import Cloud
 from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
@@ -259,10 +259,3 @@ def test_a_transform_that_is_none_is_refused(shift, quaternion):
     with pytest.raises(RefusedInput) as refused:
         matrix_from_message(Transform(Vector3(*shift), Quaternion(*quaternion)))
     assert refused.value.kind == "transforms refused"
-
-
-def test_many_quaternions_are_those_of_each_pose():
-    turns = np.pi * np.random.RandomState(0).uniform(-1.0, 1.0, (200, 3))
-    poses = np.array([pose_matrix((1.0, 2.0, 3.0), turn) for turn in turns])
-    expected = [quaternion_of(pose) for pose in poses]
-    np.testing.assert_allclose(quaternions_of(poses), expected, rtol=0.0, atol=1e-15)

@@ -1,5 +1,7 @@
 """Which echoes come out of a polar scan, and where they lie."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from clouds import SECOND, beam_of
@@ -49,8 +51,14 @@ def binary_image(starts, lengths, bins=400):
     return np.where((bin_numbers >= starts) & (bin_numbers < starts + lengths), 127, 0).astype(np.uint8)
 
 
+PEAKS = {"mode": "MATCHED_FILTER", "pulse_sigma": 0.15}
+MEASURED = EchoExtractorParameters(pulse_sigma=0.0)
+SETTLED_MODES = [mode for mode in ExtractionMode if mode is not ExtractionMode.AUTO]
+STRONG_ONLY = {"threshold_share": 1.0, "min_height": 10.0}
+
+
 def _echoes(image, **values):
-    return extract_echoes(image, RESOLUTION, EchoExtractorParameters(**values))[0]
+    return extract_echoes(image, RESOLUTION, EchoExtractorParameters(**{**PEAKS, **values}))[0]
 
 
 def test_an_echo_is_found_between_the_bins():
@@ -60,7 +68,7 @@ def test_an_echo_is_found_between_the_bins():
 
 
 def test_speckle_leaves_the_wall():
-    echoes = _echoes(with_speckle(wall_image(WALL), seed=1))
+    echoes = _echoes(with_speckle(wall_image(WALL), seed=1), **STRONG_ONLY)
     assert echoes.beams.tolist() == list(range(BEAMS))
     np.testing.assert_allclose(echoes.bins, WALL, atol=1.5)
 
@@ -100,7 +108,7 @@ def test_contrast_keeps_echoes_out_of_a_scan_of_speckle_alone():
     draw different speckle from the same seeds."""
     speckle = [with_speckle(np.zeros((120, 500), np.float32), seed=seed, strength=90.0) for seed in range(9)]
     without, usual, high = (
-        np.array([len(_echoes(image, **values)) for image in speckle])
+        np.array([len(_echoes(image, **STRONG_ONLY, **values)) for image in speckle])
         for values in ({"min_contrast": 0.0}, {}, {"min_contrast": 15.0})
     )
     assert (without > 500).all()
@@ -111,14 +119,15 @@ def test_contrast_keeps_echoes_out_of_a_scan_of_speckle_alone():
 
 
 def test_a_scan_of_nothing_has_no_echo():
-    echoes, threshold = extract_echoes(np.zeros((BEAMS, 400), np.uint8), RESOLUTION)
-    assert (len(echoes), threshold) == (0, 10.0)
+    parameters = EchoExtractorParameters(**PEAKS, min_height=2.0)
+    echoes, threshold = extract_echoes(np.zeros((BEAMS, 400), np.uint8), RESOLUTION, parameters)
+    assert (len(echoes), threshold) == (0, 2.0)
 
 
 def test_a_smaller_share_of_the_threshold_keeps_a_weak_wall_beside_a_strong_one():
     heights = np.where(np.arange(BEAMS) % 2, 200.0, 60.0)[:, np.newaxis]
     image = wall_image(WALL, height=1.0) * heights
-    assert len(_echoes(image)) == BEAMS // 2
+    assert len(_echoes(image, threshold_share=1.0)) == BEAMS // 2
     assert len(_echoes(image, threshold_share=0.5)) == BEAMS
 
 
@@ -166,7 +175,7 @@ def test_an_echo_at_either_end_of_the_range_lies_there(mode, at, sigma):
     assert np.abs(echoes.bins - at).max() < 3.5
 
 
-@given(st.integers(0, 2**32 - 1), st.sampled_from(list(ExtractionMode)), st.sampled_from([0.0, 0.3, 0.9]))
+@given(st.integers(0, 2**32 - 1), st.sampled_from(SETTLED_MODES), st.sampled_from([0.0, 0.3, 0.9]))
 def test_no_scan_breaks_it_and_every_echo_lies_in_the_scan(seed, mode, quantile):
     rng = np.random.default_rng(seed)
     image = rng.integers(0, rng.integers(1, 257), (rng.integers(10, 30), rng.integers(1, 40)), dtype=np.uint8)
@@ -237,7 +246,7 @@ def test_the_stage_tells_its_threshold():
     extractor = EchoExtractor(EchoExtractorParameters())
     assert extractor.newest_threshold is None
     extractor(_polar_cloud(wall_image(WALL)))
-    assert 10.0 <= extractor.newest_threshold < 127.0
+    assert 2.0 <= extractor.newest_threshold < 127.0
 
 
 def test_a_cloud_without_rows_is_refused():
@@ -248,3 +257,51 @@ def test_a_cloud_without_rows_is_refused():
 def test_a_cloud_of_removed_points_only_is_refused():
     with pytest.raises(RefusedInput, match="no two neighbouring bins"):
         EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), min_range=90.0))
+
+
+def _stamped(image, seconds):
+    """Return the cloud of a turn that ends `seconds` later than others."""
+    cloud = _polar_cloud(image)
+    return replace(cloud, stamp_ns=cloud.stamp_ns + seconds * SECOND)
+
+
+def _settled(extractor, *clouds):
+    """Return mode and width with which the newest of some clouds was extracted."""
+    for cloud in clouds:
+        extractor(cloud)
+    return extractor.newest_parameters.mode, extractor.newest_parameters.pulse_sigma
+
+
+PLATEAUS = binary_image([150] * 30 + [200] * 30, [28] * 30 + [9] * 30)
+
+
+@pytest.mark.parametrize(
+    ("image", "mode", "sigma"),
+    [
+        (wall_image(WALL, sigma=4.0), ExtractionMode.MATCHED_FILTER, pytest.approx(0.4, rel=0.05)),
+        (PLATEAUS, ExtractionMode.DENSE, 0.15),
+    ],
+)
+def test_the_first_scan_is_already_extracted_as_suits_its_echoes(image, mode, sigma):
+    assert _settled(EchoExtractor(MEASURED), _polar_cloud(image)) == (mode, sigma)
+
+
+def test_what_the_user_names_is_not_measured():
+    named = EchoExtractorParameters(mode="LEADING_EDGE", pulse_sigma=0.3)
+    assert _settled(EchoExtractor(named), _polar_cloud(PLATEAUS)) == (ExtractionMode.LEADING_EDGE, 0.3)
+    assert _settled(EchoExtractor(EchoExtractorParameters(pulse_sigma=0.3)), _polar_cloud(PLATEAUS))[1] == 0.3
+
+
+def test_all_scans_with_the_same_bins_tell_the_width_of_echoes():
+    narrow, wide = _stamped(wall_image(WALL, sigma=2.0), 0), _stamped(wall_image(WALL, sigma=6.0), 60)
+    _, sigma = _settled(EchoExtractor(MEASURED), narrow, wide)
+    assert 0.25 < sigma < 0.6
+
+
+@pytest.mark.parametrize("seconds", [-60, 60])
+def test_other_bins_or_a_time_that_jumps_back_begin_anew(seconds):
+    bins = 400 if seconds < 0 else 300
+    alone = _stamped(wall_image(WALL, bins=bins, sigma=6.0), seconds)
+    extractor = EchoExtractor(MEASURED)
+    extractor(_stamped(wall_image(WALL, sigma=2.0), 0))
+    assert _settled(extractor, alone) == _settled(EchoExtractor(MEASURED), alone)

@@ -158,10 +158,6 @@ def test_a_buoy_is_found_behind_its_near_side(center):
     np.testing.assert_allclose(circle.center, center, atol=0.1)
 
 
-def test_a_wall_is_no_row_of_circles():
-    assert _circles(_cloud(_wall(0, 8, 0.0, 20, 40, 0.05))) == []
-
-
 def test_circles_stand_beside_walls():
     cloud = _cloud(np.concatenate([_wall(0, 8, 0.0, 20, 40, 0.05), _seen_circle((4.0, -4.0), 0.4)]))
     (circle,) = _circles(cloud)

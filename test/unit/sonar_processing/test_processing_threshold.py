@@ -48,34 +48,12 @@ def test_it_is_the_mean_of_the_first_and_the_last_maximum(strategy, data):
     assert otsu_threshold(np.array(levels)) == literal_threshold(levels)
 
 
-@given(LEVELS, st.integers(2, 1000))
-def test_copies_of_a_scan_have_its_threshold(levels, copies):
-    assert otsu_threshold(np.repeat(levels, copies)) == literal_threshold(levels)
-
-
-def test_it_lies_midway_between_two_levels():
-    assert otsu_threshold(np.array([10, 10, 20])) == 14.5
-
-
-def test_symmetric_levels_have_two_maxima_that_are_averaged():
-    assert otsu_threshold(np.array([0, 50, 100])) == 49.5
-
-
-def test_strengths_above_127_are_levels_of_their_own():
-    assert otsu_threshold(np.array([128, 255])) == literal_threshold([128, 255]) == 191.0
-
-
 def test_strengths_outside_the_levels_count_in_the_nearest():
     assert otsu_threshold(np.array([-50.0, 1000.0])) == literal_threshold([0, 255])
 
 
 def test_fractions_of_a_level_count_in_the_level_below():
     assert otsu_threshold(np.array([10.9, 20.2])) == literal_threshold([10, 20])
-
-
-@pytest.mark.parametrize("level", [0, 30, 200, 255])
-def test_one_level_is_its_own_threshold(level):
-    assert otsu_threshold(np.full(5, level)) == level
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32, np.float64, np.int64])
@@ -114,24 +92,16 @@ def _threshold_by_numpy(strengths, mode, nonzero):
     return max(values.get(mode.value, own.otsu_multiplier * otsu), own.min_threshold)
 
 
-def test_proportional_weighs_the_strongest_and_the_weakest():
-    assert _threshold([10, 50, 110], mode="PROPORTIONAL", max_proportion=0.5, min_proportion=0.2) == pytest.approx(57)
-
-
-def test_otsu_takes_the_threshold_as_it_is():
-    assert _threshold([10, 20, 90, 95], mode="OTSU", otsu_multiplier=3) == otsu_threshold(np.array([10, 20, 90, 95]))
-
-
-def test_otsu_proportional_multiplies_it():
-    assert _threshold([10, 20, 90, 95], mode="OTSU+PROPORTIONAL", otsu_multiplier=1.5) == pytest.approx(
-        1.5 * otsu_threshold(np.array([10, 20, 90, 95]))
-    )
-
-
-def test_otsu_over_the_strengths_above_zero_does_not_see_the_zeros():
-    strengths = [0] * 100 + [10, 10, 20]
-    assert _threshold(strengths, mode="OTSU", otsu_nonzero=True) == 14.5
-    assert _threshold(strengths, mode="OTSU", otsu_nonzero=False) == otsu_threshold(np.array(strengths)) < 14.5
+@pytest.mark.parametrize(
+    ("mode", "values", "threshold"),
+    [
+        ("PROPORTIONAL", {"max_proportion": 0.5, "min_proportion": 0.2}, 49.5),
+        ("OTSU", {"otsu_multiplier": 3.0}, 54.5),
+        ("OTSU+PROPORTIONAL", {"otsu_multiplier": 1.5}, 81.75),
+    ],
+)
+def test_each_mode_weighs_by_its_own_parameters(mode, values, threshold):
+    assert _threshold([10, 20, 90, 95], mode=mode, **values) == pytest.approx(threshold)
 
 
 @pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
@@ -179,28 +149,12 @@ def test_stamps_go_with_their_points(strengths):
     np.testing.assert_array_equal(kept.time_stamps, kept.points[:, 0] + 1.0)
 
 
-@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
-def test_an_empty_cloud_stays_empty(mode):
-    assert _kept([], mode=mode) == []
-
-
-@pytest.mark.parametrize("mode", ["OTSU", "OTSU+PROPORTIONAL"])
-def test_silence_has_no_echoes(mode):
-    assert _kept([0, 0, 0], mode=mode) == []
-
-
 def test_an_organised_cloud_keeps_its_shape_and_its_stamps():
     cloud = cloud_of([10, 100, 20, 200, 30, 90], height=2)
     kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
     assert (kept.height, len(kept), kept.is_organized) == (2, 6, True)
     assert np.isnan(kept.points).all(axis=1).tolist() == [True, False, True, False, True, False]
     assert kept.time_stamps.tolist() == cloud.time_stamps.tolist()
-
-
-def test_an_organised_cloud_without_a_finite_point_stays_so():
-    kept = Thresholder(ThresholderParameters())(cloud_of([np.nan] * 6, height=2))
-    assert np.isnan(kept.points).all()
-    assert (len(kept), kept.height) == (6, 2)
 
 
 def test_the_cloud_given_is_not_changed():
@@ -229,14 +183,6 @@ def test_the_newest_threshold_can_be_read():
 @pytest.mark.parametrize("strength", [1, 127, 255])
 def test_echoes_that_are_all_equally_strong_pass(mode, nonzero, strength):
     assert _kept([0, strength, 0, strength], mode=mode, otsu_nonzero=nonzero) == [strength, strength]
-
-
-def test_echoes_that_are_all_equally_strong_do_not_pass_the_floor():
-    assert _kept([0, 40, 40], min_threshold=50) == []
-
-
-def test_two_strengths_above_zero_are_separated():
-    assert _kept([0, 10, 200], mode="OTSU") == [200]
 
 
 def _noticed(scans):

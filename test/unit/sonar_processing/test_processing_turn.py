@@ -93,11 +93,6 @@ def test_a_sector_after_whole_turns_gives_its_sweeps():
     assert lengths[-3:] == [59, 59, 59]
 
 
-def test_a_change_of_range_forgets_only_the_turn_in_which_it_happens():
-    beams = [{"angle": STEP * number, "strengths": (1,) * (3 if number < 150 else 5)} for number in range(400)]
-    assert [len(turn) for turn in _turns(beams)] == [120, 120, 120]
-
-
 def test_beams_before_and_after_a_silence_make_no_turn_together():
     before = [{"angle": STEP * number, "seconds": number} for number in range(50)]
     after = [{"angle": STEP * number, "seconds": 1000 + number} for number in range(50, 180)]

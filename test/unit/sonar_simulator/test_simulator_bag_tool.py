@@ -7,7 +7,7 @@ import pytest
 import rosbag
 import yaml
 
-from sonar_simulator.simulation.simulate_bag import SimulatedBag, main
+from sonar_simulator.simulation.simulate_bag import main
 from sonar_simulator.vehicle.scripted_vehicle import load_script
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -33,11 +33,6 @@ def _messages(path, topic):
         return [(message, stamp) for _, message, stamp in bag.read_messages([topic])]
 
 
-def _records(path):
-    with rosbag.Bag(str(path)) as bag:
-        return [(topic, message[1], stamp) for topic, message, stamp in bag.read_messages(raw=True)]
-
-
 def test_a_bag_holds_beams_tf_odometry_and_truth(tmp_path, script):
     status, out = _write(tmp_path, script)
     with rosbag.Bag(str(out)) as bag:
@@ -54,16 +49,6 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, sc
     first, second, third = (bag.read_bytes() for bag in bags)
     assert first == second
     assert first != third
-
-
-@pytest.mark.parametrize("instruments", ["DVL", "COMPASS", "NONE"])
-def test_moments_written_together_are_written_as_one_by_one(tmp_path, script, monkeypatch, instruments):
-    script.write_text("moves: [{wait: 0.2}, {x: 1, yaw_deg: 20, seconds: 1}, {tilt_deg: 20}, {wait: 0.5}]")
-    asked, add = ("--set", f"instruments={instruments}"), SimulatedBag.add
-    _, together = _write(tmp_path, script, "together.bag", *asked)
-    monkeypatch.setattr(SimulatedBag, "add", lambda bag, moments: [add(bag, [moment]) for moment in moments])
-    _, alone = _write(tmp_path, script, "alone.bag", *asked)
-    assert _records(together) == _records(alone)
 
 
 @pytest.mark.parametrize(("instruments", "begin"), [("DVL", (1.0, -2.0)), ("COMPASS", (0.0, 0.0))])

@@ -29,7 +29,7 @@ def test_from_inside_a_room_every_ray_meets_the_wall_that_geometry_gives(place, 
     direction = _directions(bearing, elevation)
     with np.errstate(divide="ignore", over="ignore"):
         expected = ((HALF - np.sign(direction) * origin) / np.abs(direction)).min()
-    found = ROOM.distances(origin[np.newaxis], direction[np.newaxis])
+    found = ROOM.hits(origin[np.newaxis], direction[np.newaxis])[0]
     np.testing.assert_allclose(found, [expected], rtol=1e-5)
 
 
@@ -38,21 +38,21 @@ def test_no_ray_slips_through_the_edges_between_triangles():
     along = np.linspace(0.0, 1.0, 20001)[:, np.newaxis]
     diagonal = (1 - along) * (60.0, -25.0, -5.0) + along * (60.0, 25.0, 5.0)
     rays = np.vstack([diagonal / np.linalg.norm(diagonal, axis=1, keepdims=True), corner])
-    assert np.isfinite(ROOM.distances(np.zeros_like(rays), rays)).all()
+    assert np.isfinite(ROOM.hits(np.zeros_like(rays), rays)[0]).all()
 
 
 def test_a_cylinder_is_met_at_its_radius():
     caster = RayCaster(World.from_shapes("w", [Shape("b", "cylinder", pose_matrix((10, 0, 0)), (0.5, 4.0))]))
-    assert caster.distances(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]))[0] == pytest.approx(9.5, abs=1e-3)
+    assert caster.hits(np.zeros((1, 3)), np.array([[1.0, 0.0, 0.0]]))[0][0] == pytest.approx(9.5, abs=1e-3)
 
 
 def test_a_ray_that_hits_nothing_is_infinitely_long():
     caster = RayCaster(World.from_shapes("w", [Shape("b", "sphere", pose_matrix((10, 0, 0)), (1.0,))]))
-    assert caster.distances(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))[0] == np.inf
+    assert caster.hits(np.zeros((1, 3)), np.array([[0.0, 1.0, 0.0]]))[0][0] == np.inf
 
 
 def test_no_rays_have_no_distances():
-    assert ROOM.distances(np.empty((0, 3)), np.empty((0, 3))).shape == (0,)
+    assert ROOM.hits(np.empty((0, 3)), np.empty((0, 3)))[0].shape == (0,)
 
 
 def test_without_embreex_the_error_says_what_to_install(monkeypatch):

@@ -130,7 +130,7 @@ def test_a_tour_stays_between_surface_and_bottom(name):
     times = np.arange(0.0, TOURS[name].duration, 1.0)
     path = np.array([TOURS[name].pose(time)[:3, 3] for time in times])
     caster = RayCaster(load_world(ROOT / "worlds" / f"{name}.sdf").world)
-    below = caster.distances(path, np.tile([0.0, 0.0, -1.0], (len(path), 1)))
+    below = caster.hits(path, np.tile([0.0, 0.0, -1.0], (len(path), 1)))[0]
     assert path[:, 2].max() < -0.5
     assert below.min() > 0.6
 

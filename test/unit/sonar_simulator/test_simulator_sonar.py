@@ -11,7 +11,7 @@ import pytest
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.rays.beam_pattern import BeamPattern
+from sonar_simulator.rays.beam_pattern import BeamPattern, head_turns
 from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters, WorldEchoes, world_echoes
 from sonar_simulator.world.world import Shape, World
@@ -34,7 +34,7 @@ def _repeated(pose, count=120):
 
 
 def test_rays_stay_inside_the_opening():
-    rays = PATTERN.directions(np.zeros(20), np.random.default_rng(0))
+    rays = PATTERN.sample(20, np.random.default_rng(0))
     assert rays.shape == (20, 500, 3)
     np.testing.assert_allclose(np.linalg.norm(rays, axis=-1), 1.0)
     assert np.abs(np.arcsin(rays[..., 2])).max() <= math.radians(11.0) + 1e-12
@@ -42,19 +42,19 @@ def test_rays_stay_inside_the_opening():
 
 
 def test_every_stratum_holds_one_ray():
-    rays = PATTERN.directions(np.zeros(1), np.random.default_rng(0))[0]
+    rays = PATTERN.sample(1, np.random.default_rng(0))[0]
     row = np.floor((np.degrees(np.arcsin(rays[:, 2])) / 22.0 + 0.5) * 50)
     column = np.floor((np.degrees(np.arctan2(rays[:, 1], rays[:, 0])) / 2.5 + 0.5) * 10)
     assert len(set(zip(row, column))) == 500
 
 
 def test_every_beam_has_a_jitter_of_its_own():
-    first, second = PATTERN.directions(np.zeros(2), np.random.default_rng(0))
+    first, second = PATTERN.sample(2, np.random.default_rng(0))
     assert not (first[:, 2] == second[:, 2]).any()
 
 
 def test_rays_turn_counter_clockwise_with_the_head():
-    (rays,) = PATTERN.directions(np.array([math.pi / 2]), np.random.default_rng(0))
+    (rays,) = PATTERN.sample(1, np.random.default_rng(0)) @ head_turns(np.array([math.pi / 2])).transpose(0, 2, 1)
     np.testing.assert_allclose(rays.mean(axis=0)[:2], (0.0, 1.0), atol=0.01)
 
 

@@ -17,15 +17,33 @@ from mlsm_manager.surface_map.export.rasters import (
     write_map_server,
 )
 from mlsm_manager.surface_map.map_file import ENDING, ExportError, Layer, StoredMap, write_map
-from mlsm_manager.surface_map.ply_file import write_ply
-from node_support.files import whole_file
+from node_support.files import whole_file, write_whole
+
+_PLY_TYPES = {"f8": "double", "u4": "uint", "u1": "uchar"}
+
+
+def write_ply(path: Path, blocks: Blocks) -> None:
+    """Write a binary PLY: x y z of each block's mean, intensity, variances, bottom, height, count and type.
+
+    Raises OSError.
+    """
+    axes = ("x", "y", "z", "intensity")
+    columns = {**dict(zip(axes, blocks.mean.T)), **dict(zip((f"variance_{axis}" for axis in axes), blocks.variance.T))}
+    columns.update(bottom=blocks.bottom, height=blocks.height, count=blocks.count, type=blocks.type)
+    kinds = {name: {"count": "u4", "type": "u1"}.get(name, "f8") for name in columns}
+    vertices = np.empty(len(blocks), dtype=[(name, f"<{kind}") for name, kind in kinds.items()])
+    for name, column in columns.items():
+        vertices[name] = column
+    lines = [
+        "ply", "format binary_little_endian 1.0",
+        f"comment multi level surface map, resolution {blocks.resolution!r} m", f"element vertex {len(blocks)}",
+        *(f"property {_PLY_TYPES[kind]} {name}" for name, kind in kinds.items()), "end_header\n",
+    ]  # fmt: skip
+    write_whole(path, "\n".join(lines).encode("ascii") + vertices.tobytes())
 
 
 def write_pcd(path: Path, blocks: Blocks) -> None:
-    """Write a binary PCD, float32: x y z of each block's mean, intensity, variances, bottom, height, count and type.
-
-    Raises ExportError without Open3D, and OSError.
-    """
+    """Write a binary PCD with what `write_ply` writes, in float32. Raises ExportError without Open3D, and OSError."""
     try:
         import open3d
     except ImportError:

@@ -25,7 +25,6 @@ _INNER_SHARE = (2.0, 98.0)  # percent: a few echoes far off do not take the colo
 _FREE_COLOR = (0.91, 0.95, 0.98)
 _WIDTH_INCHES = 10.0
 _DPI = 150
-_BAR_SHARE = 0.25
 _CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)])
 _TRIANGLES = np.array(
     [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
@@ -76,7 +75,6 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = 
     # matplotlib takes half a second and 40 MB: only who draws a picture shall pay for it.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
-    from mpl_toolkits.axes_grid1.anchored_artists import AnchoredSizeBar
 
     pixels, origin, resolution = _pixels(blocks, free, color_by)
     rows, columns = pixels.shape[:2]
@@ -86,18 +84,9 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = 
     axes = figure.add_subplot(1, 1, 1)
     axes.imshow(pixels, origin="lower", extent=extent, interpolation="nearest")
     axes.set(xlabel="x [m]", ylabel="y [m]")
-    length = bar_length(columns * resolution)
-    axes.add_artist(AnchoredSizeBar(axes.transData, length, f"{length:g} m", loc="lower right", size_vertical=0))
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
     write_whole(path, picture.getvalue())
-
-
-def bar_length(width: float) -> float:
-    """Return the length [m] of a scale bar for a picture `width` [m] wide: 1, 2 or 5 times a power of ten."""
-    wanted = max(width * _BAR_SHARE, 1e-3)
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(step for step in (1.0, 2.0, 5.0) if step * power <= wanted * (1.0 + 1e-9)) * power)
 
 
 def _pixels(blocks: Blocks, free: Blocks, color_by: ColorBy) -> tuple:

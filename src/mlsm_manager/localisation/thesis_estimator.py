@@ -1,4 +1,4 @@
-"""Matches scan by scan with the map of the scans before, and keeps that map and the pose in it (thesis 6.5.6)."""
+"""The thesis's way (6.5.6): each scan is matched alone, with the map of the scans before, or rejected."""
 
 from typing import List, Mapping, Optional
 
@@ -17,9 +17,11 @@ from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed
 
+_FEWEST_BLOCKS = 15  # of a map that can be matched with: fewer do not fix three coordinates against chance
 
-class ScanByScan(Estimator):
-    """Keeps the map, what is known of the pose, and the errors of the odometry.
+
+class ThesisEstimator(Estimator):
+    """Keeps the map, what is known of the pose, and the errors of the odometry. Takes any matcher of single scans.
 
     A scan that is not matched, because `matching` is off or because there is no map yet, is placed by the odometry as
     corrected so far and inserted; its pose is then certain.
@@ -71,7 +73,7 @@ class ScanByScan(Estimator):
     def add_scan(self, scan: Scan) -> ScanUpdate:
         """Match a scan, or place it by the odometry, and insert it into the map that is matched with."""
         belief = self._belief_at(scan)
-        if not self.matching or len(self.matched) < self.settings.fewest_blocks:
+        if not self.matching or len(self.matched) < _FEWEST_BLOCKS:
             return self._place(scan, belief)
         result = self.matcher.match(scan, self.matched, prior_of(belief, scan.reference_pose))
         return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)

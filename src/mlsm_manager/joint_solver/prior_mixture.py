@@ -1,0 +1,181 @@
+"""Unknowns whose prior is one of several: the echoes tell which, and until they do each counts by its probability."""
+
+from dataclasses import dataclass
+from typing import Callable, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.joint_solver.normal_equations import NormalEquations
+
+
+class Gaussian(NamedTuple):
+    """mean: (k,). covariance: (k, k)."""
+
+    mean: np.ndarray
+    covariance: np.ndarray
+
+
+class PriorTerm(NamedTuple):
+    """A Gaussian factor exp(-x^T information x / 2 + vector^T x) of k unknowns x. information: (k, k). vector: (k,)."""
+
+    information: np.ndarray
+    vector: np.ndarray
+
+    @classmethod
+    def none(cls, size: int) -> "PriorTerm":
+        """Return the factor 1 of `size` unknowns."""
+        return cls(np.zeros((size, size)), np.zeros(size))
+
+    @classmethod
+    def of_array(cls, array: np.ndarray) -> "PriorTerm":
+        """Return what `array` gave, (k, k + 1)."""
+        return cls(array[:, :-1], array[:, -1])
+
+    @property
+    def array(self) -> np.ndarray:
+        """(k, k + 1) information and vector, to be stored."""
+        return np.column_stack([self.information, self.vector])
+
+    def add(self, equations: NormalEquations, columns: np.ndarray, values: np.ndarray) -> None:
+        """Add the factor of unknowns in `columns` (k,), which are at `values` (k,)."""
+        gradient = self.information @ values - self.vector
+        equations.add_terms(columns[np.newaxis], self.information[np.newaxis], gradient[np.newaxis])
+
+    def removed_from(self, known: Gaussian) -> Gaussian:
+        """Return what is known without the factor, which `known` contains."""
+        information = np.linalg.inv(known.covariance)
+        covariance = np.linalg.inv(information - self.information)
+        return Gaussian(covariance @ (information @ known.mean - self.vector), covariance)
+
+
+class PriorComponent(NamedTuple):
+    """One of the priors. share: its probability before the run. deviations: (k,) standard deviations about `mean`."""
+
+    name: str
+    share: float
+    deviations: np.ndarray
+
+
+class Judgement(NamedTuple):
+    """log_probabilities: (c,) of the components.
+
+    term: what makes of what is known without the mixture what is known with it, in mean and covariance.
+    """
+
+    log_probabilities: np.ndarray
+    term: PriorTerm
+
+
+@dataclass(frozen=True)
+class PriorMixture:
+    """The prior of the unknowns in node columns `columns` (k,): one of the components, nobody knows which.
+
+    The solver holds these unknowns by `widest` (k,) standard deviations about `mean` (k,), and by a term that follows
+    from what it knows of them: with it they have mean and covariance of the mixture (the generalised pseudo-Bayes
+    estimator of first order, Bar-Shalom, Li and Kirubarajan 2001, 11.6.4).
+
+    A component counts only once the echoes tell the unknowns that it knows better than `widest` to `told` (k,): until
+    then a narrow prior that is wrong would draw a map that seems to confirm it. One component has the deviations
+    `widest`. walks: (k,) per root second, how fast what the echoes told is forgotten.
+    """
+
+    columns: Tuple[int, ...]
+    mean: np.ndarray
+    widest: np.ndarray
+    told: np.ndarray
+    walks: np.ndarray
+    components: Sequence[PriorComponent]
+
+    def without(self, term: PriorTerm, node: np.ndarray, covariance: np.ndarray) -> Gaussian:
+        """Return what is known of the mixed ones of a node's unknowns (width,) without a term that was added.
+
+        covariance: (width, width) or larger, of the node.
+        """
+        own = np.array(self.columns)
+        return term.removed_from(Gaussian(node[own], covariance[np.ix_(own, own)]))
+
+    @property
+    def before(self) -> Gaussian:
+        """What is known without any echo."""
+        return Gaussian(self.mean, np.diag(self.widest**2))
+
+    def judged(self, known: Gaussian) -> Judgement:
+        """Return how probable the components are where the widest prior and all echoes say `known`."""
+        posteriors, log_weights = zip(*(self._posterior(known, component) for component in self.components))
+        logs = np.array(log_weights) - np.logaddexp.reduce(log_weights)
+        weights = np.exp(logs) * self._admitted(known)
+        weights /= weights.sum()
+        means = np.array([posterior.mean for posterior in posteriors])
+        mean = weights @ means
+        apart = means - mean
+        covariance = sum(weight * own.covariance for weight, own in zip(weights, posteriors))
+        covariance = covariance + np.einsum("c,ca,cb->ab", weights, apart, apart)
+        return Judgement(logs, _term_between(known, Gaussian(mean, covariance)))
+
+    def _admitted(self, known: Gaussian) -> np.ndarray:
+        """Return which components (c,) may be assumed: narrow ones once the echoes tell what they are narrow in."""
+        told = np.diag(known.covariance) <= self.told**2
+        return np.array([(told | (one.deviations >= self.widest)).all() for one in self.components])
+
+    def likeliest(self, known: Gaussian) -> PriorComponent:
+        """Return the component that is the most probable where the widest prior and all echoes say `known`."""
+        return self.components[int(np.argmax(self.judged(known).log_probabilities))]
+
+    def line(self, known: Gaussian) -> str:
+        """Return which component is the likeliest, as text for people: `DVL, by 3.1 nats over THRUSTERS`."""
+        logs = self.judged(known).log_probabilities
+        best, second = np.argsort(-logs)[:2]
+        lead = f"by {logs[best] - logs[second]:.1f} nats over {self.components[second].name}"
+        return f"{self.components[best].name}, {lead}"
+
+    def _posterior(self, known: Gaussian, component: PriorComponent) -> Tuple[Gaussian, float]:
+        """Return what is known if a component is the prior, and the logarithm of its probability times a constant."""
+        added = np.diag(component.deviations**-2.0 - self.widest**-2.0)
+        before = np.linalg.inv(known.covariance)
+        covariance = np.linalg.inv(before + added)
+        off = known.mean - self.mean
+        mean = covariance @ before @ off
+        log_weight = np.log(component.share) + np.log(self.widest / component.deviations).sum()
+        log_weight += 0.5 * (np.linalg.slogdet(covariance)[1] - np.linalg.slogdet(known.covariance)[1])
+        log_weight -= 0.5 * (off @ before @ off - mean @ (before + added) @ mean)
+        return Gaussian(self.mean + mean, covariance), float(log_weight)
+
+
+class AdaptedPrior:
+    """The prior of one node in a problem that is solved step by step; it follows what each step finds.
+
+    term: the one of the newest step; empty for a model without a mixture.
+    """
+
+    def __init__(self, mixture: Optional[PriorMixture], term: Optional[PriorTerm]) -> None:
+        """term: to begin with; None for what is known without any echo."""
+        self._mixture, self.term = mixture, PriorTerm.none(0)
+        if mixture is not None:
+            self.term = term or mixture.judged(mixture.before).term
+            self._next = self.term
+
+    def add(self, equations: NormalEquations, start: int, node: np.ndarray) -> None:
+        """Add the term to the unknowns of a node (width,) in the columns from `start` on."""
+        if self._mixture is not None:
+            self.term, own = self._next, np.array(self._mixture.columns)
+            self.term.add(equations, start + own, node[own])
+
+    def learn(self, start: int, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Learn from the step with the present term, after which the node is `node` (width,).
+
+        covariance: from columns (k,) to theirs (k, k).
+        """
+        if self._mixture is not None:
+            own = np.array(self._mixture.columns)
+            found = Gaussian(node[own], covariance(start + own))
+            self._next = self._mixture.judged(self.term.removed_from(found)).term
+
+
+def _term_between(known: Gaussian, wanted: Gaussian) -> PriorTerm:
+    """Return the factor that makes `wanted` of `known`; where that knows less, as between two peaks, none."""
+    before, after = np.linalg.inv(known.covariance), np.linalg.inv(wanted.covariance)
+    added, axes = np.linalg.eigh(after - before)
+    if added[0] >= 0.0:
+        return PriorTerm(after - before, after @ wanted.mean - before @ known.mean)
+    information = axes @ np.diag(np.maximum(added, 0.0)) @ axes.T
+    return PriorTerm(information, information @ wanted.mean)

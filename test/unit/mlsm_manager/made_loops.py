@@ -1,0 +1,24 @@
+"""Runs whose odometry goes astray while nothing is heard, and that come back to places heard before."""
+
+from dataclasses import replace
+
+import numpy as np
+from made_harbour import selected
+
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import inverse, transformed
+
+DEAF = range(15, 25)  # scans that hear nothing, while the odometry goes astray
+
+
+def astray(made, drift):
+    """Return the scans of a tour, and its odometry, which drifts by `drift` (2,) [m] while nothing is heard."""
+    start, end = (made.scans[number].reference_time for number in (DEAF[0], DEAF[-1]))
+    share = np.clip((made.odometry.times - start) / (end - start), 0.0, 1.0)[:, np.newaxis]
+    track = Track(made.odometry.times, made.odometry.poses + share * np.append(drift, 0.0))
+    return [_heard_by(scan, number, track) for number, scan in enumerate(made.scans)], track
+
+
+def _heard_by(scan, number, track):
+    points = transformed(track.at(scan.times), transformed(inverse(scan.track.at(scan.times)), scan.points))
+    return selected(replace(scan, points=points, track=track), np.full(len(points), number not in DEAF))

@@ -1,0 +1,55 @@
+"""Single scans that are found in the map while the odometry's scale is hardly known, and what their fixes tell."""
+
+import numpy as np
+from made_scans import at_velocity, harbour, scan_of
+
+from mlsm_manager.joint_solver.fixes import Fix, Fixes
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
+from mlsm_manager.localisation.parameters import LocaliserParameters
+
+SCALE = 1.3
+SPEED = 0.2
+
+
+def scans(count):
+    """Return scans of a vehicle that rests in the first and goes 3.2 m in each other; its odometry reports 2.5 m."""
+    truth, odometry = (at_velocity((speed, 0.0, 0.0)) for speed in (SPEED, SPEED / SCALE))
+    starts = 16.0 * (np.arange(count) - 1.0)
+    return [scan_of(harbour(offset=start / 160.0 + 0.1), truth, odometry, start, moving=True) for start in starts]
+
+
+def localised(**changes):
+    """Return by how much positions are off, m, and the solver."""
+    localiser = LocaliserParameters(**changes).build_localiser()
+    taken = scans(4)
+    found = np.array([localiser.take_scan(scan).scan.belief.theta[:2] for scan in taken])
+    return np.hypot(*(found - [[SPEED * 16.0 * turn, 0.0] for turn in range(len(taken))]).T), localiser.estimator.solver
+
+
+def test_while_the_scale_is_hardly_known_scans_are_found_from_the_second_on():
+    off, solver = localised(odometry=OdometryKind.AUTO)
+    assert 2 in solver.fixes.by_node
+    assert off[1:].max() < 0.3
+
+
+def test_where_the_scale_is_known_no_scan_is_searched():
+    _, solver = localised(odometry=OdometryKind.DVL)
+    assert not solver.fixes.by_node
+
+
+def test_a_fix_is_what_the_scan_says_and_not_what_was_expected():
+    expected, of_expected = np.array([1.0, 0.0]), np.diag([4.0, 1.0])
+    said, of_said = np.array([2.0, 1.0]), np.array([[0.25, 0.1], [0.1, 0.5]])
+    of_both = np.linalg.inv(np.linalg.inv(of_expected) + np.linalg.inv(of_said))
+    both = expected + of_both @ np.linalg.solve(of_said, said - expected)
+    fix = Fix.without_prior(both, of_both, expected, of_expected)
+    np.testing.assert_allclose(fix.information, np.linalg.inv(of_said))
+    np.testing.assert_allclose(fix.place, said)
+
+
+def test_fixes_are_stored_and_taken_back():
+    fixes = Fixes({3: Fix(np.arange(2.0), np.eye(2)), 7: Fix(np.ones(2), 2.0 * np.eye(2))})
+    again = Fixes.of_arrays(fixes.stored())
+    assert list(again.by_node) == [3, 7]
+    np.testing.assert_array_equal(again.by_node[7].information, 2.0 * np.eye(2))
+    assert Fixes.of_arrays(Fixes().stored()) == Fixes()

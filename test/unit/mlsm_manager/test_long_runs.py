@@ -1,0 +1,119 @@
+"""What a long live run forgets, and what it keeps."""
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, logged, tour
+from made_models import followed, solver_parameters
+
+from mlsm_manager.joint_solver import live_solver
+from mlsm_manager.joint_solver.live_window import nearest_groups, superfluous
+from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.localisation import joint_session
+from mlsm_manager.localisation.joint_session import JointSession
+
+SCANS = tour(12).scans
+EVERY_THIRD = np.arange(len(SCANS)) % 3 == 0
+
+
+@pytest.fixture
+def log():
+    made = logged(SCANS)
+    made.forget(EVERY_THIRD)
+    return made
+
+
+def test_points_of_forgotten_scans_are_gone_and_those_of_others_stay(log):
+    whole = logged(SCANS)
+    for scan in range(len(SCANS)):
+        found, before = log.points(log.rows(scan, scan + 1)), whole.points(whole.rows(scan, scan + 1))
+        np.testing.assert_array_equal(found.ranges, [] if EVERY_THIRD[scan] else before.ranges)
+        assert set(log.scans(log.rows(scan, scan + 1))) <= {scan}
+
+
+def test_scans_go_on_after_some_are_forgotten(log):
+    log.append(tour(13).scans[-1], 1.0)
+    assert log.scan_count == 13
+    assert log.point_counts[-1] > 0
+    assert not log.forgotten[-1]
+
+
+def test_the_newest_scan_can_be_taken_back_after_some_are_forgotten(log):
+    log.thin_odometry(6)
+    length = len(log.odometry)
+    log.append(tour(13).scans[-1], 1.0)
+    log.remove_newest()
+    assert (log.scan_count, len(log.odometry), len(log.forgotten)) == (12, length, 12)
+
+
+def test_old_odometry_is_kept_once_in_a_second():
+    log, whole = logged(SCANS), logged(SCANS)
+    log.thin_odometry(8)
+    start, end = log.node_times[[0, 8]]
+    assert len(log.odometry) < 0.6 * len(whole.odometry)
+    times = np.linspace(start, end + 30.0, 500)
+    np.testing.assert_allclose(log.odometry.at(times), whole.odometry.at(times), atol=0.05)
+    later = times[times > end]
+    np.testing.assert_array_equal(log.odometry.at(later), whole.odometry.at(later))
+
+
+def standing(groups, forgotten=()):
+    """Return a run of a vehicle that hears the same in so many groups of scans; those `forgotten` are."""
+    parameters = solver_parameters(scans_per_group=1, frozen_scans=3)
+    scans = tour(groups).scans
+    log = logged(scans)
+    nodes = np.zeros((groups + 1, parameters.odometry.width))
+    nodes[:, :2] -= log.node_poses(np.arange(groups + 1))[:, :2]
+    log.forget(np.isin(np.arange(groups), forgotten))
+    return Solution(log, parameters, State(nodes, np.zeros(2)))
+
+
+def test_groups_with_enough_older_ones_beside_them_are_superfluous():
+    np.testing.assert_array_equal(np.flatnonzero(superfluous(standing(6), 0, 6)), [3, 4, 5])
+
+
+def test_what_was_forgotten_before_does_not_count():
+    np.testing.assert_array_equal(np.flatnonzero(superfluous(standing(6, forgotten=[1]), 2, 6)), [1, 4, 5])
+
+
+def test_groups_elsewhere_are_kept():
+    solution = standing(6)
+    solution.state.nodes[4:, 0] += 10.0
+    assert not superfluous(solution, 0, 6)[4:].any()
+
+
+def test_forgotten_groups_are_none_of_the_nearest():
+    np.testing.assert_array_equal(nearest_groups(standing(6, forgotten=[0, 1]), 6, np.zeros(2)).numbers, [2, 3, 4])
+
+
+def round_and_round(times):
+    """Return poses (n, 3) of a vehicle that goes round in a circle of two metres."""
+    phase = times / 60.0
+    return np.column_stack([np.cos(phase), np.sin(phase), phase])
+
+
+@pytest.fixture
+def forgetful(monkeypatch):
+    """Forget what is older than 30 scans, six scans at once."""
+    monkeypatch.setattr(live_solver, "_FORGOTTEN_AT_ONCE", 6)
+    parameters = solver_parameters(free_scans=5, frozen_scans=10)
+    object.__setattr__(parameters, "kept_scans", 30)
+    return parameters
+
+
+def test_a_run_that_forgets_is_followed_as_one_that_does_not(forgetful):
+    made = tour(60, path=round_and_round)
+    solver = followed(made.scans, forgetful)
+    assert np.count_nonzero(solver.log.forgotten) > 10
+    assert solver.estimates[20] is None
+    newest = solver.estimates[-1]
+    assert np.hypot(*(newest.T_map_base - made.truth.at(newest.time))[:2]) < 0.3
+
+
+def test_scans_are_kept_for_storing_only_as_many_as_are_stored(monkeypatch):
+    monkeypatch.setattr(joint_session, "_MOST_STORED", 5)
+    session = JointSession.begun(solver_parameters(), SONAR_IN_BASE, np.zeros(3), None, np.empty((0, 2)))
+    for number, scan in enumerate(SCANS[:8], start=1):
+        session.add(scan)
+        assert session.may_be_stored == (number <= 5)
+        assert len(session.scans) == (number if number <= 5 else 0)
