@@ -2,23 +2,30 @@
 
 Source: "Binary log file structure" of Ping Viewer, and its src/link/filelink.cpp and logsensorstruct.cpp. Qt writes
 numbers big-endian, texts as their number of bytes and UTF-16. Times are hours, minutes, seconds and milliseconds since
-Ping Viewer was started; older versions wrote the time of day.
+Ping Viewer was started; older versions wrote the time of day, and the first ones no header. Qt writes times with the
+digits and signs of the computer's language.
 """
 
 import re
 import struct
+import unicodedata
 from dataclasses import dataclass
 from typing import Iterator, Optional, Tuple
 
 TITLE = "PingViewer sensor log file"
 
 _BUILD_TEXTS = 5  # Commit, date, release, name and version of the operating system
-_NULL_TEXT = 0xFFFFFFFF
+_NULL = 0xFFFFFFFF  # Length of a text or of data that Qt calls null
 _LONGEST_PART = 10240  # Bytes, the buffer of Ping Viewer's parser
 _DAY = 86400.0
-_TIME = re.compile(r"(\d\d):([0-5]\d):([0-5]\d)\.(\d\d\d)")
-_TIME_LENGTH = 28  # Bytes of the next pattern
-_TIME_BYTES = re.compile(rb"\0\0\0\x18\0\d\0\d\0:\0[0-5]\0\d\0:\0[0-5]\0\d\0\.\0\d\0\d\0\d")
+_HALF_DAY = 12  # h
+# Hours, minutes and seconds with the same sign between them, and milliseconds, which a date beside them does not have.
+_CLOCK = re.compile(r"(?<!\d)(\d{1,2})([^\d\s])([0-5]\d)\2([0-5]\d)\D(\d{3})(?!\d)")
+_AFTERNOON = {"pm", "بظ", "بعدازظهر", "م", "下午", "午後", "오후", "μμ"}
+_MORNING = {"am", "قظ", "قبلازظهر", "ص", "上午", "午前", "오전", "πμ"}
+# The length of a text of 8 to 40 characters, with which each part begins.
+_TEXT_LENGTH = re.compile(rb"(?=\0\0\0[\x10-\x50])")
+_LONGEST_TEXT = 0x50  # Bytes
 
 
 class NoLogError(ValueError):
@@ -40,16 +47,7 @@ class PingViewerLog:
         """`data`: the whole file. Raises NoLogError."""
         self.damaged = 0
         self._data = data
-        try:
-            title, position = _text(data, 0)
-            if title != TITLE:
-                raise NoLogError(f"begins with {title[:40]!r}: must be {TITLE!r}")
-            self.version, position = _number(data, position)
-            for _ in range(_BUILD_TEXTS):
-                _, position = _text(data, position)
-            self._start = position + 2 * 4
-        except (struct.error, UnicodeDecodeError):
-            raise NoLogError(f"{len(data)} bytes: the header is cut short or damaged") from None
+        self._start = 0 if self._time(0) is not None else _after_header(data)
 
     def __iter__(self) -> Iterator[LoggedPart]:
         position, last, days = self._start, 0.0, 0
@@ -61,43 +59,73 @@ class PingViewerLog:
                 last = max(last, part.time + days * _DAY)
                 yield LoggedPart(last, part.data)
 
-    def _is_cut(self, start: int, end: int) -> bool:
-        """Return whether another part begins within the data of one: its own end is lost."""
-        inner = _TIME_BYTES.search(self._data, start, end + _TIME_LENGTH)
-        return inner is not None and inner.start() < end
-
     def _part(self, position: int) -> Tuple[Optional[LoggedPart], int]:
         """Return the part at `position`, if there is one, and where to continue."""
-        try:
-            text, after = _text(self._data, position)
-            (length,) = struct.unpack_from(">I", self._data, after)
-            end = after + 4 + length
-            time = _seconds(text)
-            if time is not None and length <= _LONGEST_PART and end <= len(self._data) and not self._is_cut(after, end):
-                return LoggedPart(time, self._data[after + 4 : end]), end
-        except (struct.error, UnicodeDecodeError):
-            pass
+        found = self._time(position)
+        if found is not None:
+            time, start = found
+            end = start + _length(self._data, start - 4)
+            # Where another part begins within the data of one, its own end is lost.
+            if end <= min(start + _LONGEST_PART, len(self._data)) and self._next_time(start, end) is None:
+                return LoggedPart(time, self._data[start:end]), end
         self.damaged += 1
-        following = _TIME_BYTES.search(self._data, position + 1)
-        return None, following.start() if following else len(self._data)
+        following = self._next_time(position + 1, len(self._data))
+        return None, len(self._data) if following is None else following
+
+    def _next_time(self, start: int, end: int) -> Optional[int]:
+        """Return where from `start` on, and before `end`, the next part begins."""
+        places = (one.start() for one in _TEXT_LENGTH.finditer(self._data, start, end + 3))
+        return next((place for place in places if self._time(place) is not None), None)
+
+    def _time(self, position: int) -> Optional[Tuple[float, int]]:
+        """Return the time [s] of the part that begins at `position` and where its data begin; None where none does."""
+        try:
+            length = _length(self._data, position)
+            if length > _LONGEST_TEXT:
+                return None
+            text, after = _text(self._data, position)
+            _length(self._data, after)
+        except (struct.error, UnicodeDecodeError):
+            return None
+        time = _seconds(text)
+        return None if time is None else (time, after + 4)
+
+
+def _after_header(data: bytes) -> int:
+    """Return where a header at the start of `data` ends. Raises NoLogError."""
+    try:
+        title, position = _text(data, 0)
+        if title != TITLE:
+            raise NoLogError(f"begins with {title[:40]!r}: must be {TITLE!r}")
+        position += 4  # Version of the header
+        for _ in range(_BUILD_TEXTS):
+            _, position = _text(data, position)
+    except (struct.error, UnicodeDecodeError):
+        raise NoLogError(f"{len(data)} bytes: the header is cut short or damaged") from None
+    return position + 2 * 4  # Family and type of the device
 
 
 def _seconds(text: str) -> Optional[float]:
-    found = _TIME.fullmatch(text)
+    """Return the time of day or since the start in a text of any language [s], None where there is none."""
+    plain = "".join(str(unicodedata.decimal(one, one)) for one in text if unicodedata.category(one) != "Cf")
+    found = _CLOCK.search(plain)
     if found is None:
         return None
-    hours, minutes, seconds, milliseconds = map(int, found.groups())
+    hours, minutes, seconds, milliseconds = (int(found[group]) for group in (1, 3, 4, 5))
+    letters = "".join(filter(str.isalpha, plain[: found.start()] + plain[found.end() :])).casefold()
+    if letters in _AFTERNOON | _MORNING:
+        hours = hours % _HALF_DAY + _HALF_DAY * (letters in _AFTERNOON)
     return 3600.0 * hours + 60.0 * minutes + seconds + 1e-3 * milliseconds
 
 
-def _number(data: bytes, position: int) -> Tuple[int, int]:
-    return struct.unpack_from(">i", data, position)[0], position + 4
+def _length(data: bytes, position: int) -> int:
+    """Return the number of bytes that is written at `position`. Raises struct.error where it is cut short."""
+    (length,) = struct.unpack_from(">I", data, position)
+    return 0 if length == _NULL else length
 
 
 def _text(data: bytes, position: int) -> Tuple[str, int]:
     """Return the text at `position` and where it ends; raises struct.error where it is cut short."""
-    (length,) = struct.unpack_from(">I", data, position)
-    if length == _NULL_TEXT:
-        return "", position + 4
+    length = _length(data, position)
     (raw,) = struct.unpack_from(f">{min(length, len(data))}s", data, position + 4)
     return raw.decode("utf-16-be"), position + 4 + length

@@ -2,14 +2,15 @@
 
 from os.path import getmtime
 from pathlib import Path
-from typing import Callable, Iterator, Optional, Tuple
+from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
 from imagenex_852_driver.log_file import LogReader, timed
 from imagenex_852_driver.protocol.reply import head_angle as imagenex_angle
+from node_support.errors import RefusedInput
 from ping360_driver.ping_viewer_log import NoLogError, PingViewerLog
-from ping360_driver.protocol.messages import MessageError, MessageId, MessageStream
+from ping360_driver.protocol.messages import MessageError, MessageId, MessageStream, PingMessage
 from ping360_driver.protocol.replies import Beam as HeadBeam
 from ping360_driver.protocol.replies import beam as head_beam
 from ping360_driver.protocol.scan_command import bin_length
@@ -92,28 +93,39 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
     except NoLogError as error:
         raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
     stream = MessageStream()
-    beams, inconsistent = [], 0
-    for time, found in _messages(log, stream):
-        if found is None:
+    heads: Dict[int, List[Beam]] = {}
+    inconsistent = 0
+    for time, message in _beam_messages(log, stream):
+        try:
+            found = head_beam(message)
+            beam = _beam_of(found, time - found.pulse.listening_time)
+        except (MessageError, RefusedInput):
             inconsistent += 1
             continue
-        stamp = max(round((time - found.pulse.listening_time) * 1e9), 1)
-        resolution = bin_length(found.pulse.sample_period, USUAL_SPEED_OF_SOUND)
-        strengths = np.frombuffer(found.echoes, dtype=np.uint8)
-        beams.append(Beam(stamp, _FRAME, ping360_angle(found.angle), strengths, resolution))
-    if not beams:
-        raise RecordingError(f"{path}: no beam of a Ping360 in this log")
-    note = f"times of {path.name} count from the start of Ping Viewer; ranges are those of {USUAL_SPEED_OF_SOUND:g} m/s"
-    return RecordedBeams(beams, [False] * len(beams), log.damaged + stream.broken + inconsistent, [note])
+        heads.setdefault(message.src_device_id, []).append(beam)
+    refused = log.damaged + stream.broken + inconsistent
+    if not heads:
+        raise RecordingError(f"{path}: none of its messages is a beam of a Ping360; {refused} were damaged or empty")
+    notes = [
+        f"times of {path.name} count from the start of Ping Viewer; ranges are those of {USUAL_SPEED_OF_SOUND:g} m/s"
+    ]
+    device, beams = max(heads.items(), key=lambda one: len(one[1]))
+    if len(heads) > 1:
+        counts = ", ".join(f"{len(kept)} of device {number}" for number, kept in sorted(heads.items()))
+        notes.append(f"{path.name} holds the beams of several heads, {counts}: only those of device {device} are used")
+    return RecordedBeams(beams, [False] * len(beams), refused, notes)
 
 
-def _messages(log: PingViewerLog, stream: MessageStream) -> Iterator[Tuple[float, Optional[HeadBeam]]]:
-    """Yield the beams with the times of their messages; None for one that is inconsistent."""
+def _beam_messages(log: PingViewerLog, stream: MessageStream) -> Iterator[Tuple[float, PingMessage]]:
+    """Yield the messages of beams with the times at which they came, s."""
     for part in log:
         for parsed in stream.feed(part.data):
             if parsed.message.message_id in _BEAMS:
-                try:
-                    found = head_beam(parsed.message)
-                    yield part.time, found if found.echoes else None
-                except MessageError:
-                    yield part.time, None
+                yield part.time, parsed.message
+
+
+def _beam_of(found: HeadBeam, time: float) -> Beam:
+    """Return what the head sent at `time` [s]. Raises RefusedInput where it holds no echoes."""
+    stamp = max(round(time * 1e9), 1)
+    resolution = bin_length(found.pulse.sample_period, USUAL_SPEED_OF_SOUND)
+    return Beam(stamp, _FRAME, ping360_angle(found.angle), np.frombuffer(found.echoes, dtype=np.uint8), resolution)

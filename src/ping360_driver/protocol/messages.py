@@ -6,7 +6,7 @@ from enum import IntEnum
 from typing import List, NamedTuple
 
 try:
-    from brping.definitions import payload_dict_common, payload_dict_ping360
+    from brping.definitions import payload_dict_common, payload_dict_ping1d, payload_dict_ping360
     from brping.pingmessage import PingMessage, variable_msgs
 except ImportError as missing:
     raise ImportError("a Ping360 needs the library bluerobotics-ping: pip install bluerobotics-ping") from missing
@@ -17,7 +17,8 @@ START = bytes([PingMessage.start_1, PingMessage.start_2])
 
 # Bytes of payload: a beam of 1,200 samples takes 1,220. A longer message is none.
 _LONGEST_PAYLOAD = 2048
-_KNOWN = {**payload_dict_common, **payload_dict_ping360}
+# An echo sounder of the same maker may share the line, and the log.
+_KNOWN = {**payload_dict_common, **payload_dict_ping1d, **payload_dict_ping360}
 _UNKNOWN = float("inf")
 
 

@@ -16,6 +16,7 @@ from recordings.reader import Request, read
 
 TICKS = 400
 SAMPLES = 300
+PERSIAN, ARABIC = ({ord("0") + digit: zero + digit for digit in range(10)} for zero in (0x06F0, 0x0660))
 LISTENING = TICKS * 25e-9 * SAMPLES
 
 
@@ -77,6 +78,43 @@ def test_messages_split_over_parts_and_automatic_ones_are_read_too(tmp_path):
     assert angles == pytest.approx([(200 - 7) * np.pi / 200, (200 - 8) * np.pi / 200])
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "21:56:10.861",
+        "21:56:10.861".translate(PERSIAN),
+        "21:56:10\u066b861".translate(ARABIC),
+        "21.56.10,861",
+        "09:56:10.861 PM",
+        "下午9:56:10.861",
+        "2021-06-11 21:56:10.861",
+        "21:56:10.861 11.06.21",
+        "\u200f11/06/2021 9:56:10.861 ب.ظ",
+    ],
+)
+def test_times_are_read_in_the_digits_signs_and_order_of_any_language(text):
+    data = log_bytes([]) + text_bytes(text) + struct.pack(">I", 2) + b"BR"
+    (part,) = PingViewerLog(data)
+    assert (part.time, part.data) == (pytest.approx(78970.861), b"BR")
+
+
+def test_logs_of_the_first_versions_have_no_header():
+    data = log_bytes([(1.0, b"a"), (2.0, b"b")])[len(log_bytes([])) :]
+    assert [part.time for part in PingViewerLog(data)] == [1.0, 2.0]
+
+
+def test_the_head_with_most_beams_is_read_of_several_on_one_line(tmp_path):
+    path = tmp_path / "two.bin"
+    other = bytearray(beam_bytes(5))
+    other[6] = 3  # Number of the sending device, and the checksum that counts it
+    other[-2:] = struct.pack("<H", sum(other[:-2]) & 0xFFFF)
+    depth = packed(1211, distance=4000, confidence=90)
+    path.write_bytes(log_bytes([(1.0, bytes(other)), (1.1, depth), (1.2, beam_bytes(6)), (1.3, beam_bytes(7))]))
+    found = makers_beams(path)
+    assert (len(found.beams), found.refused) == (2, 0)
+    assert "1 of device 3: only those of device 0 are used" in found.notes[-1]
+
+
 def test_times_go_on_after_midnight():
     log = PingViewerLog(log_bytes([(86399.0, b"a"), (86401.0, b"b"), (86400.5, b"c")]))
     assert [part.time for part in log] == [86399.0, 86401.0, 86401.0]
@@ -97,7 +135,7 @@ def test_it_is_read_as_a_recording_of_a_standing_vehicle(turn):
 def test_a_log_without_beams_is_refused(tmp_path):
     path = tmp_path / "empty.bin"
     path.write_bytes(log_bytes([]))
-    with pytest.raises(RecordingError, match="no beam of a Ping360"):
+    with pytest.raises(RecordingError, match="is a beam of a Ping360"):
         makers_beams(path)
 
 
