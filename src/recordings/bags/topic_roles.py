@@ -34,7 +34,9 @@ _TYPES: Dict[Role, List[str]] = {
 _ROLES = {name: role for role, names in _TYPES.items() for name in names}
 _NUMBERS = ("std_msgs/Float32", "std_msgs/Float64")
 # Parts of names of poses that are wanted, or known by other means than the vehicle's own.
-_NO_ODOMETRY = ("setpoint", "goal", "target", "command", "truth", "gps", "dgps", "gnss", "/gt", "waypoint", "home")
+_NO_ODOMETRY = (
+    "setpoint", "goal", "target", "command", "truth", "gps", "dgps", "gnss", "/gt", "waypoint", "home", "heading",
+)  # fmt: skip
 _LIKELY = ("odom", "local_position", "dead_reckoning", "navigation", "pose")
 
 

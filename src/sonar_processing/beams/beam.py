@@ -12,6 +12,7 @@ MAX_BINS = 4096  # Four times what scanning sonars send (Micron 800, Imagenex 85
 # m: ten times what scanning sonars hear; farther points would only cost precision.
 FARTHEST_RANGE = 10_000.0
 SERVO_DEAD_BAND = 1e-3  # rad: a servo that holds its place trembles by less, and none steps by as little
+_ROUNDING = 1e-4  # Share: of a length of bins that was computed from float32
 _LONGEST_NS = 10 * 10**9
 """Longer than any head takes for some beams, shorter than a slow turn: the vehicle is elsewhere by then."""
 
@@ -76,6 +77,12 @@ class PlacedBeam:
 def servo_moved(beam: Beam, earlier: Beam) -> bool:
     """Whether the servo stands elsewhere than at an earlier beam; it may tremble."""
     return abs(beam.sensor_angle - earlier.sensor_angle) > SERVO_DEAD_BAND
+
+
+def has_other_bins(beam: Beam, earlier: Beam) -> bool:
+    """Whether number or length of a beam's bins are others than an earlier one's, but for rounding."""
+    same = math.isclose(beam.range_resolution, earlier.range_resolution, rel_tol=_ROUNDING)
+    return beam.intensities.size != earlier.intensities.size or not same
 
 
 def long_after(beam: Beam, earlier: Beam) -> bool:

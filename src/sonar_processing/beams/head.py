@@ -6,7 +6,7 @@ from enum import Enum
 from typing import Deque, List, Optional
 
 from node_support.geometry import FULL_TURN, wrapped
-from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.beam import Beam, has_other_bins
 
 _BOTH_ENDS = 2  # a head that reversed twice has swept its sector from end to end
 _SETTLED = 5  # Equal steps after which the head's step is another, and none was lost
@@ -110,7 +110,7 @@ class HeadWatch:
             self.clear()
             self._last = beam
             return events
-        if (beam.intensities.size, beam.range_resolution) != (last.intensities.size, last.range_resolution):
+        if has_other_bins(beam, last):
             events[HeadEvent.RANGE_CHANGED] += 1
         self._turn(wrapped(beam.angle - last.angle), last.angle, events)
         return events

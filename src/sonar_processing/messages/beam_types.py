@@ -23,6 +23,8 @@ _LASER_STRENGTH = 255
 _MOST_RAYS = 7200  # Rays of 0.05 deg, finer than any head steps; more is a broken message
 OWN = "underwater_map_construction/SonarScanLine"
 LASER_SCAN = "sensor_msgs/LaserScan"
+POINT_CLOUD = "sensor_msgs/PointCloud"
+_STRAIGHT = 0.01  # Of a bin: so far points of one beam lie beside their line, by rounding
 
 
 class AngleUnit(Enum):
@@ -133,6 +135,24 @@ def scan_line(message: Any) -> List[BeamFields]:
     return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle, strengths, step)]
 
 
+def point_cloud(message: Any) -> List[BeamFields]:
+    """Read a PointCloud of tritech_micron: one beam, whose bin i ends at its point i.
+
+    Raises RefusedInput for points that are not those of one beam.
+    """
+    points = np.array([(one.x, one.y, one.z) for one in message.points], dtype=np.float64).reshape(-1, 3)
+    strengths = message.channels[0].values if message.channels else ()
+    if len(points) < 2 or len(strengths) != len(points):
+        raise RefusedInput("beams refused", f"{len(points)} points with {len(strengths)} strengths; must be one beam")
+    step = points[-1] / len(points)
+    off = np.abs(points - step * np.arange(1, len(points) + 1)[:, np.newaxis]).max()
+    resolution = float(np.linalg.norm(step))
+    if not off <= _STRAIGHT * resolution:
+        raise RefusedInput("beams refused", f"points lie {off:.2g} m beside equal steps on a line; must be one beam")
+    angle = math.atan2(step[1], step[0])
+    return [BeamFields(stamp_ns(message.header), message.header.frame_id, angle, _strengths(strengths), resolution)]
+
+
 def laser_scan(message: Any) -> List[BeamFields]:
     """Read a LaserScan: one beam with one echo for each ray; raises RefusedInput for one without range or direction.
 
@@ -231,6 +251,12 @@ _TYPES: Tuple[BeamType, ...] = (
         zero="+x of the frame, as in the package's `scan_line_parser`; where that is on the head is not documented",
         strengths="0 to 255", bins="`bin_distance_step`; bin i ends at i + 1 steps",
         source="the message has no comments; `scan_line_parser` and the driver of micron_driver_ros",
+    ),
+    BeamType(
+        (POINT_CLOUD,), point_cloud, AngleUnit.RADIANS,
+        zero="+x of the frame, as the points lie", strengths="0 to 255",
+        bins="from point to point; bin i ends at point i",
+        source="the driver tritech_micron, which publishes a cloud for each beam",
     ),
     BeamType(
         (LASER_SCAN,), laser_scan, AngleUnit.RADIANS,

@@ -7,7 +7,7 @@ from typing import Deque, List, Optional
 
 import numpy as np
 
-from sonar_processing.beams.beam import Beam, PlacedBeam, long_after, servo_moved
+from sonar_processing.beams.beam import Beam, PlacedBeam, has_other_bins, long_after, servo_moved
 from sonar_processing.beams.head import HeadTurn
 from sonar_processing.beams.projection import kept_bins, project_beams
 from sonar_processing.cloud import Cloud
@@ -159,7 +159,6 @@ def _differs(beam: Beam, earlier: Beam) -> bool:
     return (
         servo_moved(beam, earlier)
         or long_after(beam, earlier)
-        or beam.intensities.size != earlier.intensities.size
-        or beam.range_resolution != earlier.range_resolution
+        or has_other_bins(beam, earlier)
         or beam.frame_id != earlier.frame_id
     )

@@ -50,6 +50,14 @@ def micron_line_of(angle=-180.0, strengths=(1, 2, 3), step=0.05, **values):
     return _made(values, header=header(frame_id="/Micron"), angle=angle, bin_distance_step=step, bins=bins)
 
 
+def point_cloud_of(strengths=(1, 2, 3), bearing=-0.5 * np.pi, step=0.05, **values):
+    """Return a PointCloud of tritech_micron."""
+    reach = step * np.arange(1, len(strengths) + 1)
+    points = [SimpleNamespace(x=one * np.cos(bearing), y=one * np.sin(bearing), z=0.0) for one in reach]
+    channels = [SimpleNamespace(name="intensity", values=[float(one) for one in strengths])]
+    return _made(values, header=header(), points=points, channels=channels)
+
+
 def laser_scan_of(ranges=(1.0, np.inf, 3.0), **values):
     """Return a LaserScan."""
     return _made(

@@ -15,12 +15,13 @@ from sonar_messages import (
     laser_scan_of,
     micron_line_of,
     ping_360_of,
+    point_cloud_of,
     scan_line_of,
     sonar_echo_of,
 )
 
 from node_support.errors import RefusedInput
-from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN, OWN
+from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN, OWN, POINT_CLOUD
 from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
 
 ECHO, PING_360 = "ping360_sonar/SonarEcho", "bluerobotics_sonar_msgs/SonarPing360"
@@ -30,6 +31,7 @@ MADE = {
     ECHO: sonar_echo_of,
     PING_360: ping_360_of,
     MICRON: micron_line_of,
+    POINT_CLOUD: point_cloud_of,
     LASER_SCAN: laser_scan_of,
 }
 SONARS_PAGE = (Path(__file__).resolve().parents[3] / "docs/sonars.md").read_text()
@@ -38,6 +40,7 @@ NEEDED = {
     ECHO: "header angle intensities range number_of_samples speed_of_sound",
     PING_360: "header angle profile_data range",
     MICRON: "header angle bin_distance_step bins",
+    POINT_CLOUD: "header points channels",
     LASER_SCAN: "header angle_min angle_increment time_increment range_max ranges",
 }
 MESSAGES = 5000
@@ -88,6 +91,20 @@ def test_a_micron_of_the_micron_driver_ros_package():
     found = beam(MICRON, micron_line_of(-90.0))
     assert (found.frame_id, found.range_resolution, found.intensities.tolist()) == ("Micron", 0.05, [1, 2, 3])
     assert found.angle == pytest.approx(-math.pi / 2)
+
+
+def test_a_micron_of_the_tritech_micron_package():
+    found = beam(POINT_CLOUD, point_cloud_of(bearing=2.0))
+    assert (found.angle, found.range_resolution) == (pytest.approx(2.0), pytest.approx(0.05))
+    assert found.intensities.tolist() == [1, 2, 3]
+
+
+def test_a_cloud_that_is_no_single_beam_is_refused():
+    bent = point_cloud_of()
+    bent.points[1].x += 0.01
+    for cloud in (bent, point_cloud_of(channels=[]), point_cloud_of(points=[])):
+        with pytest.raises(RefusedInput, match="must be one beam"):
+            reading(POINT_CLOUD, cloud)
 
 
 @pytest.mark.parametrize("ros_2_name", ["ping360_sonar_msgs/msg/SonarEcho", "micron_driver_ros/msg/ScanLine"])
