@@ -245,6 +245,7 @@ NODES: Dict[str, NodeDescription] = {
         (
             _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "commands, if `drive` is CMD_VEL"),
             _subscribes(topics.SERVO_COMMANDS, "std_msgs/Float64", "goal of the servo, rad, positive down"),
+            _subscribes(topics.ECHOES, "StampedIntensityCloud", "simulated time waits while they are overdue"),
             _publishes(topics.BEAMS, "SonarScanLine", "beams"),
             _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "dead reckoning with the configured errors; also as tf"),
             _publishes(topics.HEADING, "sensor_msgs/Imu", "orientation, if `instruments` is COMPASS"),

@@ -12,6 +12,8 @@ from geometry_msgs.msg import Twist
 from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, run, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 
+from underwater_map_construction.msg import StampedIntensityCloud
+
 ATTEMPTS = 5
 
 
@@ -25,6 +27,12 @@ def _goes_on_at_speed(truth: Odometry) -> bool:
     """Return whether the vehicle has come so far that it no longer accelerates, and moves as it was told."""
     speed = truth.twist.twist.linear
     return truth.pose.pose.position.x > -1.5 and abs(speed.x - 0.4) < 0.05 and abs(speed.y - 0.1) < 0.02
+
+
+def _echoes(stamp: rospy.Time) -> StampedIntensityCloud:
+    made = StampedIntensityCloud()
+    made.header.stamp = stamp
+    return made
 
 
 class SimulatorCommands(unittest.TestCase):
@@ -69,6 +77,20 @@ class SimulatorCommands(unittest.TestCase):
         fast = self._drive(_command(-9.0), lambda m: m.twist.twist.linear.x < -0.9)
         self.assertGreaterEqual(fast.twist.twist.linear.x, -1.0)
         self.diagnostics.wait_for("sonar_simulator", "velocity commands limited", 1)
+
+    def test_time_waits_for_echoes_that_are_overdue(self) -> None:
+        """They came each second; two seconds after the last ones time stands, until others come."""
+        echoes = rospy.Publisher("sonar/scan/echoes", StampedIntensityCloud, queue_size=10)
+        wait_for_publisher_links(echoes, 1)
+        last = rospy.Time.now()
+        for seconds in (1.0, 0.0):
+            echoes.publish(_echoes(last - rospy.Duration(seconds)))
+        time.sleep(2.0)  # for messages that are late
+        held = rospy.Time.now()
+        time.sleep(1.0)  # in which four seconds are simulated while nothing is waited for
+        self.assertEqual(rospy.Time.now(), held)
+        echoes.publish(_echoes(held))
+        self.truth.wait_for(lambda m: m.header.stamp > held)
 
     def test_it_ends_within_two_seconds_of_ctrl_c(self) -> None:
         """Also when its next moment is five seconds away; another program may take the processor in one attempt."""

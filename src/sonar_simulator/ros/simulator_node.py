@@ -2,6 +2,7 @@
 
 import itertools
 import math
+import struct
 import threading
 from typing import Iterator
 
@@ -15,7 +16,7 @@ from node_support.files import package_folder
 from node_support.parameters import ParameterError
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
-from node_support.timing import Pace
+from node_support.timing import Pace, UsualInterval
 from sonar_simulator.ros.publisher import SimulatorPublisher, TrueSonar
 from sonar_simulator.simulation.moment_messages import map_origin
 from sonar_simulator.simulation.simulation import Drive, Head, Moment
@@ -25,6 +26,28 @@ from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 _WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
 _LISTENER_TIME = 0.5  # s: a subscriber that has one topic has the others within this time
+_LONGEST_WAIT = 10.0  # s: of the wall clock for echoes that are overdue; who needs longer has ended
+
+
+class Echoes:
+    """Knows from the echoes that come back whether their listeners keep pace; without any, nobody is waited for."""
+
+    def __init__(self) -> None:
+        self._interval = UsualInterval()
+        self._condition = threading.Condition()
+        rospy.Subscriber(topics.ECHOES, rospy.AnyMsg, self._take, queue_size=10)
+
+    def _take(self, echoes: rospy.AnyMsg) -> None:
+        _, seconds, nanoseconds = struct.unpack_from("<3I", echoes._buff)
+        with self._condition:
+            self._interval.take(seconds + 1e-9 * nanoseconds)
+            self._condition.notify()
+
+    def wait_for(self, stamp: float) -> None:
+        """Wait while echoes are overdue at `stamp` [s]; a sender that stays silent is forgotten."""
+        with self._condition:
+            if not self._condition.wait_for(lambda: not self._interval.overdue(stamp), _LONGEST_WAIT):
+                self._interval = UsualInterval()
 
 
 class Simulator:
@@ -43,6 +66,7 @@ class Simulator:
         self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive, instruments, origin)
         self._publisher.publish_world(self._setup.world)
         self._true_sonar = TrueSonar(origin) if self._parameters.head is Head.EMULATED else None
+        self._echoes = Echoes()
         self._start_time = START_TIME
         self._now = 0.0
         self._lock = threading.Lock()
@@ -102,6 +126,7 @@ class Simulator:
 
     def _keep_pace(self, moment: Moment, pace: Pace) -> None:
         lost = pace.lost
+        self._echoes.wait_for(self._start_time + moment.time)
         pace.wait_for(moment.time)
         if pace.lost > lost:
             factor = self._parameters.real_time_factor
