@@ -3,6 +3,7 @@
 from typing import Dict
 
 import numpy as np
+import rosgraph
 import rospy
 import tf2_ros
 from genpy import Message
@@ -80,7 +81,7 @@ def _transform(frame: str, T_world_frame: np.ndarray, stamp: rospy.Time) -> Tran
     return message
 
 
-_QUEUE_SIZE = 100  # A second of every topic at the usual rates
+_QUEUE_SIZE = 1000  # A second of every topic at the usual rates and ten times the real time
 
 
 class SimulatorPublisher:
@@ -107,6 +108,18 @@ class SimulatorPublisher:
     def has_listener(self) -> bool:
         """Whether anybody subscribes to the beams."""
         return self._publishers[topics.BEAMS].get_num_connections() > 0
+
+    def lacks_listeners(self) -> bool:
+        """Return whether somebody who subscribes is not connected yet, or nobody takes the heading; asks the master."""
+        try:
+            subscribers = {topic: len(nodes) for topic, nodes in rosgraph.Master(rospy.get_name()).getSystemState()[1]}
+        except (OSError, rosgraph.MasterException):
+            return False
+        made = [*self._publishers.values(), *([] if self._commands is None else [self._commands])]
+        heading = self._publishers.get(topics.HEADING)
+        return (heading is not None and not heading.get_num_connections()) or any(
+            one.get_num_connections() < subscribers.get(one.resolved_name, 0) for one in made
+        )
 
     def publish_clock(self, stamp: rospy.Time) -> None:
         """Publish the simulated time."""

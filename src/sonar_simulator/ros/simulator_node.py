@@ -25,7 +25,8 @@ from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 _WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
-_LISTENER_TIME = 0.5  # s: a subscriber that has one topic has the others within this time
+_LISTENER_TIME = 0.5  # s: who subscribes to the beams has told the master its other topics within this time
+_LONGEST_START = 10.0  # s: who is not connected by then has ended
 _LONGEST_WAIT = 10.0  # s: of the wall clock for echoes that are overdue; who needs longer has ended
 
 
@@ -134,13 +135,15 @@ class Simulator:
             self.health.problem("delays", detail)
 
     def _wait_for_listener(self) -> None:
-        """Let the clock run until somebody subscribes to the beams and has had time to connect to tf as well."""
+        """Let the clock run until somebody subscribes to the beams, and all who subscribe have been connected."""
         start, waited = self._setup.simulation.moment(0.0), 0.0
-        while waited < _LISTENER_TIME and not self._ended.wait(_WAIT_STEP):
+        while waited < _LONGEST_START and not self._ended.wait(_WAIT_STEP):
             waited += _WAIT_STEP if self._publisher.has_listener else 0.0
             self._publish_true_sonar(start, rospy.Time.from_sec(self._start_time))
             self._publisher.publish_rest(start, rospy.Time.from_sec(self._start_time))
             self._start_time += _WAIT_STEP
+            if waited >= _LISTENER_TIME and not self._publisher.lacks_listeners():
+                return
 
     def _publish_true_sonar(self, moment: Moment, stamp: rospy.Time) -> None:
         if self._true_sonar is not None:
