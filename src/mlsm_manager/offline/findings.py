@@ -16,6 +16,7 @@ from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
+from mlsm_manager.self_check.headline import headline
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
@@ -107,19 +108,25 @@ class Calibration:
 
 @dataclass(frozen=True)
 class Trust:
-    """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then."""
+    """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
+
+    matched: scans that were compared with the surfaces of others.
+    """
 
     verdicts: List[Verdict]
     times: np.ndarray
     covariances: np.ndarray
+    matched: int
 
     @property
     def line(self) -> str:
         """One line for people."""
-        firing = [verdict for verdict in self.verdicts if verdict.fires]
-        if not firing:
-            return f"trust: all {len(self.verdicts)} checks are fine"
-        return "trust: DOUBTFUL: " + "; ".join(verdict.text for verdict in firing)
+        return headline(self.verdicts, self.matched, float(self.deviations.max()))
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """(k,) m, 2-D standard deviations of the position in map, as stated at `times`."""
+        return _radii(self.covariances)
 
     @property
     def uncertainty(self) -> Uncertainty:
@@ -138,11 +145,12 @@ class Trust:
                 "value": None if np.isnan(verdict.value) else round(verdict.value, 3),
                 "limit": verdict.limit,
                 "fires": verdict.fires,
+                "answer": verdict.answer.value,
                 "meaning": verdict.text,
             }
             for verdict in self.verdicts
         }
-        minutes = per_minute(self.times, _radii(self.covariances))
+        minutes = per_minute(self.times, self.deviations)
         stated = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
         return {"checks": checks, "deviation_per_minute": stated}
 
@@ -175,7 +183,7 @@ def _trust(
         as_expected(before.names, before.values, before.deviations, calibration.values),
         *_halves(solver),
     ]
-    return Trust([*verdicts, *further], times, covariances)
+    return Trust([*verdicts, *further], times, covariances, replayed.matched)
 
 
 def _radii(covariances: np.ndarray) -> np.ndarray:

@@ -67,6 +67,7 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
     run, findings = mapped.run, mapped.findings
     return Mission(
         title=mapped.title,
+        headline="trust: NOT MEASURED: no solver ran" if findings is None else findings.trust.line,
         paths=trajectories_of(run, mapped.recording),
         scans=_scan_records(mapped),
         blocks=run.blocks,

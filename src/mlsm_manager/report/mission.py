@@ -73,13 +73,14 @@ class Uncertainty:
 class Mission:
     """Everything that the report shows.
 
-    title: names of the recordings. paths: the first is the odometry, the last one the best. scans: oldest first, at
-    least one. verdicts: of all checks; none where none was made. calibration: name -> (value, deviation).
-    facts: name -> value, for the head of the page. parameters: name -> value. further: ways of further recordings,
-    which are shown in the map only.
+    title: names of the recordings. headline: whether the run can be trusted. paths: the first is the odometry, the last
+    one the best. scans: oldest first, at least one. verdicts: of all checks; none where none was made.
+    calibration: name -> (value, deviation). facts: name -> value, for the head of the page. parameters: name -> value.
+    further: ways of further recordings, which are shown in the map only.
     """
 
     title: str
+    headline: str
     paths: List[Path]
     scans: List[ScanRecord]
     blocks: Blocks

@@ -22,7 +22,7 @@ from mlsm_manager.report.figures import (
 )
 from mlsm_manager.report.mission import Mission
 from mlsm_manager.report.page_template import PAGE
-from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.verdict import Answer, Verdict
 from node_support.files import write_whole
 
 _NEAR = 0.75  # share of a limit from which on a figure is worth a look
@@ -37,16 +37,10 @@ class Light(Enum):
     GREEN = "fine"
     AMBER = "near its limit"
     RED = "doubtful"
-    GREY = "too little to tell"
+    GREY = "not measured"
 
 
 _LIGHT_COLORS = {Light.GREEN: "#2e8540", Light.AMBER: "#e0a526", Light.RED: "#c0392b", Light.GREY: "#999999"}
-_RUN_WORDS = {
-    Light.GREEN: "All checks are fine.",
-    Light.AMBER: "All checks pass, but some only just.",
-    Light.RED: "Do not rely on the marked stretches: at least one check failed.",
-    Light.GREY: "Nothing was checked.",
-}
 
 
 def write_report(path: Path, mission: Mission) -> None:
@@ -63,7 +57,7 @@ def report_page(mission: Mission) -> str:
     return Template(PAGE).substitute(
         title=escape(mission.title),
         plotly=get_plotlyjs(),
-        summary=f"{_lamp(of_run)} {_RUN_WORDS[of_run]}",
+        summary=f"{_lamp(of_run)} {escape(mission.headline)}",
         facts=_table(("", ""), _words(mission.facts)),
         checks=_table(("", "question", "what was found", ""), checks) if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
@@ -127,22 +121,20 @@ def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
 
 def light_of(verdict: Verdict) -> Light:
     """Return the light of a check."""
-    if np.isnan(verdict.value):
-        return Light.GREY
-    if verdict.fires:
-        return Light.RED
+    if verdict.answer is not Answer.FINE:
+        return Light.RED if verdict.fires else Light.GREY
     worse = verdict.limit / verdict.value if verdict.more_is_better else verdict.value / verdict.limit
     return Light.AMBER if worse > _NEAR else Light.GREEN
 
 
 def light_of_run(lights: List[Light]) -> Light:
-    """Return the light of the whole run: that of its worst check."""
-    return next((light for light in (Light.RED, Light.AMBER, Light.GREEN) if light in lights), Light.GREY)
+    """Return the light of the whole run: that of its worst check. What was not measured is worse than what is near."""
+    return next((light for light in (Light.RED, Light.GREY, Light.AMBER, Light.GREEN) if light in lights), Light.GREY)
 
 
 def sentence(verdict: Verdict) -> str:
     """Return what a check found, in words."""
-    text = f"too little to tell: {verdict.text}" if np.isnan(verdict.value) else verdict.text
+    text = verdict.line() if verdict.answer is Answer.NOT_MEASURED else verdict.text
     return f"{text[:1].upper()}{text[1:]}."
 
 

@@ -2,10 +2,19 @@
 
 from dataclasses import dataclass, field
 from datetime import datetime, timezone
+from enum import Enum
 
 import numpy as np
 
 _RECORDED, _LATEST = 1e9, 2.0**31  # s since 1970 of clocks that tell the time: simulated ones begin near 0
+
+
+class Answer(Enum):
+    """What a check says. A check without enough data is not fine."""
+
+    FINE = "fine"
+    DOUBTFUL = "DOUBTFUL"
+    NOT_MEASURED = "not measured"
 
 
 @dataclass(frozen=True)
@@ -27,17 +36,21 @@ class Verdict:
     question: str = ""
 
     @property
+    def answer(self) -> Answer:
+        """What the check says."""
+        if np.isnan(self.value):
+            return Answer.NOT_MEASURED
+        beyond = self.value < self.limit if self.more_is_better else self.value > self.limit
+        return Answer.DOUBTFUL if beyond else Answer.FINE
+
+    @property
     def fires(self) -> bool:
         """Whether the run is not to be trusted in this respect."""
-        if np.isnan(self.value):
-            return False
-        return self.value < self.limit if self.more_is_better else self.value > self.limit
+        return self.answer is Answer.DOUBTFUL
 
     def line(self) -> str:
         """Return the verdict as one line."""
-        if np.isnan(self.value):
-            return f"too little to tell: {self.text}"
-        return f"{'DOUBTFUL' if self.fires else 'fine'}: {self.text}"
+        return f"{self.answer.value}: {self.text}"
 
 
 def merged(starts: np.ndarray, length: float) -> np.ndarray:

@@ -37,7 +37,8 @@ def mission(block_count=1000, scans=20, verdicts=(), rejections=(), **more):
     covariances = np.tile(np.diag([1.0, 0.25]), (scans, 1, 1))
     told = Uncertainty(ends, covariances, np.array([[ends[3], ends[5]]]) if scans > 5 else np.empty((0, 2)))
     return Mission(
-        title="<mission & run>", paths=paths, scans=records, blocks=blocks(block_count), verdicts=list(verdicts),
+        title="<mission & run>", headline="trust: <fine>",
+        paths=paths, scans=records, blocks=blocks(block_count), verdicts=list(verdicts),
         calibration={"sonar_delay": (0.95, 0.07)}, facts={"duration": "5 minutes"},
         parameters={"resolution": RESOLUTION}, uncertainty=told, **more,
     )  # fmt: skip

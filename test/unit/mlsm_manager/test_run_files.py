@@ -67,19 +67,29 @@ FIRING = Verdict("width", 2.0, 1.0, "too wide (2 m)", doubtful=np.array([[3.0, 9
 SHORT = Verdict("length", np.nan, 1.0, "m")
 
 
-def trust_of(*verdicts, times=(0.0, 10.0, 200.0)):
+def trust_of(*verdicts, times=(0.0, 10.0, 200.0), matched=3):
     covariances = np.tile(np.diag([9.0, 16.0]), (len(times), 1, 1))
-    return Trust(list(verdicts), np.array(times), covariances)
+    return Trust(list(verdicts), np.array(times), covariances, matched)
 
 
-def test_a_run_without_doubts_says_so():
-    assert trust_of(FINE, SHORT).line == "trust: all 2 checks are fine"
+@pytest.mark.parametrize(
+    ("verdicts", "matched", "line"),
+    [
+        ((FINE, FINE), 3, "all 2 checks are fine, nothing contradicts: position within 8.7 m"),
+        ((FINE, SHORT), 3, "1 of 2 checks are fine, NOT MEASURED: length; position within 8.7 m if these are fine too"),
+        ((SHORT,), 3, "NOT MEASURED: none of 1 checks had enough data; nothing can be said of the position"),
+        ((FINE,), 2, "NOT MEASURED: 2 scans matched, 3 needed; nothing can be said of the position"),
+        ((FINE, SHORT, FIRING), 3, "DOUBTFUL: too wide (2 m); at best position within 8.7 m"),
+        ((FIRING,), 0, "DOUBTFUL: too wide (2 m); at best position within 8.7 m"),
+    ],
+)
+def test_the_headline_says_fine_only_of_what_was_measured(verdicts, matched, line):
+    assert trust_of(*verdicts, matched=matched).line == f"trust: {line}"
+
+
+def test_stretches_are_doubtful_where_a_check_fires():
     assert trust_of(FINE).doubtful.shape == (0, 2)
-
-
-def test_only_the_checks_that_fire_are_named():
     trust = trust_of(FINE, FIRING)
-    assert trust.line == "trust: DOUBTFUL: too wide (2 m)"
     np.testing.assert_array_equal(trust.doubtful, [[3.0, 9.0]])
 
 

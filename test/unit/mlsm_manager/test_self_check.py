@@ -59,7 +59,7 @@ def test_a_path_that_bends_away_is_doubted():
 def test_a_vehicle_that_stays_says_nothing_about_distances():
     along, across = against_odometry(TIMES, 0.0 * STRAIGHT, 0.0 * STRAIGHT)
     assert not along.fires
-    assert "too little" in across.line()
+    assert "not measured" in across.line()
 
 
 @pytest.mark.parametrize(("lost_from", "fires"), [(100, False), (92, False), (70, True)])
@@ -137,7 +137,7 @@ def test_windows_that_overlap_make_one_stretch():
 
 
 @pytest.mark.parametrize(
-    ("value", "line"), [(2.0, "DOUBTFUL: deep"), (0.5, "fine: deep"), (np.nan, "too little to tell: deep")]
+    ("value", "line"), [(2.0, "DOUBTFUL: deep"), (0.5, "fine: deep"), (np.nan, "not measured: deep")]
 )
 def test_a_verdict_says_first_whether_it_is_to_be_trusted(value, line):
     verdict = Verdict("depth", value, 1.0, "deep")
@@ -224,8 +224,8 @@ def test_the_figure_falls_with_the_shares_of_the_scans_that_fit_worst():
 
 
 def test_few_scans_say_too_little():
-    assert "too little" in surfaces_tell(0.0, *heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
-    assert "too little" in scans_go_on(TURN_SECONDS * np.arange(10), np.full(10, 0.1)).line()
+    assert "not measured" in surfaces_tell(0.0, *heard(canal_after(0)[:9]), distance_deviation=np.inf)[0].line()
+    assert "not measured" in scans_go_on(TURN_SECONDS * np.arange(10), np.full(10, 0.1)).line()
 
 
 def test_scans_without_points_are_left_out():
@@ -304,4 +304,4 @@ def test_a_tour_of_the_basin_turned_over_is_suspected(z_is_down, count):
 def test_a_run_whose_turns_are_reversed_is_doubted():
     assert not z_down_signs(LEVEL, _scans(8)).turns().fires
     assert z_down_signs(LEVEL, _scans(8, TURNED_OVER)).turns().fires
-    assert "too little" in z_down_signs(LEVEL, _scans(4, TURNED_OVER)).turns().line()
+    assert "not measured" in z_down_signs(LEVEL, _scans(4, TURNED_OVER)).turns().line()

@@ -1,0 +1,29 @@
+"""Each fault of the bench breaks a recording that can still be mapped."""
+
+import numpy as np
+import pytest
+from benchmarks.faults import faults
+from made_recordings import SECONDS, circling
+
+from mlsm_manager.offline.recording import Recording
+
+WHOLE = circling()
+FAULTS = {name: make for name, make in faults(SECONDS).items() if name != "nothing"}
+
+
+def content(recording: Recording):
+    """Return all that a fault may change, as one array."""
+    beams = recording.beams
+    parts = [np.array([one.beam.stamp_ns * 1e-9, one.beam.angle, one.beam.intensities.size]) for one in beams]
+    parts += [np.concatenate([one.T_target_sonar.ravel(), one.beam.intensities]) for one in beams]
+    return np.concatenate([recording.track.poses.ravel(), *parts])
+
+
+@pytest.mark.parametrize("name", FAULTS)
+def test_it_changes_the_recording_and_leaves_the_original(name):
+    before = content(WHOLE)
+    broken, again = FAULTS[name](WHOLE), FAULTS[name](WHOLE)
+    assert not np.array_equal(content(broken), before)
+    assert np.array_equal(content(broken), content(again))
+    assert np.array_equal(content(WHOLE), before)
+    assert np.isfinite(content(broken)).all()
