@@ -15,6 +15,7 @@ from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, expo
 from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
 from mlsm_manager.surface_map.map_file import StoredMap, read_map
 from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged
+from node_support.files import check_output
 from node_support.help import CommandLine
 
 _MAPS = "a map (.mlsm)"
@@ -24,6 +25,9 @@ def run_map_tool() -> None:
     """Run map_tool with the command line; ends with one line and status 1 when something is wrong with the input."""
     options = map_tool_arguments(sys.argv[1:])
     try:
+        if "out" in options:
+            read = [getattr(options, name) for name in ("map", "first", "second") if name in options]
+            check_output(options.out, read, options.overwrite)
         lines = _COMMANDS[options.command](options)
     except OSError as error:
         sys.exit(f"map_tool: {error.filename or 'output'}: {error.strerror or error}")
@@ -130,6 +134,7 @@ def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     two_maps.add_argument("first", type=Path, metavar="FIRST", help=_MAPS)
     two_maps.add_argument("second", type=Path, metavar="SECOND", help=_MAPS)
     out.add_argument("out", type=Path, metavar="OUT", help=f"file to write, ending with one of {' '.join(ENDINGS)}")
+    out.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     names = [by.value.lower() for by in ColorBy]
     colors.add_argument("--color", choices=names, default="height", help="what blocks are coloured by")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")

@@ -6,7 +6,7 @@ import os
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Iterator, Tuple
+from typing import Iterable, Iterator, Tuple
 
 PACKAGE = "underwater_map_construction"
 _MARK = f"<name>{PACKAGE}</name>"
@@ -24,12 +24,25 @@ def write_whole(path: Path, data: bytes) -> None:
         temporary.write_bytes(data)
 
 
+def check_output(path: Path, inputs: Iterable[Path], overwrite: bool, ending: str = "") -> None:
+    """Raise OSError unless a program that reads `inputs` may write `path`: a new file, an old one with `overwrite`.
+
+    ending: that the file's name must have.
+    """
+    if not path.name.endswith(ending):
+        raise OSError(errno.EINVAL, f"must end with {ending}", str(path))
+    if any(path.exists() and one.exists() and path.samefile(one) for one in inputs):
+        raise OSError(errno.EINVAL, "is read too; give another name to write", str(path))
+    if path.exists() and not overwrite:
+        raise FileExistsError(errno.EEXIST, "exists; --overwrite replaces it", str(path))
+
+
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
     """Give the path of a temporary file, made beside `path`, that takes its place when the block ends well.
 
     The folder is made where it is missing; on any failure an older file stays as it was. What killed processes left
-    behind in that folder is removed first. Raises OSError.
+    behind in that folder is removed first. Raises OSError, which names `path` where the system names no file.
     """
     make_folder(path.parent)
     remove_abandoned_parts(path.parent)
@@ -39,8 +52,10 @@ def whole_file(path: Path) -> Iterator[Path]:
         _flush(temporary)
         os.chmod(str(temporary), 0o644)
         os.replace(str(temporary), str(path))
-    except BaseException:
+    except BaseException as error:
         temporary.unlink()
+        if isinstance(error, OSError) and error.errno is not None and error.filename is None:
+            raise OSError(error.errno, error.strerror, str(path)) from error
         raise
     finally:
         os.close(handle)

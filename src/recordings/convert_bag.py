@@ -8,7 +8,7 @@ from typing import Any, Iterator, List, Tuple
 import numpy as np
 
 from node_support import topics
-from node_support.files import whole_file
+from node_support.files import check_output, whole_file
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values
 from node_support.parameters import ParameterError
@@ -43,6 +43,7 @@ def convert_bag(arguments: List[str]) -> str:
     Raises ParameterError, RecordingError and OSError.
     """
     options = _parser().parse_args(arguments)
+    check_output(options.out, [options.recording], options.overwrite, ".bag")
     request = request_of(options, ReadingParameters.from_mapping(assigned_values(options.set)))
     content = read(options.recording, request)
     for note in content.notes:
@@ -57,7 +58,8 @@ def _parser() -> argparse.ArgumentParser:
         "convert_bag", description="Write a recording of any kind as a bag of ROS 1 with /sonar/raw, /odom and tf."
     )
     parser.add_argument("recording", type=Path, help="a bag of ROS 1 or ROS 2, or the log of a sonar's maker")
-    parser.add_argument("out", type=Path, help="bag to write; an existing one is replaced")
+    parser.add_argument("out", type=Path, help="bag to write (.bag)")
+    parser.add_argument("--overwrite", action="store_true", help="replace a bag that exists")
     parser.add_argument(
         "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="mounting and angles"
     )

@@ -12,7 +12,7 @@ import yaml
 from tqdm import tqdm
 
 from node_support import topics
-from node_support.files import package_folder, whole_file
+from node_support.files import check_output, package_folder, whole_file
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import ParameterError
@@ -124,7 +124,8 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--world", required=True, help="file, or the name of a world of this package: basin, tank, harbour"
     )
     parser.add_argument("--script", help="yaml file of the vehicle's moves (default: the tour of the package's world)")
-    parser.add_argument("--out", required=True, type=Path, help="bag to write; an existing one is replaced")
+    parser.add_argument("--out", required=True, type=Path, help="bag to write (.bag)")
+    parser.add_argument("--overwrite", action="store_true", help="replace a bag that exists")
     parser.add_argument(
         "--parameters", type=Path, help="yaml file of the simulator's parameters (default: the world's)"
     )
@@ -185,7 +186,7 @@ def main(arguments: List[str]) -> int:
         print(f"simulate_bag: {error}", file=sys.stderr)
         return 1
     except OSError as error:
-        print(f"simulate_bag: {options.out}: {error.strerror}", file=sys.stderr)
+        print(f"simulate_bag: {error.filename or options.out}: {error.strerror}", file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("simulate_bag: stopped; nothing was written", file=sys.stderr)
@@ -194,6 +195,7 @@ def main(arguments: List[str]) -> int:
 
 
 def _run(options: Namespace) -> None:
+    check_output(options.out, [], options.overwrite, ".bag")
     package = package_folder()
     settings = Settings.from_mapping(settings_of(options, package))
     if settings.simulator.drive is not Drive.SCRIPT:

@@ -91,6 +91,8 @@ def test_diff_of_a_map_with_itself_is_nothing(run):
         ("crop a.mlsm c.mlsm --low 90 90 --high 91 91", "the map has no blocks"),
         ("info broken.mlsm", "broken.mlsm: not a map of this package"),
         ("export a.mlsm no/such/place.ply", ""),
+        ("export a.mlsm broken.mlsm", "broken.mlsm: exists; --overwrite replaces it"),
+        ("merge a.mlsm a.mlsm a.mlsm --overwrite", "a.mlsm: is read too"),
     ],
 )
 def test_what_is_wrong_is_told_in_one_line(run, tmp_path, line, reason):

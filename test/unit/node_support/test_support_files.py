@@ -4,10 +4,11 @@ import os
 import signal
 import subprocess
 import sys
+from contextlib import nullcontext
 
 import pytest
 
-from node_support.files import remove_abandoned_parts, ros_path, whole_file, write_whole
+from node_support.files import check_output, remove_abandoned_parts, ros_path, whole_file, write_whole
 
 WRITER = """
 import sys, time
@@ -54,6 +55,37 @@ def test_two_at_once_in_one_process_do_not_disturb_each_other(tmp_path):
         second.write_text("two")
     assert (tmp_path / "a").read_text() + (tmp_path / "b").read_text() == "onetwo"
     assert sorted(os.listdir(str(tmp_path))) == ["a", "b"]
+
+
+@pytest.mark.parametrize(
+    ("name", "overwrite", "reason"),
+    [
+        ("new.bag", False, None),
+        ("old.bag", True, None),
+        ("old.bag", False, "exists"),
+        ("new.mcap", True, r"must end with \.bag"),
+        ("read.bag", True, "is read too"),
+        ("link.bag", True, "is read too"),
+    ],
+)
+def test_no_program_writes_over_what_it_reads_or_unasked_over_what_exists(tmp_path, name, overwrite, reason):
+    for existing in ("old.bag", "read.bag"):
+        (tmp_path / existing).write_text("recorded")
+    (tmp_path / "link.bag").symlink_to(tmp_path / "read.bag")
+    expected = pytest.raises(OSError, match=f"{reason}.*{name}") if reason else nullcontext()
+    with expected:
+        check_output(tmp_path / name, [tmp_path / "read.bag"], overwrite, ".bag")
+
+
+def test_a_full_disk_is_told_with_the_name_of_the_file(tmp_path):
+    def fill(path):
+        with whole_file(path) as part:
+            part.unlink()
+            part.symlink_to("/dev/full")
+            part.write_bytes(b"more than fits")
+
+    with pytest.raises(OSError, match=r"No space left.*whole\.bag"):
+        fill(tmp_path / "whole.bag")
 
 
 def test_other_hidden_files_stay(tmp_path):

@@ -88,3 +88,11 @@ def test_nothing_is_left_of_a_conversion_that_failed(tmp_path):
     with pytest.raises(RecordingError):
         convert_bag(["/no/such.bag", str(tmp_path / "out.bag")])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_recording_is_not_converted_into_itself(tmp_path):
+    recording = tmp_path / "x.bag"
+    recording.write_bytes(BASIN.read_bytes())
+    with pytest.raises(OSError, match="is read too"):
+        convert_bag([str(recording), str(recording), "--overwrite"])
+    assert recording.read_bytes() == BASIN.read_bytes()

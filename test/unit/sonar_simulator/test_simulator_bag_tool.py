@@ -45,7 +45,10 @@ def test_a_bag_holds_beams_tf_odometry_and_truth(tmp_path, script):
 
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, script):
-    bags = [_write(tmp_path, script, name, "--set", f"seed={seed}")[1] for name, seed in (("a", 5), ("b", 5), ("c", 6))]
+    bags = [
+        _write(tmp_path, script, name, "--set", f"seed={seed}")[1]
+        for name, seed in (("a.bag", 5), ("b.bag", 5), ("c.bag", 6))
+    ]
     first, second, third = (bag.read_bytes() for bag in bags)
     assert first == second
     assert first != third
@@ -153,7 +156,7 @@ def test_a_bag_that_could_not_be_finished_leaves_the_older_one(tmp_path, script,
         raise KeyboardInterrupt
 
     monkeypatch.setattr("sonar_simulator.simulation.simulate_bag.SimulatedBag.add", stop)
-    assert _write(tmp_path, script)[0] == 130
+    assert _write(tmp_path, script, "out.bag", "--overwrite")[0] == 130
     assert "nothing was written" in capsys.readouterr().err
     assert out.read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.bag", "script.yaml"]
