@@ -30,7 +30,8 @@ SPARE_PRIORITY = 19
 ALONE = ("imagenex_852_load", "ping360_load")
 # Rostests that take longest: those that begin last should be short.
 LONG = (
-    "every_node", "silence", "strafing_demo", "matching", "one_and_many_processes", "resume_kills", "imagenex_852_logs"
+    "one_and_many_processes", "every_node", "vehicle_emulated", "silence", "thrusters_demo", "strafing_demo",
+    "unaided_demo",
 )  # fmt: skip
 # Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds.
 IN_PARALLEL = ("-n", str(os.cpu_count() or 1), "--dist", "loadfile")
