@@ -1,6 +1,6 @@
 """Writes the generated files: the default yaml files, two pages of docs, and the files that make filters nodes.
 
-These pages are docs/nodes.md and docs/thesis_names.md. A filter in the table of stages gets an executable, a
+These pages are docs/nodes.md and docs/from_2015.md. A filter in the table of stages gets an executable, a
 dynamic_reconfigure description and a launch file.
 """
 
@@ -124,7 +124,7 @@ def generated() -> Dict[Path, str]:
         texts[ROOT / f"cfg/{config_name(name)}.cfg"] = CONFIGURATION.format(**words)
         texts[ROOT / f"launch/{name}.launch"] = LAUNCH.format(**words)
     texts[ROOT / "docs/nodes.md"] = nodes_page()
-    texts[ROOT / "docs/thesis_names.md"] = thesis_names()
+    texts[ROOT / "docs/from_2015.md"] = from_2015()
     return texts
 
 
@@ -151,16 +151,22 @@ def _setting(setting: Setting, indent: str) -> List[str]:
     return [f"{indent}# {setting.reason}", f"{indent}{setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
 
 
-def thesis_names() -> str:
-    """Return the table that pairs the parameter names of the thesis with ours."""
-    lines = [
-        "# Parameters of the thesis and their names here",
-        "",
-        "*Written by `scripts/document` from the parameter dataclasses; do not edit.*",
-        "",
-        "| node | thesis | here |",
-        "| --- | --- | --- |",
-    ]
+FROM_2015 = """\
+# Coming from the package of 2015
+
+*Written by `scripts/document`; do not edit.*
+
+`thesis:=true`, an argument of `vehicle.launch`, `mapping.launch`, `play_bag.launch` and `demo.launch`, and `map_bag
+--thesis` set everything as the thesis and its code have it. All of it stands in `yaml/thesis.yaml`, each line with the
+section of the thesis or the file of 2015 that it comes from.
+
+    roslaunch underwater_map_construction play_bag.launch bag:=old.bag thesis:=true
+"""
+
+
+def from_2015() -> str:
+    """Return docs/from_2015.md, with the table that pairs the parameter names of the thesis with ours."""
+    lines = [FROM_2015, "| node | thesis | here |", "| --- | --- | --- |"]
     for name in sorted(LIVE_NODES):
         for field in dataclasses.fields(LIVE_NODES[name]):
             described = describe(field)

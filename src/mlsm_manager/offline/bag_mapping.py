@@ -13,7 +13,7 @@ from tqdm import tqdm
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
 from mlsm_manager.offline.findings import Findings, Trust
-from mlsm_manager.offline.recording import Recording, read_recording, whole_turns
+from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import Refined, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -65,7 +65,9 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     recording = recording.corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
     with _bar(len(recording.beams), "beam", "echoes") as bar:
-        scans = whole_turns(options.bags[0], recording, extractor, bar.update)
+        chain = options.chain
+        found = scans_of(recording, extractor) if chain is None else chain.scans(recording)
+        scans = whole_turns(options.bags[0], len(recording.beams), found, bar.update)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     parameters = with_odometry(extracting, odometry.kind, options.fixed)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)

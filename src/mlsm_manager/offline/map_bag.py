@@ -14,6 +14,7 @@ from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text, replay_values
 from mlsm_manager.offline.run_files import REPORT, errors_of, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.run_reports import mission_of, summary_lines, summary_of
+from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.report.mission import Mission
 from node_support.files import make_folder, write_whole
 from node_support.help import CommandLine
@@ -65,7 +66,7 @@ def _write_results(mapped: MappedBag, options: Namespace) -> None:
     write_run(options.out, mapped.title, mapped.run, mapped.recording)
     for number, session in enumerate(mapped.sessions, start=2):
         write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
-    live = live_text(mapped.parameters, options.odom_frame, options.base_frame)
+    live = live_text(mapped.parameters, options.odom_frame, options.base_frame, options.chain)
     write_whole(options.out / "live.yaml", live.encode())
 
 
@@ -143,8 +144,8 @@ def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
         help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
     )  # fmt: skip
     parser.add_argument(
-        "--matcher", choices=[EstimatorName.THESIS.value],
-        help="match each scan alone instead of jointly, by the thesis's matcher",
+        "--thesis", action="store_true",
+        help="everything as the thesis of 2015 has it (yaml/thesis.yaml): cleaned clouds, each matched alone",
     )  # fmt: skip
 
 
@@ -157,6 +158,8 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
         parser.error("--refine fits one recording, not several")
     if options.check and not options.refine:
         parser.error("--check repeats the fit of --refine; give both")
+    if options.thesis and len(options.bags) > 1:
+        parser.error("--thesis maps one recording, not several")
     if options.out is None and not options.inspect:
         parser.error("--out is required, unless --inspect is given")
     if options.vehicle and len(options.bags) > 1:
@@ -172,13 +175,15 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
 
 def _values(options: argparse.Namespace) -> Dict[str, Any]:
     """Return the parameters that were set, by their names; one line on stderr names keys of an older version."""
-    values, remarks = replay_values(read_values(options.parameters) if options.parameters else {})
+    given = read_values(options.parameters) if options.parameters else {}
+    options.chain = ThesisChain.from_values(thesis_values(given)) if options.thesis else None
+    values = replay_values(thesis_values({}))[0] if options.thesis else {}
+    own, remarks = replay_values(given)
+    values.update(own)
     assigned, told = ReplayParameters.by_name(assigned_values(options.set))
     values.update(assigned)
     if remarks + told:
         print(f"map_bag: {OLD_KEYS}: {'; '.join(dict.fromkeys(remarks + told))}", file=sys.stderr)
-    if options.matcher:
-        values.update(estimator=options.matcher)
     if not options.calibrate:
         values.update(range_scale_deviation=0.0, plateau_scale_deviation=0.0, sonar_delay_deviation=0.0)
     return values

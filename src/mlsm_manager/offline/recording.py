@@ -1,8 +1,9 @@
 """A recording as map_bag takes it, read from a bag of any kind."""
 
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Callable, Dict, Iterator, List, Optional, Tuple
+from typing import Callable, Dict, Iterable, Iterator, List, Optional, Tuple
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from recordings.motion.frame_tree import FrameTree
 from recordings.reader import Request, read
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import EchoExtractor
 from sonar_processing.scans.assembler import RevolutionCollector
 from sonar_processing.scans.parameters import SonarToCloudParameters
@@ -77,40 +79,46 @@ class Recording:
 
 
 def scans_of(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Scan, int]]:
-    """Yield one scan of echoes per turn of the head, with its number of beams.
+    """Yield one scan of echoes per turn of the head, with its number of beams; see clouds_with_odometry."""
+    return clouds_with_odometry(recording, _echoes(recording, extractor))
+
+
+def _echoes(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Cloud, int]]:
+    collector, cloud = RevolutionCollector(), SonarToCloudParameters()
+    for placed in recording.beams:
+        turn = collector.add(placed)
+        if turn is not None:
+            with suppress(RefusedInput):
+                yield extractor(PolarScan.of(turn).cloud(cloud)), len(turn)
+
+
+def clouds_with_odometry(recording: Recording, clouds: Iterable[Tuple[Cloud, int]]) -> Iterator[Tuple[Scan, int]]:
+    """Yield a scan for each cloud, with its number of beams.
 
     Its track begins a minute before its end, or where the scan before ended if that was earlier, and reaches 10 s
     beyond, for stamps that are to be moved.
     """
-    collector, cloud = RevolutionCollector(), SonarToCloudParameters()
     before = np.inf
-    for placed in recording.beams:
-        turn = collector.add(placed)
-        if turn is None:
-            continue
-        try:
-            found = extractor(PolarScan.of(turn).cloud(cloud))
-        except RefusedInput:
-            continue
-        end = found.stamp_ns * 1e-9
+    for cloud, beams in clouds:
+        end = cloud.stamp_ns * 1e-9
         track = track_between(recording.track, min(end - _BEFORE, before), end + _AFTER)
         before = end
-        yield Scan.from_stamps(found.points, found.time_stamps, end, track), len(turn)
+        yield Scan.from_stamps(cloud.points, cloud.time_stamps, end, track), beams
 
 
 def whole_turns(
-    bag: Path, recording: Recording, extractor: EchoExtractor, on_beams: Callable[[int], None] = lambda _: None
+    bag: Path, beams: int, found: Iterable[Tuple[Scan, int]], on_beams: Callable[[int], None] = lambda _: None
 ) -> List[Scan]:
-    """Return the scans of the recording in `bag`; `on_beams` takes the number of beams of each.
+    """Return the scans `found` in the `beams` of a bag; `on_beams` takes the number of beams of each.
 
     Raises RecordingError where there is none.
     """
     scans = []
-    for scan, beams in scans_of(recording, extractor):
+    for scan, number in found:
         scans.append(scan)
-        on_beams(beams)
+        on_beams(number)
     if not scans:
-        raise RecordingError(f"{bag}: {len(recording.beams)} beams make no whole turn of the head; a scan needs one")
+        raise RecordingError(f"{bag}: {beams} beams make no whole turn of the head; a scan needs one")
     return scans
 
 

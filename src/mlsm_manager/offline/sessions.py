@@ -9,7 +9,7 @@ from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.offline.recording import Recording, whole_turns
+from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
 from mlsm_manager.offline.replay import CORRECTED, Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Path as Trajectory
@@ -60,7 +60,8 @@ class Session:
 def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
     """Return the corrected recording and its scans. Raises RecordingError, and OSError, as `read` does."""
     recording = read(bag).corrected(parameters.part(BeamCorrection))
-    return recording, whole_turns(bag, recording, EchoExtractor(parameters.echoes()))
+    scans = scans_of(recording, EchoExtractor(parameters.echoes()))
+    return recording, whole_turns(bag, len(recording.beams), scans)
 
 
 @contextmanager

@@ -25,6 +25,7 @@ class Beam:
     angle: of the head, rad, counter-clockwise about +z of `frame_id` from +x.
     intensities: (bins,) uint8; bin i holds the echoes from i to i + 1 times `range_resolution` metres.
     sensor_angle: tilt of the sonar's servo, rad.
+    bin_place: where in its bin an echo is drawn, 0 the near end and 1 the far one.
     """
 
     stamp_ns: int
@@ -33,6 +34,7 @@ class Beam:
     intensities: np.ndarray
     range_resolution: float
     sensor_angle: float = 0.0
+    bin_place: float = 0.5
 
     def __post_init__(self) -> None:
         if self.stamp_ns < 0:
@@ -55,8 +57,8 @@ class Beam:
 
     @property
     def ranges(self) -> np.ndarray:
-        """(bins,) distance of each bin's centre, m."""
-        return (np.arange(self.intensities.size) + 0.5) * self.range_resolution
+        """(bins,) distance at which the echoes of each bin are drawn, m."""
+        return (np.arange(self.intensities.size) + self.bin_place) * self.range_resolution
 
 
 @dataclass(frozen=True)

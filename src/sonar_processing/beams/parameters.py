@@ -52,7 +52,7 @@ class MountingParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class BeamCorrection(ParameterSet):
-    """Known errors of a sonar's stamps and ranges; map_bag estimates both from a recording."""
+    """Known errors of a sonar's stamps and ranges, both of which map_bag estimates, and where echoes are drawn."""
 
     sonar_delay: float = parameter(
         0.0, "added to the stamps of beams to match those of the odometry", unit="s", low=-10.0, high=10.0,
@@ -62,6 +62,10 @@ class BeamCorrection(ParameterSet):
         1.0, "true range divided by reported range; differs from 1 where the speed of sound does", low=0.5, high=2.0,
         tunable=False,
     )  # fmt: skip
+    bin_place: float = parameter(
+        0.5, "where in its bin an echo is drawn: 0 the near end, 0.5 the middle, 1 the far end as in the thesis",
+        low=0.0, high=1.0, tunable=False,
+    )  # fmt: skip
 
     def corrected(self, beam: Beam) -> Beam:
         """Return the corrected beam; raises RefusedInput when its stamp would be below 0."""
@@ -69,4 +73,5 @@ class BeamCorrection(ParameterSet):
             beam,
             stamp_ns=beam.stamp_ns + round(self.sonar_delay * 1e9),
             range_resolution=beam.range_resolution * self.range_scale,
+            bin_place=self.bin_place,
         )

@@ -22,7 +22,7 @@ class PolarScan:
 
     strengths: (beams, bins) uint8. angles: (beams,) head angles, rad. T_target_sonar: (beams, 4, 4), where each beam
     was sent from. time_stamps: (beams,) s, negative while the vehicle was still. range_resolution: length of a bin, m.
-    sonar_frame: the sonar's own frame. stamp_ns: of the newest beam.
+    sonar_frame: the sonar's own frame. stamp_ns: of the newest beam. bin_place: see Beam.
     """
 
     strengths: np.ndarray
@@ -32,6 +32,7 @@ class PolarScan:
     range_resolution: float
     sonar_frame: str
     stamp_ns: int
+    bin_place: float = 0.5
 
     @classmethod
     def of(cls, beams: List[PlacedBeam]) -> "PolarScan":
@@ -45,12 +46,13 @@ class PolarScan:
             range_resolution=newest.range_resolution,
             sonar_frame=newest.frame_id,
             stamp_ns=newest.stamp_ns,
+            bin_place=newest.bin_place,
         )
 
     @property
     def ranges(self) -> np.ndarray:
-        """(bins,) distance of each bin's centre, m."""
-        return (np.arange(self.strengths.shape[1]) + 0.5) * self.range_resolution
+        """(bins,) distance at which the echoes of each bin are drawn, m."""
+        return (np.arange(self.strengths.shape[1]) + self.bin_place) * self.range_resolution
 
     @property
     def directions(self) -> np.ndarray:
