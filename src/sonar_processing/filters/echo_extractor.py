@@ -25,6 +25,7 @@ _SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it
 _SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do not count as spread
 _SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included
 _ROWS_MEASURED = 8  # Rows of a cloud that tell the length of a bin; it is the same in all of them
+_ROUNDING = 1e-3  # Bins: the length of a bin is known from float32 points, which move by this with the mount
 _EDGE_SIGMA = 0.15  # m: of the filter for plateaus, which closes gaps and leaves an edge where it is
 
 
@@ -98,11 +99,11 @@ def extract_echoes(
     """
     is_dense = parameters.mode is ExtractionMode.DENSE
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
-    first_bin = max(math.ceil(parameters.min_range / range_resolution - 0.5), 0)
+    first_bin = max(_whole_bins(parameters.min_range / range_resolution - 0.5), 0)
     smooth = matched_filter(strengths, sigma, first_bin)
     ring, spread = ring_of(smooth, parameters.ring_quantile, sigma)
     response = np.maximum(smooth - ring, 0.0, out=smooth)
-    peaks = find_peaks(response, apart=math.ceil(2.0 * sigma))
+    peaks = find_peaks(response, apart=_whole_bins(2.0 * sigma))
     least = np.maximum(parameters.min_contrast * spread, parameters.min_height)
     peaks = peaks.select(peaks.heights >= least[np.rint(peaks.bins).astype(np.int64)])
     share = 1.0 if is_dense else parameters.threshold_share
@@ -140,7 +141,12 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
     ranks = [int(share * (beams - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
     ordered = np.partition(smooth, ranks, axis=0)
     ring, upper = ordered[ranks[0]], ordered[ranks[1]]
-    return ring, uniform_filter1d(upper - ring, 2 * math.ceil(_SPREAD_SIGMAS * sigma) + 1)
+    return ring, uniform_filter1d(upper - ring, 2 * _whole_bins(_SPREAD_SIGMAS * sigma) + 1)
+
+
+def _whole_bins(bins: float) -> int:
+    """Return the number of bins that holds `bins`; a whole number stays what it is, whatever rounding adds to it."""
+    return math.ceil(bins - _ROUNDING)
 
 
 def height_threshold(heights: np.ndarray) -> float:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 
 _LEVELS_PER_STRENGTH = 64.0  # Exact in float32 up to 2^18 strengths, and finer than speckle
-_ROUNDING = 1e-6  # Bins: a quotient that is a whole number but for rounding counts as whole
+_ROUNDING = 1e-3  # Bins: a quotient that is a whole number but for rounding counts as whole
 
 
 @dataclass(frozen=True)

@@ -229,6 +229,16 @@ def test_the_stage_places_every_echo_by_the_pose_of_its_beam(moving_by):
     assert cloud.points.dtype == np.float32
 
 
+@pytest.mark.parametrize("shift", [1e-6, 1e-5, 1e-4, 3.3, 30.1])
+def test_the_stage_finds_the_same_echoes_wherever_the_sonar_is(shift):
+    """Widths of 3 and 12 bins are whole numbers but for the rounding of float32 points."""
+    polar = _polar_cloud(with_speckle(wall_image(WALL), seed=3))
+    moved = replace(polar, points=polar.points + np.float32([shift, 0.0, 0.0, 0.0]))
+    parameters = EchoExtractorParameters(**PEAKS, min_height=1.0, threshold_share=0.1)
+    echoes, of_moved = (EchoExtractor(parameters)(cloud) for cloud in (polar, moved))
+    np.testing.assert_allclose(of_moved.points[:, 3], echoes.points[:, 3], rtol=1e-3)
+
+
 def test_the_stage_gives_every_echo_the_stamp_of_its_beam():
     cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), moving_by=0.01))
     np.testing.assert_allclose(cloud.time_stamps, np.arange(1, BEAMS + 1))
