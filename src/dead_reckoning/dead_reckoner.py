@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Optional
+from typing import Optional, Sequence
 
 import numpy as np
 
@@ -40,8 +40,8 @@ class DeadReckoner:
     """Takes headings, depths and velocities in the order in which they come.
 
     The vehicle keeps its newest velocity, which is one along its own axes, until a newer one comes. Once that is
-    overdue, a velocity that was estimated fades: nobody knows whether the vehicle still has it. After a timeout the
-    vehicle counts as still.
+    overdue, a velocity that was estimated or measured fades: nobody knows whether the vehicle still has it. After a
+    timeout the vehicle counts as still. A velocity that was measured tilts with the vehicle, the others are level.
     """
 
     def __init__(self, parameters: DeadReckoningParameters) -> None:
@@ -53,15 +53,19 @@ class DeadReckoner:
         self._position = np.zeros(3)
         self._stamp_ns: Optional[int] = None
         self._yaw = 0.0
-        self._velocity = np.zeros(3)
+        self._velocity, self._instrument = np.zeros(3), np.zeros(2)
         self._velocity_stamp_ns: Optional[int] = None
         self._velocities = UsualInterval()
 
-    def take_velocity(self, stamp_ns: int, velocity: np.ndarray) -> None:
-        """Take a velocity (3,) [m/s] in base_link. Raises RefusedInput for one that no vehicle has."""
+    def take_velocity(self, stamp_ns: int, velocity: np.ndarray, instrument: Sequence[float] = (0.0, 0.0)) -> None:
+        """Take a velocity (3,) [m/s] along base_link's axes, of the place x y [m] in base_link where it was measured.
+
+        Raises RefusedInput for one that no vehicle has.
+        """
         if not np.abs(velocity).max() <= _FASTEST:
             raise RefusedInput(_REFUSED_VELOCITIES, f"{velocity} m/s, must be finite and at most {_FASTEST:g} m/s")
         self._velocity = np.array(velocity, dtype=np.float64)
+        self._instrument = np.array(instrument, dtype=np.float64)
         self._velocity_stamp_ns = stamp_ns
         self._velocities.take(stamp_ns * 1e-9)
 
@@ -83,13 +87,17 @@ class DeadReckoner:
         yaw = yaw_of(rotation)
         elapsed = 0.0 if self._stamp_ns is None else (stamp_ns - self._stamp_ns) * 1e-9
         turn = wrapped(yaw - self._yaw) if elapsed else 0.0
-        velocity = self._velocity_at(stamp_ns)
-        self._position[:2] += elapsed * rotated(velocity[:2], yaw - turn / 2.0)
+        turn_rate = turn / elapsed if elapsed else 0.0
+        velocity = self._velocity_at(stamp_ns, turn_rate)
+        level = velocity[:2]
+        if self.parameters.velocity_source is VelocitySource.MEASURED:
+            level = rotated((rotation @ velocity)[:2], -yaw)
+        self._position[:2] += elapsed * rotated(level, yaw - turn / 2.0)
         self._stamp_ns, self._yaw = stamp_ns, yaw
         gap = elapsed if elapsed > self.parameters.longest_gap else 0.0
-        return Reckoning(stamp_ns, self._pose(rotation), velocity, turn / elapsed if elapsed else 0.0, gap)
+        return Reckoning(stamp_ns, self._pose(rotation), velocity, turn_rate, gap)
 
-    def _velocity_at(self, stamp_ns: int) -> np.ndarray:
+    def _velocity_at(self, stamp_ns: int, turn_rate: float) -> np.ndarray:
         own = self.parameters
         if self._velocity_stamp_ns is None:
             return np.zeros(3)
@@ -98,7 +106,8 @@ class DeadReckoner:
         if math.fabs(age) > (own.command_timeout if commanded else own.velocity_timeout):
             return np.zeros(3)
         overdue = 0.0 if commanded else self._velocities.overdue(stamp_ns * 1e-9)
-        return math.exp(-overdue / own.velocity_fading) * self._velocity
+        x, y = self._instrument
+        return math.exp(-overdue / own.velocity_fading) * (self._velocity + turn_rate * np.array([y, -x, 0.0]))
 
     def _pose(self, rotation: np.ndarray) -> np.ndarray:
         pose = np.eye(4)

@@ -12,6 +12,7 @@ class VelocitySource(Enum):
 
     ESTIMATE = "ESTIMATE"
     COMMANDS = "COMMANDS"
+    MEASURED = "MEASURED"
 
 
 class HeadingType(Enum):
@@ -38,7 +39,8 @@ class DeadReckoningParameters(StampParameters):
 
     velocity_source: VelocitySource = parameter(
         VelocitySource.ESTIMATE,
-        "ESTIMATE: what mlsm_core finds from matched scans; COMMANDS: what the thrusters are told on cmd_vel",
+        "ESTIMATE: what mlsm_core finds from matched scans; COMMANDS: what the thrusters are told on cmd_vel; "
+        "MEASURED: what a DVL measures, on dvl",
         tunable=False,
     )
     velocity_timeout: float = parameter(
@@ -46,7 +48,8 @@ class DeadReckoningParameters(StampParameters):
     )
     velocity_fading: float = parameter(
         40.0,
-        "an estimate falls to a third within this time once the next one is overdue; as long as the profile `heading` "
+        "an estimate, or what was measured, falls to a third within this time once the next one is overdue; as long as "
+        "the profile `heading` "
         "takes a change of speed to last", unit="s", low=0.1, high=3600.0,
     )  # fmt: skip
     command_timeout: float = parameter(

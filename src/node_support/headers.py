@@ -1,7 +1,7 @@
 """What a header has to hold before its stamp and frame reach tf2, rospy.Time or a buffer."""
 
 from dataclasses import dataclass
-from typing import Iterable
+from typing import Any, Iterable
 
 import numpy as np
 
@@ -27,6 +27,14 @@ class StampParameters(ParameterSet):
         DAY, "refuse messages whose stamps are farther than this from the newest odometry and from the clock",
         unit="s", low=1.0, high=1e9, tunable=False,
     )  # fmt: skip
+
+
+def stamp_ns(header: Any) -> int:
+    """Return the stamp of a header, ns; ROS 1 names its parts secs and nsecs, ROS 2 and rosbags sec and nanosec."""
+    stamp = header.stamp
+    if hasattr(stamp, "nanosec"):
+        return int(stamp.sec) * 10**9 + int(stamp.nanosec)
+    return int(stamp.secs) * 10**9 + int(stamp.nsecs)
 
 
 def check_stamp(stamp_ns: int, references_ns: Iterable[int] = (), tolerance: float = DAY) -> None:

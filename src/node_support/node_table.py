@@ -215,8 +215,8 @@ NODES: Dict[str, NodeDescription] = {
         ),
     ),
     "dead_reckoning": NodeDescription(
-        "Odometry for a vehicle without a DVL: adds up the velocity that the scans tell, or that the thrusters are "
-        "told, along the heading of a compass. See [dead_reckoning](dead_reckoning.md).",
+        "Odometry for a vehicle without a position: adds up the velocity that the scans tell, that a DVL measures or "
+        "that the thrusters are told, along the heading of a compass. See [dead_reckoning](dead_reckoning.md).",
         (
             _subscribes(
                 topics.HEADING,
@@ -232,7 +232,12 @@ NODES: Dict[str, NodeDescription] = {
                 "velocity that mlsm_core estimates, if `velocity_source` is ESTIMATE",
             ),
             _subscribes(topics.VELOCITY_COMMANDS, "geometry_msgs/Twist", "velocity if `velocity_source` is COMMANDS"),
-            _subscribes("tf", "", "`base_link -> ` frame of the compass: how it is mounted"),
+            _subscribes(
+                topics.MEASURED_VELOCITY,
+                "TwistWithCovarianceStamped or a DVL's own type",
+                "velocity if `velocity_source` is MEASURED",
+            ),
+            _subscribes("tf", "", "`base_link -> ` frames of compass and DVL: how they are mounted"),
             _publishes("tf", "", "`odom -> base_link` at each heading"),
             _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "the same with the velocity"),
         ),

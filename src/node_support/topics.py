@@ -22,6 +22,7 @@ SERVO_COMMANDS = "sonar_servo/command"  # Float64: where the sonar's servo shall
 VELOCITY_COMMANDS = "cmd_vel"  # Twist: where the vehicle shall go; its velocity where nothing better is published
 HEADING = "imu"  # Imu: the orientation that a compass or an AHRS measures
 DEPTH = "depth"  # PoseWithCovarianceStamped, Float64 or FluidPressure: what a depth sensor measures
+MEASURED_VELOCITY = "dvl"  # TwistWithCovarianceStamped or a DVL's own message: the velocity that a DVL measures
 VELOCITY = "velocity"  # Twist: the velocity that the simulated vehicle measures
 ODOMETRY = "odom"  # Odometry: the vehicle's dead reckoning
 GROUND_TRUTH = "ground_truth"  # Odometry: where the simulated vehicle truly is

@@ -5,7 +5,7 @@ import math
 import unittest
 
 import rospy
-from geometry_msgs.msg import Quaternion
+from geometry_msgs.msg import Quaternion, TwistWithCovarianceStamped
 from graph import Diagnostics, Inbox, run
 from messages import publisher
 from nav_msgs.msg import Odometry
@@ -22,11 +22,11 @@ class DeadReckoning(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.diagnostics = Diagnostics()
+        cls.diagnostics = Diagnostics("/dead_reckoning")
         cls.odometry, cls.transforms = Inbox("/odom", Odometry), Inbox("/tf", TFMessage)
         for inbox in (cls.odometry, cls.transforms):
             inbox.wait_for_link()
-        cls.headings = publisher("/imu", Imu)
+        cls.headings = publisher("/imu", Imu, listeners=2)
         cls.depths = publisher("/depth", Float64)
         cls.velocities = publisher("/MLSM/odometry", Odometry)
         cls.now = rospy.Time.now()
@@ -89,7 +89,7 @@ class DeadReckoning(unittest.TestCase):
         self.headings.publish(message)
         odometry = self.odometry.wait_for(lambda odometry: odometry.header.stamp == stamp)
         self.assertAlmostEqual(_yaw(odometry.pose.pose.orientation), _yaw(message.orientation), places=6)
-        self.diagnostics.wait_for("dead_reckoning", "headings without a mount", 1)
+        self.diagnostics.wait_for("dead_reckoning", "instruments without a mount", 1)
 
     def test_5_a_compass_that_publishes_degrees_counts_clockwise_from_north(self) -> None:
         """East is 90 degrees; what is no heading is counted, and the next one is taken."""
@@ -102,6 +102,25 @@ class DeadReckoning(unittest.TestCase):
         headings.publish(Float64(data=135.0))
         south_east = odometry.wait_for(lambda message: message.header.stamp > east.header.stamp)
         self.assertAlmostEqual(_yaw(south_east.pose.pose.orientation), -math.pi / 4.0, places=6)
+
+    def test_6_what_a_dvl_measures_moves_another_vehicle_along_its_heading(self) -> None:
+        """0.5 m/s to the right for 2 s, heading east, are 1 m to the south."""
+        odometry, velocities = Inbox("/dvl/odom", Odometry), publisher("/dvl", TwistWithCovarianceStamped)
+        diagnostics = Diagnostics("/dvl_reckoning")
+        odometry.wait_for_link()
+        stamp = self.now + rospy.Duration(180.0)
+        velocity = TwistWithCovarianceStamped()
+        velocity.header.stamp, velocity.header.frame_id = stamp, "base_link"
+        velocity.twist.twist.linear.y = -0.5
+        velocities.publish(velocity)
+        diagnostics.wait_for("dead_reckoning", "velocities in", 1)
+        places = []
+        for moment in (stamp, stamp + rospy.Duration(2.0)):
+            self.headings.publish(_heading(moment, 0.0))
+            found = odometry.wait_for(lambda message, moment=moment: message.header.stamp == moment)
+            places.append(found.pose.pose.position)
+        self.assertAlmostEqual(places[1].x - places[0].x, 0.0, places=6)
+        self.assertAlmostEqual(places[1].y - places[0].y, -1.0, places=6)
 
 
 def _heading(stamp: rospy.Time, yaw: float) -> Imu:

@@ -21,7 +21,7 @@ ALLOWED = {
     "imagenex_852_driver": {"node_support", "sonar_driver"},
     "ping360_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
-    "recordings": {"imagenex_852_driver", "node_support", "ping360_driver", "sonar_processing"},
+    "recordings": {"dead_reckoning", "imagenex_852_driver", "node_support", "ping360_driver", "sonar_processing"},
     "mlsm_manager": {"node_support", "recordings", "sonar_processing"},
     "sonar_simulator": {"node_support", "recordings", "sonar_processing"},
 }

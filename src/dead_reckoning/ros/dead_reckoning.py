@@ -1,7 +1,7 @@
 """The ROS side of dead_reckoning: heading, depth and velocity in; odom -> base_link and odometry out."""
 
 import threading
-from typing import Any, Callable, Dict, Tuple
+from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -13,16 +13,18 @@ from std_msgs.msg import Float64
 
 from dead_reckoning.dead_reckoner import GAPS, DeadReckoner, Reckoning, depth_of_pressure, rotation_of_heading
 from dead_reckoning.parameters import DeadReckoningParameters, DepthType, HeadingType, VelocitySource
+from dead_reckoning.velocity_messages import velocity_type
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame
+from node_support.ros.any_messages import MessageClasses
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import TfBuffer, matrix_of_quaternion, pose_from_matrix
 
 QUEUE_SIZE = 100  # a second of a fast AHRS
 _REFUSED_HEADINGS = "headings refused"
-_MISALIGNED = "headings without a mount"
+_MISALIGNED = "instruments without a mount"
 _NO_ORIENTATION = -1.0  # sensor_msgs/Imu: in the first covariance of a device that measures no orientation
 
 
@@ -34,6 +36,7 @@ class DeadReckoning:
         self.health = make_health("dead_reckoning")
         self.healths = [self.health]
         self._lock = threading.Lock()
+        self._classes = MessageClasses()
         self._live = ReconfigurableParameters(
             DeadReckoningParameters, namespace, "DeadReckoning", self.health, self._use_parameters
         )
@@ -53,6 +56,7 @@ class DeadReckoning:
         velocities: Dict[VelocitySource, Tuple[str, type, Callable[[Any], None]]] = {
             VelocitySource.ESTIMATE: (topics.MATCHED_ODOMETRY, Odometry, self._take_estimate),
             VelocitySource.COMMANDS: (topics.VELOCITY_COMMANDS, Twist, self._take_command),
+            VelocitySource.MEASURED: (topics.MEASURED_VELOCITY, rospy.AnyMsg, self._take_measured),
         }
         depths: Dict[DepthType, Tuple[type, Callable[[Any], float]]] = {
             DepthType.POSE: (PoseWithCovarianceStamped, lambda message: -message.pose.pose.position.z),
@@ -85,10 +89,25 @@ class DeadReckoning:
     def _take_command(self, message: Twist) -> None:
         self._take_velocity(rospy.get_rostime().to_nsec(), message)
 
+    def _take_measured(self, message: rospy.AnyMsg) -> None:
+        self.health.count("velocities in")
+        kind = velocity_type(message._connection_header["type"])
+        fields = kind.fields(self._classes.deserialised(message))
+        stamp_ns = fields.stamp_ns or rospy.get_rostime().to_nsec()
+        self._transforms.check_stamp(stamp_ns)
+        mount = self._mount(fields.frame_id, stamp_ns)
+        if mount is None:
+            self._reckon(stamp_ns, kind.in_vehicle(fields))
+        else:
+            self._reckon(stamp_ns, mount[:3, :3] @ fields.velocity, mount[:2, 3])
+
     def _take_velocity(self, stamp_ns: int, twist: Twist) -> None:
         self.health.count("velocities in")
+        self._reckon(stamp_ns, np.array([twist.linear.x, twist.linear.y, twist.linear.z]))
+
+    def _reckon(self, stamp_ns: int, velocity: np.ndarray, instrument: Sequence[float] = (0.0, 0.0)) -> None:
         with self._lock:
-            self._reckoner.take_velocity(stamp_ns, np.array([twist.linear.x, twist.linear.y, twist.linear.z]))
+            self._reckoner.take_velocity(stamp_ns, velocity, instrument)
 
     def _take_imu(self, message: Imu) -> None:
         self.health.count("headings in")
@@ -114,20 +133,23 @@ class DeadReckoning:
         if message.orientation_covariance[0] == _NO_ORIENTATION:
             raise RefusedInput(_REFUSED_HEADINGS, "the Imu says that it measures no orientation; choose another topic")
         R_odom_imu = matrix_of_quaternion(_components(message.orientation), _REFUSED_HEADINGS)
-        return R_odom_imu @ self._mount(message.header.frame_id, message.header.stamp.to_nsec()).T
+        mount = self._mount(message.header.frame_id, message.header.stamp.to_nsec())
+        return R_odom_imu if mount is None else R_odom_imu @ mount[:3, :3].T
 
-    def _mount(self, imu_frame: str, stamp_ns: int) -> np.ndarray:
-        """Return R_base_imu (3, 3); where tf does not know it, the compass is taken as aligned with the vehicle."""
+    def _mount(self, frame: str, stamp_ns: int) -> Optional[np.ndarray]:
+        """Return T_base_instrument (4, 4); None for the vehicle's own frame, and where tf does not know it.
+
+        Such an instrument is taken as aligned with the vehicle.
+        """
         base_frame = self._live.current.base_frame
-        if imu_frame == base_frame:
-            return np.eye(3)
+        if frame == base_frame:
+            return None
         try:
-            check_frame(imu_frame, _MISALIGNED)
-            return self._transforms.matrix(base_frame, imu_frame, stamp_ns)[:3, :3]
+            check_frame(frame, _MISALIGNED)
+            return self._transforms.matrix(base_frame, frame, stamp_ns)
         except RefusedInput:
-            detail = f"tf does not know {imu_frame!r} in {base_frame}: taken as aligned with it"
-            self.health.problem(_MISALIGNED, detail)
-            return np.eye(3)
+            self.health.problem(_MISALIGNED, f"tf does not know {frame!r} in {base_frame}: taken as aligned with it")
+            return None
 
     def _publish(self, reckoning: Reckoning) -> None:
         parameters = self._live.current

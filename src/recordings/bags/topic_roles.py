@@ -3,8 +3,11 @@
 from enum import Enum
 from typing import Dict, List, Optional
 
+from dead_reckoning.velocity_messages import VELOCITY_TYPES
 from recordings.bags.bag import Topic
 from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN
+
+ODOMETRY = "nav_msgs/Odometry"
 
 
 class Role(Enum):
@@ -23,11 +26,11 @@ class Role(Enum):
 _TYPES: Dict[Role, List[str]] = {
     Role.BEAMS: [*(name for name in BEAM_TYPES if name != LASER_SCAN), LASER_SCAN],
     Role.ODOMETRY: [
-        "nav_msgs/Odometry", "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped",
+        ODOMETRY, "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped",
     ],
     Role.HEADING: ["sensor_msgs/Imu"],
     Role.DEPTH: ["sensor_msgs/FluidPressure"],
-    Role.VELOCITY: ["geometry_msgs/TwistStamped", "geometry_msgs/TwistWithCovarianceStamped", "geometry_msgs/Twist"],
+    Role.VELOCITY: [name for name in VELOCITY_TYPES if name != ODOMETRY],
     Role.POSITION: ["sensor_msgs/NavSatFix"],
     Role.TRANSFORMS: ["tf2_msgs/TFMessage", "tf/tfMessage"],
 }  # fmt: skip
@@ -37,6 +40,7 @@ _NUMBERS = ("std_msgs/Float32", "std_msgs/Float64")
 _NO_ODOMETRY = (
     "setpoint", "goal", "target", "command", "truth", "gps", "dgps", "gnss", "/gt", "waypoint", "home", "heading",
 )  # fmt: skip
+_COMMANDS = ("cmd", "command", "setpoint", "target", "desired")
 _LIKELY = ("odom", "local_position", "dead_reckoning", "navigation", "pose")
 
 
@@ -50,6 +54,8 @@ def role_of(topic: Topic) -> Optional[Role]:
     role = _ROLES.get(topic.type)
     if role is Role.ODOMETRY and any(part in name for part in _NO_ODOMETRY):
         return Role.POSITION if any(part in name for part in ("truth", "gps", "gnss", "/gt")) else None
+    if role is Role.VELOCITY and any(part in name for part in _COMMANDS):
+        return None
     return role
 
 

@@ -6,13 +6,14 @@ from typing import Any, Dict, Iterable, List, Optional, Tuple
 import numpy as np
 
 from node_support import topics
+from node_support.headers import stamp_ns
 from recordings.bags.bag import Bag
 from recordings.motion.pose_track import PoseTrack
-from sonar_processing.messages.beam_types import stamp_ns
 
 Link = Tuple[str, str]
 """Parent and child."""
 
+_KNOWN = (0.0,)  # Covariance; its first value is -1 where an Imu measures no orientation (sensor_msgs/Imu)
 _Sample = Tuple[int, Tuple[float, float, float], Tuple[float, float, float, float]]
 
 
@@ -125,8 +126,13 @@ def pose_track(messages: Iterable[Any]) -> PoseTrack:
 
 
 def heading_track(messages: Iterable[Any]) -> PoseTrack:
-    """Return the orientations of Imu messages, at the origin; may be empty. Raises AttributeError for others."""
-    return _track([(stamp_ns(one.header), (0.0, 0.0, 0.0), _rotation(one.orientation)) for one in messages])
+    """Return the orientations of Imu or Odometry messages, at the origin; may be empty.
+
+    Those of a device that says that it measures none are left out. Raises AttributeError for other messages.
+    """
+    poses = ((one.header, one.pose.pose if hasattr(one, "pose") else one) for one in messages)
+    known = ((header, pose) for header, pose in poses if getattr(pose, "orientation_covariance", _KNOWN)[0] != -1.0)
+    return _track([(stamp_ns(header), (0.0, 0.0, 0.0), _rotation(pose.orientation)) for header, pose in known])
 
 
 def frame_name(name: str) -> str:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node_support.geometry import rotation_matrices
+from node_support.geometry import quaternion_of, rotation_matrices
 
 _NORMS = (0.5, 2.0)  # of quaternions; a norm outside says that something else than a rotation was written
 
@@ -66,6 +66,13 @@ class PoseTrack:
         translations = (1.0 - share)[:, np.newaxis] * self.translations[before]
         translations += share[:, np.newaxis] * self.translations[after]
         return _matrices(translations, _between(self.rotations[before], self.rotations[after], share))
+
+    def mounted(self, T_vehicle_instrument: np.ndarray) -> "PoseTrack":
+        """Return the orientations of the vehicle, at the origin, where the track has those of an instrument on it."""
+        turns = np.tile(np.eye(4), (len(self), 1, 1))
+        turns[:, :3, :3] = rotation_matrices(self.rotations) @ T_vehicle_instrument[:3, :3].T
+        rotations = np.array([quaternion_of(turn) for turn in turns])
+        return PoseTrack(self.stamps_ns, np.zeros((len(self), 3)), rotations, self.is_fixed)
 
     def turned_up(self) -> "PoseTrack":
         """Return the track from north, east, down to x, y left, z up: both frames by half a turn about x."""

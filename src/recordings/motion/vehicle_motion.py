@@ -1,15 +1,17 @@
 """Where the vehicle was, as far as a recording tells: poses, a heading, or nothing."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from typing import List, Optional
 
 import numpy as np
 
+from dead_reckoning.velocity_messages import VELOCITY_TYPES
 from recordings.bags.bag import Bag, RecordingError, missing_topic
-from recordings.bags.topic_roles import Role, with_role
+from recordings.bags.topic_roles import ODOMETRY, Role, with_role
 from recordings.motion.frame_tree import FrameTree, frame_name, frame_tree, heading_track, pose_track
 from recordings.motion.pose_track import PoseTrack
+from recordings.motion.velocity_motion import fixed_pose, reckoned, velocities_of
 
 _NO_SHIFT, _NO_TURN = np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0])
 
@@ -18,6 +20,7 @@ class MotionSource(Enum):
     """What is known of the motion."""
 
     POSES = "poses"
+    VELOCITY = "velocity and heading"
     HEADING = "heading only"
     STANDING = "declared as standing"
     UNKNOWN = "declared as unknown"
@@ -56,8 +59,11 @@ def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> 
     if names.odometry is None and tree.links_between(names.odom_frame, names.base_frame) is not None:
         return Motion(_upward(tree, names), MotionSource.POSES)
     topic = names.odometry or _likeliest(bag, Role.ODOMETRY, truth)
-    if topic is not None:
+    if topic is not None and not _is_of_velocities(bag, topic):
         return _of_poses(bag, tree, topic, names)
+    velocity = topic or _likeliest(bag, Role.VELOCITY, truth)
+    if velocity is not None:
+        return _of_velocity(bag, tree, velocity, names)
     topic = _likeliest(bag, Role.HEADING, truth)
     if topic is not None:
         return _of_heading(bag, tree, topic, names)
@@ -105,14 +111,54 @@ def _of_poses(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Moti
 
 
 def _of_heading(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
-    try:
-        track = heading_track(message for _, message in bag.messages(topic))
-    except AttributeError:
-        track = None
-    if track is None or not len(track):
+    track = _headings(bag, tree, topic, names)
+    if track is None:
         raise RecordingError(f"{_nothing(bag, tree, names)}; {topic} holds no orientation either")
     note = f"no odometry: heading from {topic} ({bag.topics[topic].type}), the position is unknown"
     return Motion(linked(tree, names, track), MotionSource.HEADING, [note])
+
+
+def _of_velocity(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
+    """Return the motion that velocities make along the headings of another topic, or of their own."""
+    candidates = [*(one.name for one in with_role(bag.topics, Role.HEADING)), topic]
+    tracks = ((name, _headings(bag, tree, name, names)) for name in candidates)
+    heading, headings = next(((name, track) for name, track in tracks if track is not None), (None, None))
+    if headings is None:
+        raise RecordingError(f"{_nothing(bag, tree, names)}; {topic} holds velocities, but no topic holds a heading")
+    upward = replace(names, z_is_down=False)
+    found = velocities_of(bag, topic, tree, names.base_frame, names.z_is_down)
+    if not len(found.stamps_ns):
+        raise RecordingError(f"none of the {found.refused} messages of {topic} holds a velocity")
+    note = (
+        f"odometry from {len(found.stamps_ns)} velocities of {topic} ({bag.topics[topic].type}) along the heading of "
+        f"{heading}; they are at most {found.longest_gap:.1f} s apart, and {found.refused} messages hold none"
+    )
+    track = reckoned(found, headings.turned_up() if names.z_is_down else headings)
+    return Motion(linked(tree, upward, track), MotionSource.VELOCITY, [note])
+
+
+def _is_of_velocities(bag: Bag, topic: str) -> bool:
+    """Return whether a topic holds velocities and no positions, or an Odometry whose positions are not filled in."""
+    kind = bag.topics[topic].type if topic in bag.topics else ""
+    if kind != ODOMETRY or kind not in VELOCITY_TYPES:
+        return kind in VELOCITY_TYPES
+    messages = [message for _, message in bag.messages(topic)]
+    places = np.array([[one.pose.pose.position.x, one.pose.pose.position.y] for one in messages])
+    speeds = [max(abs(one.twist.twist.linear.x), abs(one.twist.twist.linear.y)) for one in messages]
+    return bool(messages) and not np.any(places) and max(speeds) > 0.0
+
+
+def _headings(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Optional[PoseTrack]:
+    """Return the vehicle's orientations at the origin, by the mount that tf tells; None for a topic that holds none."""
+    messages = [message for _, message in bag.messages(topic)]
+    try:
+        track = heading_track(messages)
+    except AttributeError:
+        return None
+    if not len(track):
+        return None
+    mount = fixed_pose(tree, names.base_frame, frame_name(messages[0].header.frame_id))
+    return track if mount is None or hasattr(messages[0], "pose") else track.mounted(mount)
 
 
 def _likeliest(bag: Bag, role: Role, truth: Optional[str]) -> Optional[str]:

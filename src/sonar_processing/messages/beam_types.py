@@ -13,6 +13,7 @@ from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Tuple, 
 import numpy as np
 
 from node_support.errors import RefusedInput
+from node_support.headers import stamp_ns
 
 _VOTES = 25  # Beams that are looked back on: more than the seven that gradians spend below 2 pi in a turn
 _ROUNDING = 1e-3  # Of a float32 that holds an angle
@@ -171,14 +172,6 @@ def laser_scan(message: Any) -> List[BeamFields]:
         BeamFields(stamp, message.header.frame_id, float(angle), _echo_at(distance / resolution), resolution)
         for stamp, angle, distance in zip(stamps, angles, ranges)
     ]
-
-
-def stamp_ns(header: Any) -> int:
-    """Return the stamp of a header, ns; ROS 1 names its parts secs and nsecs, ROS 2 and rosbags sec and nanosec."""
-    stamp = header.stamp
-    if hasattr(stamp, "nanosec"):
-        return int(stamp.sec) * 10**9 + int(stamp.nanosec)
-    return int(stamp.secs) * 10**9 + int(stamp.nsecs)
 
 
 def _speed_of_sound(value: float) -> float:

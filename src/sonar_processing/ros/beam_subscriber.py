@@ -1,60 +1,20 @@
 """Subscribes to beams of any known message type, also of packages that are not installed."""
 
-import shutil
-import sys
-from functools import partial
-from pathlib import Path
-from typing import Callable, Dict, Tuple
+from typing import Callable
 
-import genpy
-import genpy.dynamic
 import rospy
 from sensor_msgs.msg import LaserScan
 
 from node_support import topics
-from node_support.errors import RefusedInput
 from node_support.health import Health
+from node_support.ros.any_messages import MessageClasses
 from node_support.ros.callbacks import guarded
 from sonar_processing.beams.beam import Beam
 from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN
 from sonar_processing.messages.reader import BeamMessageParameters, BeamReader, Reading, beam_type
 from underwater_map_construction.msg import SonarScanLine
 
-_BUILT: Tuple[type, ...] = (SonarScanLine, LaserScan)
-_KIND = "messages not readable"
 _BUFFER_BYTES = 2**20  # thousands of beams: what comes while the process stands still for some seconds
-
-
-class MessageClasses:
-    """Makes and keeps one class for each type and definition."""
-
-    def __init__(self) -> None:
-        self._classes: Dict[str, type] = {kind._md5sum: kind for kind in _BUILT}
-
-    def deserialised(self, message: rospy.AnyMsg) -> genpy.Message:
-        """Return the message; raises RefusedInput when definition and bytes do not make one."""
-        header = message._connection_header
-        made = self._class_of(header["type"], header["md5sum"], header.get("message_definition", ""))
-        try:
-            return made().deserialize(message._buff)
-        except (genpy.DeserializationError, ValueError, MemoryError) as error:
-            raise RefusedInput(_KIND, f"{header['type']}: {error}") from error
-
-    def _class_of(self, name: str, md5sum: str, definition: str) -> type:
-        if md5sum not in self._classes:
-            self._classes[md5sum] = _generated(name, definition)
-        return self._classes[md5sum]
-
-
-def _generated(name: str, definition: str) -> type:
-    try:
-        made = genpy.dynamic.generate_dynamic(name, definition)[name]
-    except Exception as error:  # Whatever the parser, the generator or the generated code stumbles over
-        raise RefusedInput(_KIND, f"{name}: no usable definition: {error}") from error
-    # genpy imports the class from a folder of its own, which it removes at an exit that our nodes do not take.
-    folder = Path(sys.modules[made.__module__].__file__).parent
-    rospy.on_shutdown(partial(shutil.rmtree, folder, ignore_errors=True))
-    return made
 
 
 class BeamSubscriber:
@@ -75,7 +35,7 @@ class BeamSubscriber:
         self._health = health
         self._on_new_unit, self._on_message = on_new_unit, on_message
         self._reader = BeamReader(parameters)
-        self._classes = MessageClasses()
+        self._classes = MessageClasses((SonarScanLine, LaserScan))
         self._subscriber = rospy.Subscriber(
             topics.BEAMS,
             rospy.AnyMsg,

@@ -86,6 +86,23 @@ def test_an_estimate_that_is_not_followed_by_another_fades(reckoner):
     np.testing.assert_allclose(faded.velocity, np.exp(-1.0) * np.array([0.5, 0.1, 0.0]))
 
 
+def test_a_measured_velocity_tilts_with_the_vehicle():
+    reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=VelocitySource.MEASURED))
+    nose_down = pose_matrix((0, 0, 0), (0, 0.5, 1.0))[:3, :3]
+    reckoner.take_velocity(START, nose_down.T @ np.array([0.3, 0.4, 0.0]))
+    for second in (0, 2):
+        done = reckoner.take_orientation(START + second * SECOND, nose_down)
+    np.testing.assert_allclose(done.T_odom_base[:2, 3], [0.6, 0.8], atol=1e-9)
+
+
+def test_an_instrument_off_the_centre_of_a_turn_moves_the_vehicle_no_further():
+    """The vehicle turns on the spot; 0.4 m to the left of its middle the water goes by at 0.04 m/s."""
+    reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=VelocitySource.MEASURED))
+    reckoner.take_velocity(START, np.array([-0.04, 0.0, 0.0]), instrument=(0.0, 0.4))
+    done = reckoned(reckoner, 10.0, lambda t: 0.1 * t)
+    assert np.abs(done.T_odom_base[:2, 3]).max() < 1e-9
+
+
 def test_commands_do_not_fade():
     reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=VelocitySource.COMMANDS, command_timeout=1.0))
     for tenth in range(3):

@@ -50,11 +50,14 @@ def of_beams(path, **options):
         yield bag
 
 
-def add_odometry(bag, topic="/nav/odometry", frame="world", child="hull"):
+def add_odometry(bag, topic="/nav/odometry", frame="world", child="hull", has_positions=True):
     for time, x in poses():
         message = stamped(bag, "nav_msgs/Odometry", time, frame)
         message.child_frame_id = child
-        message.pose.pose.position.x, message.pose.pose.orientation.w = x, 1.0
+        message.pose.pose.orientation.w = 1.0
+        message.twist.twist.linear.x = SPEED
+        if has_positions:
+            message.pose.pose.position.x = x
         bag.write(topic, message, nanoseconds(time))
 
 
@@ -69,6 +72,13 @@ def add_imu(bag, topic="/imu/data", gravity=9.8):
     for time, _ in poses():
         message = stamped(bag, "sensor_msgs/Imu", time, "imu")
         message.orientation.w, message.linear_acceleration.z = 1.0, gravity
+        bag.write(topic, message, nanoseconds(time))
+
+
+def add_velocities(bag, topic="/dvl/twist", frame="base_link", y=0.0):
+    for time, _ in poses():
+        message = stamped(bag, "geometry_msgs/TwistWithCovarianceStamped", time, frame)
+        message.twist.twist.linear.x, message.twist.twist.linear.y = SPEED, y
         bag.write(topic, message, nanoseconds(time))
 
 

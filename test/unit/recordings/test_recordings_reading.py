@@ -81,6 +81,36 @@ def test_with_an_imu_alone_the_heading_is_known(tmp_path):
     assert read(tmp_path / "a.bag", Request()).motion.source is MotionSource.HEADING
 
 
+@pytest.mark.parametrize(
+    "add",
+    [foreign.add_velocities, lambda bag: foreign.add_odometry(bag, has_positions=False)],
+    ids=["twists", "odometry without positions"],
+)
+def test_velocities_along_the_heading_of_an_imu_are_odometry(tmp_path, add):
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
+        foreign.add_imu(bag)
+        add(bag)
+    recording = read_recording(tmp_path / "a.bag", Request())
+    assert_goes_ahead(recording)
+    assert "along the heading of /imu/data" in recording.notes[0]
+
+
+def test_velocities_are_along_the_axes_of_their_instrument_where_tf_places_it(tmp_path):
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
+        foreign.add_imu(bag)
+        foreign.add_velocities(bag, frame="dvl", y=0.1)
+        foreign.add_fixed(bag, "base_link", "dvl", x=1.0)
+    track = read_recording(tmp_path / "a.bag", Request()).track
+    assert track.poses[-1] == pytest.approx([10.0 * foreign.SPEED, 1.0, 0.0])
+
+
+def test_velocities_without_a_heading_are_no_odometry(tmp_path):
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
+        foreign.add_velocities(bag)
+    with pytest.raises(RecordingError, match="/dvl/twist holds velocities, but no topic holds a heading"):
+        read(tmp_path / "a.bag", Request())
+
+
 def test_a_vehicle_that_is_declared_as_standing_needs_nothing(sonar_bag):
     recording = read_recording(sonar_bag, Request(motion=MotionNames(declared=MotionSource.STANDING)))
     assert all(np.array_equal(one.T_target_sonar, np.eye(4)) for one in recording.beams)
