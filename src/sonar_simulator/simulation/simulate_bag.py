@@ -106,7 +106,7 @@ def _told(settings: Settings) -> str:
 _EPILOG = """\
 examples:
   simulate_bag --world basin --out basin.bag
-  simulate_bag --world harbour --out harbour.bag --set echo_model=physical odometry.scale_error=0.1
+  simulate_bag --world harbour --out harbour.bag --odometry-error 0.1 --set echo_model=physical
   simulate_bag --world my_pool.dae --script my_moves.yaml --out pool.bag --set sonar.ray_rows=15 seed=7
 
 yaml/sonar_simulator_default.yaml lists the keys that --set takes."""
@@ -133,6 +133,10 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE",
         help="any parameter; GROUP.KEY=VALUE for those in groups",
     )  # fmt: skip
+    parser.add_argument(
+        "--odometry-error", type=float, metavar="SHARE",
+        help="true distances are 1 + SHARE times those of the odometry (default: odometry.scale_error)",
+    )  # fmt: skip
     parser.add_argument("--robot", type=Path, help="URDF that says where the sonar is mounted (default: Charl-e)")
     parser.add_argument("--compression", choices=COMPRESSIONS, default="none", help="of the bag (default: %(default)s)")
     parser.add_argument("--quiet", action="store_true", help="no progress bar and no summary")
@@ -149,6 +153,8 @@ def settings_of(options: argparse.Namespace, package: Path) -> Dict[str, Any]:
     values = read_values(chosen) if chosen else {}
     for key, value in assigned_values(options.set).items():
         _set(values, key, value)
+    if options.odometry_error is not None:
+        _set(values, "odometry.scale_error", options.odometry_error)
     shipped = package / "worlds" / f"{options.world}.sdf"
     world = shipped if shipped.is_file() else Path(options.world).expanduser().absolute()
     if not world.exists():
@@ -215,5 +221,6 @@ def _run(options: Namespace) -> None:
         print(
             f"{options.out}: {duration:.0f} s of simulated time, {beams} beams, "
             f"{options.out.stat().st_size / 1e6:.1f} MB, written in {seconds:.1f} s "
-            f"({duration / seconds:.0f} times real time)"
+            f"({duration / seconds:.0f} times real time); true distances are "
+            f"{1.0 + settings.odometry.scale_error:.3g} times those of the odometry"
         )
