@@ -258,6 +258,11 @@ def test_a_name_that_would_leave_the_folder_is_refused(folder, name):
         folder.path(name)
 
 
+def test_a_name_that_no_file_system_takes_is_refused_in_one_line(folder):
+    with pytest.raises(MapFileError, match=r"^name 'ö{20}'\.\.\.: has 150 letters, must be 200 bytes at most$"):
+        folder.load("ö" * 150)
+
+
 def test_a_link_that_leads_out_of_the_folder_is_refused(folder, tmp_path):
     folder.folder.mkdir()
     (tmp_path / "outside.mlsm").write_bytes(b"")

@@ -9,6 +9,8 @@ from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, expo
 from mlsm_manager.surface_map.map_file import ENDING, MapFileError, StoredMap, read_map
 from node_support.files import ros_path
 
+_LONGEST = 200  # bytes of a name: file systems take 255, numbers and temporary files add some
+
 
 class MapFolder:
     """Saves and loads maps by name; nothing is written or read outside of the folder."""
@@ -24,6 +26,8 @@ class MapFolder:
         """
         if not name or name.startswith(".") or Path(name).name != name or "\0" in name:
             raise MapFileError(f"name {name!r}: must be a plain file name without a path and not start with a dot")
+        if len(name.encode(errors="replace")) > _LONGEST:
+            raise MapFileError(f"name {name[:20]!r}...: has {len(name)} letters, must be {_LONGEST} bytes at most")
         path = self.folder / (name if name.endswith(ENDINGS) else f"{name}{ENDING}")
         if path.is_symlink() and path.resolve().parent != self.folder.resolve():
             raise MapFileError(f"{path}: leads to {path.resolve()}, which is not in {self.folder}")
