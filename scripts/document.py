@@ -20,10 +20,10 @@ from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, PROFILES, 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table, start_up_yaml
-from node_support.parameters import EXPERT, ParameterSet, describe
+from node_support.parameters import EXPERT, ParameterSet, config_name, describe
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
-from sonar_processing.filters.stage_table import STAGES, config_name
+from sonar_processing.filters.stage_table import STAGES
 from sonar_processing.scans.image import SonarImageParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.tilt_scan import SonarControlParameters

@@ -133,9 +133,7 @@ def rotation_of_heading(heading: float, kind: HeadingType) -> np.ndarray:
     radians = math.radians(heading) if kind is HeadingType.COMPASS_DEGREES else heading
     if not abs(radians) <= _MOST_TURNS * 2.0 * math.pi:
         unit = "deg" if kind is HeadingType.COMPASS_DEGREES else "rad"
-        raise RefusedInput(
-            "headings refused", f"{heading} {unit}, must be finite and at most two turns; see heading_type"
-        )
+        raise RefusedInput("headings refused", f"{heading} {unit}, must be finite, at most two turns; see heading_type")
     yaw = math.pi / 2.0 - radians
     cosine, sine = math.cos(yaw), math.sin(yaw)
     return np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])

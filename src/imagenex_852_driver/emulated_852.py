@@ -30,9 +30,7 @@ class EmulatorParameters(EmulatedHeadParameters):
     """Parameters of imagenex_852_emulator."""
 
     overrun: float = parameter(0.0, "share of replies that report a character overrun", low=0.0, high=1.0)
-    head_id: int = parameter(
-        SONAR_HEAD_ID, "identification of the head", low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False
-    )
+    head_id: int = parameter(SONAR_HEAD_ID, "number of the head", low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False)
 
     def timing(self) -> LineTiming:
         """Return the timing of pings on this line."""

@@ -141,9 +141,7 @@ def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     commands.required = True
     info = commands.add_parser("info", help="say what maps hold")
     info.add_argument("maps", type=Path, nargs="+", metavar="FILE", help=_MAPS)
-    commands.add_parser(
-        "view", parents=[one_map, colors], help="show a map in a window; without a screen write a picture"
-    )
+    commands.add_parser("view", parents=[one_map, colors], help="show a map in a window; without one, write a picture")
     export_parser = commands.add_parser("export", parents=[one_map, out, colors], help="write a map in another format")
     export_parser.add_argument(
         "--slice", type=float, nargs=2, default=(-np.inf, np.inf), metavar=("LOW", "HIGH"),

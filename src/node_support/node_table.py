@@ -43,12 +43,10 @@ class HostDescription:
 
 
 _subscribes, _publishes, _serves = (partial(Interface, role) for role in Role)
-_BEAMS_IN = _subscribes(
-    topics.BEAMS, "SonarScanLine", "beams; also of the types of other sonars, see [sonars](sonars.md)"
-)
+_BEAMS_IN = _subscribes(topics.BEAMS, "SonarScanLine", "beams, also of other types, see [sonars](sonars.md)")
 _JOINTS_IN = _subscribes(topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo")
 _DRIVER_JOINTS_IN = _subscribes(
-    topics.JOINT_STATES, "sensor_msgs/JointState", "position of the tilt servo, if `sensor_joint` is set"
+    topics.JOINT_STATES, "sensor_msgs/JointState", "the tilt servo, if `sensor_joint` is set"
 )
 _OF_DRIVERS = (_DRIVER_JOINTS_IN, _publishes(topics.BEAMS, "SonarScanLine", "one beam for every valid reply"))
 _OF_EMULATORS = (

@@ -60,9 +60,7 @@ class Description:
         if kind is str:
             return "a string" if self.may_be_empty else "a non-empty string"
         number = "an integer" if kind is int else "a number"
-        bounds = [
-            f"{word} {bound:.12g}" for word, bound in (("from", self.low), ("to", self.high)) if bound is not None
-        ]
+        bounds = [f"{word} {end:.12g}" for word, end in (("from", self.low), ("to", self.high)) if end is not None]
         unit = f" {self.unit}" if self.unit else ""
         return " ".join([number, *bounds]) + unit
 
@@ -169,6 +167,11 @@ class ParameterSet:
         return tuple(field for field in dataclasses.fields(cls) if describe(field).tunable)
 
 
+def config_name(node: str) -> str:
+    """Return the name of a node's dynamic_reconfigure description: OutlierRemover of outlier_remover."""
+    return node.title().replace("_", "")
+
+
 def with_defaults(**defaults: Any) -> Callable[[type], type]:
     """Give a `ParameterSet` other defaults for parameters that it inherits; texts, units and ranges stay::
 
@@ -228,9 +231,8 @@ def _in_range(value: Any, description: Description) -> bool:
         return True
     if isinstance(value, float) and not math.isfinite(value):
         return False
-    return (description.low is None or value >= description.low) and (
-        description.high is None or value <= description.high
-    )
+    low, high = description.low, description.high
+    return (low is None or value >= low) and (high is None or value <= high)
 
 
 def _plain(value: Any) -> Any:

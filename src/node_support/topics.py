@@ -6,9 +6,7 @@ SCANS = "sonar/scan/sonarCloud"  # StampedIntensityCloud: scans
 LASER_POINTS = "sonar/scan/laserCloud"  # PointCloud2: scans of one point per beam
 LASER_SCANS = "sonar/scan/laserScan"  # LaserScan: whole revolutions of the head as a planar laser would measure them
 TURNS = "sonar/scan/turn"  # PointCloud2 with times: whole revolutions of the head from the newest beam's pose
-POLAR_SCANS = (
-    "sonar/scan/polar"  # StampedIntensityCloud, organised: whole revolutions of the head, one row for each beam
-)
+POLAR_SCANS = "sonar/scan/polar"  # StampedIntensityCloud, organised: whole revolutions, one row for each beam
 THRESHOLDED = "sonar/scan/thresholded"  # StampedIntensityCloud: scans without weak points
 CLEANED = "sonar/scan/cleaned"  # StampedIntensityCloud: scans without weak points and outliers
 ECHOES = "sonar/scan/echoes"  # StampedIntensityCloud: the echoes of polar scans

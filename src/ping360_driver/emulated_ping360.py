@@ -54,9 +54,7 @@ class EmulatorParameters(EmulatedHeadParameters):
     """Parameters of ping360_emulator."""
 
     refused: float = parameter(0.0, "share of replies instead of which the head refuses", low=0.0, high=1.0)
-    link: str = parameter(
-        "/tmp/ping360", "path at which the port appears, or udp://HOST:PORT to listen at", tunable=False
-    )
+    link: str = parameter("/tmp/ping360", "path at which the port appears, or udp://HOST:PORT", tunable=False)
     auto_transmit: bool = parameter(
         True, "the firmware can scan a sector by itself; older ones need a request per ping", tunable=False
     )

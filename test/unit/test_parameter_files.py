@@ -8,8 +8,7 @@ import yaml
 from document import LIVE_NODES, START_UP_NODES, generated
 
 from node_support.node_table import NODES
-from node_support.parameters import describe
-from sonar_processing.filters.stage_table import config_name
+from node_support.parameters import config_name, describe
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -45,7 +44,7 @@ def test_the_default_yaml_makes_the_defaults(name):
 @pytest.fixture(params=sorted(LIVE_NODES))
 def live(request):
     """Return a parameter dataclass and the dynamic_reconfigure module that the build made of it."""
-    module = f"underwater_map_construction.cfg.{config_name(request.param.replace('_driver', ''))}Config"
+    module = f"underwater_map_construction.cfg.{config_name(request.param)}Config"
     return LIVE_NODES[request.param], importlib.import_module(module)
 
 

@@ -37,9 +37,7 @@ class DeadReckoning:
         self.healths = [self.health]
         self._lock = threading.Lock()
         self._classes = MessageClasses()
-        self._live = ReconfigurableParameters(
-            DeadReckoningParameters, namespace, "DeadReckoning", self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(DeadReckoningParameters, namespace, self.health, self._use_parameters)
         self._transforms = TfBuffer(self.health, tolerance=self._live.current.stamp_tolerance)
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._odometry = rospy.Publisher(topics.ODOMETRY, Odometry, queue_size=QUEUE_SIZE)

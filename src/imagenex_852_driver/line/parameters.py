@@ -27,11 +27,9 @@ class HeadSettings(ParameterSet):
     Raises ParameterError for a value out of range and for values that do not fit together.
     """
 
-    max_range: int = parameter(
-        20, "range of a beam: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range"
-    )
+    max_range: int = parameter(20, "range: 5, 10, 20, 30, 40 or 50", unit="m", low=5, high=50, thesis_name="Range")
     direction: Direction = parameter(
-        Direction.CLOCKWISE, "direction the head turns, seen from above", thesis_name="Direction"
+        Direction.CLOCKWISE, "how the head turns, seen from above", thesis_name="Direction"
     )
     start_gain_db: int = parameter(20, "receiver gain", unit="dB", low=0, high=40, thesis_name="Gain")
     absorption_db_per_m: float = parameter(
@@ -43,9 +41,7 @@ class HeadSettings(ParameterSet):
     sector_width_deg: int = parameter(
         360, "width of the sector, in steps of 3", unit="deg", low=0, high=360, thesis_name="Sector width"
     )
-    step_size_deg: int = parameter(
-        3, "turn between pings: 0, 3 or 6", unit="deg", low=0, high=6, thesis_name="Step size"
-    )
+    step_size_deg: int = parameter(3, "turn per ping: 0, 3 or 6", unit="deg", low=0, high=6, thesis_name="Step size")
     pulse_length_us: int = parameter(
         100, "length of the pulse; 253 is not possible", unit="us", low=1, high=255, thesis_name="Pulse length"
     )
@@ -54,9 +50,7 @@ class HeadSettings(ParameterSet):
         0, "pause before the reply, in steps of 2; 506 is not possible",
         unit="ms", low=0, high=510, thesis_name="Switch delay",
     )  # fmt: skip
-    frequency_khz: int = parameter(
-        675, "sound frequency: 675 or 850", unit="kHz", low=675, high=850, thesis_name="Frequency"
-    )
+    frequency_khz: int = parameter(675, "frequency: 675 or 850", unit="kHz", low=675, high=850, thesis_name="Frequency")
     head_id: int = parameter(
         SONAR_HEAD_ID, "identification of the head: 16 sonar, 17 to 21 echo sounders",
         low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False,
@@ -131,7 +125,7 @@ class ConnectionParameters(LineParameters):
     """Where the head is connected, and how long its replies take."""
 
     speed_of_sound: float = parameter(
-        1500.0, "speed of sound that the head assumes", unit="m/s", low=1000.0, tunable=False
+        1500.0, "speed of sound, as the head has it", unit="m/s", low=1000.0, tunable=False
     )
 
     def timing(self) -> LineTiming:

@@ -46,9 +46,7 @@ def play_arguments(arguments: List[str]) -> Namespace:
     """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
     parser = CommandLine("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
-    parser.add_argument(
-        "--rate", type=positive, help="pings per second (default: as logged, and 10 where the log has no times)"
-    )
+    parser.add_argument("--rate", type=positive, help="pings per second (default: as logged, or 10 without times)")
     parser.add_argument("--loop", action="store_true", help="start again at the end")
     parser.add_argument("--wait-for-subscribers", action="store_true", help="start when somebody subscribes")
     parser.add_argument("--frame-id", default="sonar", help="frame of the head")

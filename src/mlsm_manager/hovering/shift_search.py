@@ -62,9 +62,7 @@ class ShiftSearch:
         tried: List[JudgedPath] = []
         idle = 0
         for _ in range(_ROUNDS):
-            new = [
-                one for one in found if not any(_alike(one, known) and _hardly_better(one, known) for known in tried)
-            ]
+            new = [one for one in found if not any(_alike(one, old) and _hardly_better(one, old) for old in tried)]
             tried += new
             better = _distinct(found + [other for one in new for other in self._neighbours(one)])
             idle = 0 if better[0].log_likelihood > found[0].log_likelihood + _GAIN else idle + 1

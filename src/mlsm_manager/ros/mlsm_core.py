@@ -50,10 +50,7 @@ class MlsmCore:
         parameters = read_parameters(MlsmCoreParameters, namespace)
         self._localiser = parameters.build_localiser()
         self._longest_turn = parameters.longest_turn
-        self._live = ReconfigurableParameters(
-            MlsmCoreParameters, namespace, "MlsmCore", self.health,
-            lambda changed: self._localiser.use(changed.localiser_settings()),
-        )  # fmt: skip
+        self._live = ReconfigurableParameters(MlsmCoreParameters, namespace, self.health, self._use_parameters)
         self._odometry = OdometryTrack(
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
@@ -84,6 +81,9 @@ class MlsmCore:
         """Match a scan of echoes; one that cannot be matched is counted."""
         if self._live.current.match_input is MatchInput.ECHOES:
             guarded(self.health, self._match)(cloud)
+
+    def _use_parameters(self, parameters: MlsmCoreParameters) -> None:
+        self._localiser.use(parameters.localiser_settings())
 
     def _start_matching(self, message: Bool) -> None:
         if self._localiser.match(message.data):

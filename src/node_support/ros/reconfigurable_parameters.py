@@ -8,7 +8,7 @@ import rospy
 from dynamic_reconfigure.server import Server
 
 from node_support.health import Health
-from node_support.parameters import EXPERT, OLD_KEYS, ParameterError, ParameterSet, describe
+from node_support.parameters import EXPERT, OLD_KEYS, ParameterError, ParameterSet, config_name, describe
 
 Parameters = TypeVar("Parameters", bound=ParameterSet)
 
@@ -58,14 +58,9 @@ class ReconfigurableParameters:
     """Holds the current, always valid `ParameterSet` of one stage."""
 
     def __init__(
-        self,
-        parameters: Type[ParameterSet],
-        namespace: str,
-        config_name: str,
-        health: Health,
-        on_change: Callable[[ParameterSet], None],
+        self, parameters: Type[ParameterSet], namespace: str, health: Health, on_change: Callable[[ParameterSet], None]
     ) -> None:
-        """Read `namespace` ("~", or a resolved name) and serve `config_name` (the name of the .cfg file).
+        """Read `namespace` ("~", or a resolved name) and serve the .cfg file of the node that `health` names.
 
         `on_change` is called with the first values and with every accepted change. Raises ParameterError when the
         parameter server holds an unknown key or a value that is not allowed.
@@ -74,7 +69,7 @@ class ReconfigurableParameters:
         self._on_change = on_change
         self._health = health
         on_change(self.current)
-        module = importlib.import_module(f"underwater_map_construction.cfg.{config_name}Config")
+        module = importlib.import_module(f"underwater_map_construction.cfg.{config_name(health.name)}Config")
         self._server = _Server(module, self.current, namespace, self._request)
 
     def change(self, changes: Mapping[str, Any]) -> None:

@@ -101,9 +101,7 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
                 if arrival is not None and arrival.message.message_id == MessageId.DEVICE_INFORMATION:
                     return self._checked(device_information(arrival.message))
                 self._line.take_broken()
-        raise PortUnavailableError(
-            f"no Ping360 answers at {self.connection.port}; check its power, the cable and baud_rate"
-        )
+        raise PortUnavailableError(f"no Ping360 answers at {self.connection.port}; check power, cable and baud_rate")
 
     def _checked(self, information: DeviceInformation) -> DeviceInformation:
         if not information.is_ping360:

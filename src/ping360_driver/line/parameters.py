@@ -30,7 +30,7 @@ class HeadSettings(ParameterSet):
     max_range: float = parameter(20.0, "range of a beam", unit="m", low=0.75, high=50.0)
     gain_setting: int = parameter(1, "receiver gain: 0 low, 1 normal, 2 high", low=0, high=2)
     frequency_khz: int = parameter(
-        750, "sound frequency; the receiver is made for 650 to 850", unit="kHz", low=500, high=1000
+        750, "frequency; the receiver is made for 650 to 850", unit="kHz", low=500, high=1000
     )
     speed_of_sound: float = parameter(
         1500.0, "speed of sound in the water: turns ranges into times", unit="m/s", low=1300.0, high=1700.0
@@ -94,6 +94,4 @@ class HeadSettings(ParameterSet):
 class DriverParameters(MountingParameters, HeadSettings, LineParameters):
     """Parameters of ping360_driver; usable wherever a `HeadSettings` or `LineParameters` is expected."""
 
-    port: str = parameter(
-        "/dev/ttyUSB0", "device, pyserial URL (socket://, rfc2217://) or udp://HOST:PORT", tunable=False
-    )
+    port: str = parameter("/dev/ttyUSB0", "device, URL (socket://, rfc2217://) or udp://HOST:PORT", tunable=False)

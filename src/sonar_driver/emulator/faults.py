@@ -120,9 +120,7 @@ class EmulatedHeadParameters(FaultRates):
     echo_source: EchoSourceKind = parameter(
         EchoSourceKind.PATTERN, "four walls of a square basin, or the simulator's ray caster", tunable=False
     )
-    wall_distance: float = parameter(
-        4.0, "pattern: distance to each wall", unit="m", low=0.1, high=100.0, tunable=False
-    )
+    wall_distance: float = parameter(4.0, "pattern: distance to walls", unit="m", low=0.1, high=100.0, tunable=False)
     world_file: str = parameter("worlds/basin.sdf", "world: SDF file; relative to the package's folder", tunable=False)
     head_frame: str = parameter(
         "", "world: frame of tf with which the head moves in the frame world; empty: it stands at x, y, z, yaw_deg",
@@ -133,8 +131,6 @@ class EmulatedHeadParameters(FaultRates):
     z: float = parameter(-2.0, "world: position of the head", unit="m", tunable=False)
     yaw_deg: float = parameter(0.0, "world: heading of the head, counter-clockwise", unit="deg", tunable=False)
     beam_height_deg: float = parameter(
-        22.0, "world: vertical opening of the beam", unit="deg", low=0.0, high=150.0, tunable=False
+        22.0, "world: height of the beam", unit="deg", low=0.0, high=150.0, tunable=False
     )
-    beam_width_deg: float = parameter(
-        2.5, "world: horizontal opening of the beam", unit="deg", low=0.0, high=150.0, tunable=False
-    )
+    beam_width_deg: float = parameter(2.5, "world: width of the beam", unit="deg", low=0.0, high=150.0, tunable=False)

@@ -19,7 +19,7 @@ class LineParameters(ParameterSet):
         unit="s", low=0.01, high=1.5, tunable=False,
     )  # fmt: skip
     reopen_after: float = parameter(
-        5.0, "time without a reply after which the port is reopened", unit="s", low=0.1, tunable=False
+        5.0, "reopen the port after so long without a reply", unit="s", low=0.1, tunable=False
     )
     reply_margin: float = parameter(
         0.25, "how long to wait for a reply beyond the time that head, sound and line need",
@@ -29,9 +29,7 @@ class LineParameters(ParameterSet):
         0.25, "how long to wait after a timeout for a late reply, so that the next ping does not get it",
         unit="s", low=0.0, high=4.0, tunable=False,
     )  # fmt: skip
-    byte_gap: float = parameter(
-        0.1, "silence that ends an incomplete reply", unit="s", low=0.01, high=1.0, tunable=False
-    )
+    byte_gap: float = parameter(0.1, "silence that ends part of a reply", unit="s", low=0.01, high=1.0, tunable=False)
 
     def check(self) -> None:
         """Raise ParameterError if the first wait is longer than the longest."""

@@ -26,13 +26,12 @@ _PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 class SonarModel:
     """What the node needs to know of one kind of sonar.
 
-    name: the node's. config_name: of the .cfg file. parameters: those of line, mounting and head, with a `command`;
+    name: the node's. parameters: those of line, mounting and head, with a `command`;
     `LineParameters` and `MountingParameters` are among their bases. device: takes parameters, a stop event and a clock.
     message: makes the message of a ping, but for its header and the angle of the servo; None if it holds no echoes.
     """
 
     name: str
-    config_name: str
     parameters: Type[ParameterSet]
     device: Callable[[Any, threading.Event, Callable[[], float]], LineDevice]
     message: Callable[[Any, Any], Optional[SonarScanLine]]
@@ -50,9 +49,7 @@ class DriverNode:
         self._last_stats = LineStats()
         self.health = DriverHealth(model.name, lambda line: rospy.logwarn("%s", line), self._stats)
         self.healths = [self.health]
-        self._live = ReconfigurableParameters(
-            model.parameters, namespace, model.config_name, self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(model.parameters, namespace, self.health, self._use_parameters)
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
         self._connect()

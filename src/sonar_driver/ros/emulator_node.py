@@ -51,12 +51,11 @@ def place_in_tf(frame: str, health: Health) -> Place:
 class HeadModel:
     """What the node needs to know of one kind of emulated head.
 
-    name: the node's. config_name: of the .cfg file. head: makes the head. line: makes the line that it is served on,
+    name: the node's. head: makes the head. line: makes the line that it is served on,
     not yet open.
     """
 
     name: str
-    config_name: str
     parameters: Type[EmulatedHeadParameters]
     head: Callable[[Any, EchoSource, FaultInjector], EmulatedHead]
     line: Callable[[Any], ServedLine]
@@ -70,9 +69,7 @@ class EmulatorNode:
         self.health = make_health(model.name)
         self.healths = [self.health]
         self._faults: Optional[FaultInjector] = None
-        self._live = ReconfigurableParameters(
-            model.parameters, "~", model.config_name, self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(model.parameters, "~", self.health, self._use_parameters)
         parameters = self._live.current.changed({"link": os.path.expanduser(self._live.current.link)})
         head = model.head(parameters, self._echo_source(parameters, world_echoes), self._faults)
         self._served = ExitStack()

@@ -41,7 +41,7 @@ class MountingParameters(ParameterSet):
         unit="rad", low=-2.0 * math.pi, high=2.0 * math.pi, tunable=False,
     )  # fmt: skip
     upside_down: bool = parameter(
-        False, "the sonar hangs upside down, so that its head turns the other way round", tunable=False
+        False, "the sonar hangs upside down: its head turns the other way round", tunable=False
     )
 
     def matrix(self) -> np.ndarray:

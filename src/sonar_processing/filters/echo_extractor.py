@@ -60,16 +60,12 @@ class EchoExtractorParameters(ParameterSet):
         8.0, "least height of an echo above the ring, as a multiple of the ring's spread; 15 in open water",
         low=0.0, high=100.0,
     )  # fmt: skip
-    min_height: float = parameter(
-        10.0, "least height of an echo above the ring", unit="echo strength", low=0.0, high=255.0
-    )
+    min_height: float = parameter(10.0, "least height above the ring", unit="echo strength", low=0.0, high=255.0)
     threshold_share: float = parameter(
         1.0, "share of Otsu's threshold that a peak must reach: 1 keeps strong echoes only; DENSE always takes 1",
         low=0.0, high=1.0,
     )  # fmt: skip
-    min_range: float = parameter(
-        0.5, "nearer echoes are removed: there the head itself rings", unit="m", low=0.0, high=100.0
-    )
+    min_range: float = parameter(0.5, "nearer echoes are removed: there the head rings", unit="m", low=0.0, high=100.0)
     spacing: float = parameter(1.0, "DENSE: distance between the points of an echo", unit="m", low=0.01, high=100.0)
 
     @property

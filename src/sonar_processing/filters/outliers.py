@@ -23,9 +23,7 @@ class OutlierRemoverParameters(ParameterSet):
     """Parameters of outlier_remover."""
 
     mode: OutlierMode = parameter(OutlierMode.STATISTICAL, "which rule removes points", thesis_name="mode")
-    mean_k: int = parameter(
-        20, "STATISTICAL: number of nearest neighbours whose mean distance counts", low=1, high=1000
-    )
+    mean_k: int = parameter(20, "STATISTICAL: nearest neighbours whose mean distance counts", low=1, high=1000)
     stddev_multiplier: float = parameter(
         1.0,
         "STATISTICAL: points are kept up to so many standard deviations above the mean of these distances",

@@ -65,11 +65,6 @@ STAGES: Dict[str, StageType] = {
 }
 
 
-def config_name(stage: str) -> str:
-    """Return the name of a stage's dynamic_reconfigure description: OutlierRemover of outlier_remover."""
-    return stage.title().replace("_", "")
-
-
 class EmptiedScans:
     """Counts the scans in a row that came with points and left without any."""
 

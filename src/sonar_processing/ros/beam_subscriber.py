@@ -68,7 +68,7 @@ class BeamSubscriber:
             rospy.logwarn("%s: %s", self._health.name, _topics_instead())
         if reading.refused:
             self._health.problem(
-                "beams refused", f"rays of a {kind} that make no beam; check the driver", reading.refused
+                "beams refused", f"rays of a {kind} that make no beam; see the driver", reading.refused
             )
         if reading.unit_changed:
             self._health.problem("changes of the unit of angles", "the unfinished scan is forgotten; set angle_unit")
@@ -78,7 +78,7 @@ class BeamSubscriber:
 def _topics_instead() -> str:
     """Return which topics hold the beams that a LaserScan was made of."""
     found = [
-        f"{name} ({kind})" for name, kind in rospy.get_published_topics() if kind in BEAM_TYPES and kind != LASER_SCAN
+        f"{topic} ({kind})" for topic, kind in rospy.get_published_topics() if kind in {*BEAM_TYPES} - {LASER_SCAN}
     ]
     if found:
         return f"take the beams themselves instead of the LaserScan: remap {topics.BEAMS} to {' or '.join(found)}"

@@ -71,7 +71,6 @@ class ShapeDetectorNode(ABC):
     input_topic: str
     topic: str
     what: str
-    config_name: str
     parameters: type
     message: type
 
@@ -79,9 +78,7 @@ class ShapeDetectorNode(ABC):
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health(self.name)
         self.healths = [self.health]
-        self._live = ReconfigurableParameters(
-            self.parameters, namespace, self.config_name, self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(self.parameters, namespace, self.health, self._use_parameters)
         self._places = SonarPlaces(self._live.current.sonar_frame, self.health, self._live.current.stamp_tolerance)
         self._inliers = PointsPublisher(self.topic)
         self._coefficients = rospy.Publisher(f"{self.topic}/coefficients", self.message, queue_size=QUEUE_SIZE)
@@ -130,7 +127,7 @@ class LineDetectorNode(ShapeDetectorNode):
     """line_detector."""
 
     name, input_topic, topic = "line_detector", topics.CLEANED, topics.LINES
-    what, config_name = "walls", "LineDetector"
+    what = "walls"
     parameters, message = LineDetectorParameters, Walls
 
     def _use_parameters(self, parameters: LineDetectorParameters) -> None:
@@ -153,7 +150,7 @@ class CircleDetectorNode(ShapeDetectorNode):
     """circle_detector."""
 
     name, input_topic, topic = "circle_detector", topics.THRESHOLDED, topics.CIRCLES
-    what, config_name = "circles", "CircleDetector"
+    what = "circles"
     parameters, message = CircleDetectorParameters, Circles
 
     def _use_parameters(self, parameters: CircleDetectorParameters) -> None:

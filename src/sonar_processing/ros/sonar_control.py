@@ -31,9 +31,7 @@ class SonarControl:
         self._scan: Optional[TiltScan] = None
         self._commands = rospy.Publisher(topics.SERVO_COMMANDS, Float64, queue_size=1, latch=True)
         self._sweeps = rospy.Publisher("~sweeps", UInt32, queue_size=1, latch=True)
-        self._live = ReconfigurableParameters(
-            SonarControlParameters, "~", "SonarControl", self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(SonarControlParameters, "~", self.health, self._use_parameters)
         rospy.Service("~set_mode", SetScanMode, self._set_mode)
         self._joint = JointAngle(self._live.current.joint, self.health, self._take_angle)
         BeamSubscriber(self._take_beam, self._live.current, self.health)

@@ -30,9 +30,7 @@ class SonarImage(rospy.SubscribeListener):
         self._lock = threading.Lock()
         self._beams: Optional[BeamSubscriber] = None
         self._next_image = 0.0
-        self._live = ReconfigurableParameters(
-            SonarImageParameters, namespace, "SonarImage", self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(SonarImageParameters, namespace, self.health, self._use_parameters)
         self._infos = rospy.Publisher(topics.CAMERA_INFO, CameraInfo, queue_size=QUEUE_SIZE)
         self._images = rospy.Publisher(topics.IMAGE, Image, queue_size=QUEUE_SIZE, subscriber_listener=self)
         # rospy takes connections before it knows the listener, and tells it of none that came so early.

@@ -75,9 +75,7 @@ class SonarToCloud:
         self._moving_state = MovingState()
         self._revolution = RevolutionCollector()
         self._head = HeadWatch()
-        self._live = ReconfigurableParameters(
-            SonarToCloudParameters, namespace, "SonarToCloud", self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(SonarToCloudParameters, namespace, self.health, self._use_parameters)
         self._scans = CloudPublisher(topics.SCANS)
         self._laser_scans = PointsPublisher(topics.LASER_POINTS)
         self._newest_beam = PointsPublisher(topics.NEWEST_BEAM)
@@ -112,9 +110,7 @@ class SonarToCloud:
         moving, age = self._moving_state.is_moving(parameters), self._moving_state.age(stamp_ns)
         self.health.show("velocity", "moving" if moving else "still")
         if moving and age > parameters.velocity_timeout:
-            self.health.problem(
-                "beams of an old velocity", f"{parameters.velocity_topic} is silent for {age:.1f} s while moving"
-            )
+            self.health.problem("beams of an old velocity", f"{parameters.velocity_topic} is silent for {age:.1f} s")
         return moving
 
     def _place(self, placed: PlacedBeam) -> None:

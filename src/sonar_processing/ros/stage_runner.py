@@ -11,7 +11,7 @@ from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans, config_name
+from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
 from sonar_processing.ros.cloud_topics import CloudPublisher, FigurePublisher, report_broken, subscribe_to_clouds
 
 
@@ -24,9 +24,7 @@ class StageRunner:
         self.healths = [self.health]
         self.type = STAGES[name]
         self._emptied = EmptiedScans()
-        self._live = ReconfigurableParameters(
-            self.type.parameters, namespace, config_name(name), self.health, self._use_parameters
-        )
+        self._live = ReconfigurableParameters(self.type.parameters, namespace, self.health, self._use_parameters)
         self._publisher = CloudPublisher(self.type.output_topic)
         self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self.type.figures]
 

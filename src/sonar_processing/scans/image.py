@@ -25,9 +25,7 @@ class SonarImageParameters(BeamMessageParameters):
     metres_per_pixel: float = parameter(
         0.0, f"size of a pixel; 0: the range fits into {_USUAL_PIXELS} pixels", unit="m", low=0.0, high=10.0
     )
-    beam_width: float = beam_width_parameter(
-        "least width at which a beam is drawn; where the head's steps are wider, theirs"
-    )
+    beam_width: float = beam_width_parameter("least width at which a beam is drawn; wider where the head's steps are")
     max_rate: float = parameter(20.0, "most images per second", unit="1/s", low=0.1, high=1000.0)
 
 

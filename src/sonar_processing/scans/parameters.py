@@ -56,9 +56,7 @@ class ScanParameters(ParameterSet):
     scan_size: int = parameter(120, "beams that make a scan", low=1, high=3600, thesis_name="scanSize")
     end_at_full_turn: bool = parameter(True, "end a scan before the head passes its start again")
     target_frame: str = parameter("odom", "frame the clouds are placed in", tunable=False, thesis_name="targetFrame")
-    min_range: float = parameter(
-        0.5, "nearer bins are removed: there the head itself rings", unit="m", low=0.0, high=100.0
-    )
+    min_range: float = parameter(0.5, "nearer bins are removed: there the head rings", unit="m", low=0.0, high=100.0)
     height_limit: float = parameter(
         100.0, "points higher than this in the target frame are removed", unit="m", low=-12000.0, high=12000.0
     )
@@ -75,9 +73,7 @@ class ScanParameters(ParameterSet):
     laser_first_above: float = parameter(
         50.0, "FIRST: the nearest bin above this is taken", unit="echo strength", low=0.0, high=255.0
     )
-    laser_scan_rays: int = parameter(
-        0, "rays of the laser scan; 0: as many as the head makes steps in a turn", low=0, high=7200
-    )
+    laser_scan_rays: int = parameter(0, "rays of the laser scan; 0: one for each step of the head", low=0, high=7200)
     velocity_topic: str = parameter(
         topics.VELOCITY_COMMANDS, "topic with the velocity of the vehicle", tunable=False, thesis_name="velocityTopic"
     )
@@ -86,9 +82,7 @@ class ScanParameters(ParameterSet):
         2.0, "warn when a moving vehicle sends no velocity for longer", unit="s", low=0.0, high=3600.0
     )
     still_speed: float = parameter(0.01, "slower than this counts as still", unit="m/s", low=0.0, high=1.0)
-    still_turn_rate: float = parameter(
-        0.005, "turning slower than this counts as still", unit="rad/s", low=0.0, high=1.0
-    )
+    still_turn_rate: float = parameter(0.005, "slower turning counts as still", unit="rad/s", low=0.0, high=1.0)
 
 
 @dataclass(frozen=True)

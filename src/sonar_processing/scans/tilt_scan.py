@@ -30,17 +30,13 @@ class SonarControlParameters(BeamMessageParameters):
         ControlMode.STATIC_MAPPING, "STATIC_MAPPING: step through the range; HORIZONTAL: stay at horizontal_deg"
     )
     lowest_deg: float = parameter(-60.0, "first tilt of a sweep", unit="deg", low=-180.0, high=180.0)
-    highest_deg: float = parameter(
-        60.0, "last tilt of a sweep, before the servo goes back", unit="deg", low=-180.0, high=180.0
-    )
+    highest_deg: float = parameter(60.0, "last tilt of a sweep before the return", unit="deg", low=-180.0, high=180.0)
     step_deg: float = parameter(5.0, "change of tilt from scan to scan", unit="deg", low=0.1, high=180.0)
     horizontal_deg: float = parameter(0.0, "tilt in HORIZONTAL", unit="deg", low=-180.0, high=180.0)
     tolerance_deg: float = parameter(
         1.0, "largest distance from the goal at which the servo has arrived", unit="deg", low=0.01, high=30.0
     )
-    settle_time: float = parameter(
-        0.3, "time without movement after which the servo is still", unit="s", low=0.0, high=60.0
-    )
+    settle_time: float = parameter(0.3, "the servo is still once it rested so long", unit="s", low=0.0, high=60.0)
     move_timeout: float = parameter(10.0, "longest time for a move of the servo", unit="s", low=0.1, high=3600.0)
     joint_timeout: float = parameter(2.0, "longest time between joint states", unit="s", low=0.1, high=3600.0)
     scan_timeout: float = parameter(120.0, "longest time for a scan", unit="s", low=0.1, high=36000.0)

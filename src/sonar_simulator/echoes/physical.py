@@ -42,14 +42,10 @@ class PhysicalParameters(ParameterSet):
     max_range: float = parameter(50.0, "range of the last bin's far end", unit="m", low=0.1, high=1000.0)
     saturation: int = parameter(127, "greatest strength of a bin", low=1, high=255)
     vertical_opening_deg: float = parameter(
-        22.0, "height of the beam where it is 3 dB down", unit="deg", low=0.1, high=90.0, thesis_name="opening"
+        22.0, "height of the beam, 3 dB down", unit="deg", low=0.1, high=90.0, thesis_name="opening"
     )
-    horizontal_opening_deg: float = parameter(
-        2.5, "width of the beam where it is 3 dB down", unit="deg", low=0.1, high=90.0
-    )
-    side_lobe_db: float = parameter(
-        -100.0, "level of side lobes over all bearings, two-way", unit="dB", low=-100.0, high=0.0
-    )
+    horizontal_opening_deg: float = parameter(2.5, "width of the beam, 3 dB down", unit="deg", low=0.1, high=90.0)
+    side_lobe_db: float = parameter(-100.0, "two-way level of the side lobes", unit="dB", low=-100.0, high=0.0)
     side_rays: int = parameter(60, "rays over all bearings for the side lobes, if there are any", low=0, high=10000)
     frequency_khz: float = parameter(
         675.0, "frequency of the sound, which determines the absorption", unit="kHz", low=10.0, high=3000.0
@@ -70,7 +66,7 @@ class PhysicalParameters(ParameterSet):
     speckle: float = parameter(1.0, "share of an echo that arrives with random phase", low=0.0, high=1.0)
     gain_db: float = parameter(20.0, "gain of the head", unit="dB", low=0.0, high=40.0, thesis_name="gain")
     tvg_spreading: float = parameter(
-        20.0, "gain over range: this times log10 of the range in metres", unit="dB", low=0.0, high=40.0
+        20.0, "gain over range: times log10 of the range in m", unit="dB", low=0.0, high=40.0
     )
     tvg_absorption: float = parameter(
         0.2, "gain over range: compensated absorption, per metre each way", unit="dB/m", low=0.0, high=2.55,

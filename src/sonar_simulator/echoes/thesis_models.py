@@ -103,9 +103,7 @@ class LaserCone(ContactEcho):
 class CollisionParameters(ContactEchoParameters):
     """Parameters of `Collision`; the defaults are the thesis's numbers. The thesis's sensor has no noise."""
 
-    spread: float = parameter(
-        0.6, "standard deviation of the added contacts about their contact", unit="m", low=0.0, high=100.0
-    )
+    spread: float = parameter(0.6, "standard deviation of added contacts about theirs", unit="m", low=0.0, high=100.0)
     noise_echoes: int = parameter(0, "noise echoes written into each beam that hits something", low=0, high=10000)
     opening_deg: float = parameter(
         22.0, "full angle of the round cone", unit="deg", low=0.1, high=150.0, thesis_name="opening"

@@ -122,9 +122,7 @@ def _row_count(bearings: np.ndarray) -> int:
     """Return the number of rows: how often the bearing returns to the beginning of a row, plus one."""
     span = np.ptp(bearings)
     if span > math.pi:
-        raise RefusedInput(
-            "scans refused", "the number of rows is unknown for points all around the sensor; set ray_rows"
-        )
+        raise RefusedInput("scans refused", "rows are unknown for points all around the sensor; set ray_rows")
     if span <= _NO_BEARING:
         return len(bearings)
     steps = np.diff(bearings)

@@ -120,15 +120,11 @@ def parse(arguments: Sequence[str]) -> argparse.Namespace:
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    parser.add_argument(
-        "--world", required=True, help="file, or the name of a world of this package: basin, tank, harbour"
-    )
+    parser.add_argument("--world", required=True, help="file, or a world of this package: basin, tank, harbour")
     parser.add_argument("--script", help="yaml file of the vehicle's moves (default: the tour of the package's world)")
     parser.add_argument("--out", required=True, type=Path, help="bag to write (.bag)")
     parser.add_argument("--overwrite", action="store_true", help="replace a bag that exists")
-    parser.add_argument(
-        "--parameters", type=Path, help="yaml file of the simulator's parameters (default: the world's)"
-    )
+    parser.add_argument("--parameters", type=Path, help="yaml file of parameters (default: the world's)")
     parser.add_argument(
         "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE",
         help="any parameter; GROUP.KEY=VALUE for those in groups",

@@ -41,7 +41,7 @@ class SimulatorParameters(ParameterSet):
 
     world: str = parameter("worlds/basin.sdf", "SDF or mesh file; relative to the package's folder", tunable=False)
     script: str = parameter(
-        "yaml/basin_tour.yaml", "moves of the vehicle; relative to the package's folder", tunable=False
+        "yaml/basin_tour.yaml", "the vehicle's moves; relative to the package's folder", tunable=False
     )
     echo_model: str = parameter(
         "laser_cone", "model that turns contacts into echoes: laser_cone, collision or physical", tunable=False
@@ -64,14 +64,10 @@ class SimulatorParameters(ParameterSet):
         tunable=False,
     )
     seed: int = parameter(
-        1, "seed of all random numbers: the same seed gives the same beams", low=0, high=2**31 - 1, tunable=False
+        1, "seed of all random numbers, for the same beams again", low=0, high=2**31 - 1, tunable=False
     )
-    real_time_factor: float = parameter(
-        1.0, "simulated seconds per second of wall time", low=0.01, high=1000.0, tunable=False
-    )
-    clock_rate: float = parameter(
-        20.0, "rate of /clock, odometry and tf", unit="1/s", low=1.0, high=1000.0, tunable=False
-    )
+    real_time_factor: float = parameter(1.0, "simulated seconds per second", low=0.01, high=1000.0, tunable=False)
+    clock_rate: float = parameter(20.0, "of /clock, odometry and tf", unit="1/s", low=1.0, high=1000.0, tunable=False)
     wait_for_listener: bool = parameter(True, "SCRIPT: wait until somebody subscribes to the beams", tunable=False)
 
 

@@ -27,9 +27,7 @@ class SonarParameters(ParameterSet):
     beams_per_turn: int = parameter(
         120, "beams per revolution", low=1, high=3600, thesis_name="step = 360 / beams_per_turn", tunable=False
     )
-    seconds_per_turn: float = parameter(
-        16.0, "duration of a revolution", unit="s", low=0.01, high=3600.0, tunable=False
-    )
+    seconds_per_turn: float = parameter(16.0, "time of a revolution", unit="s", low=0.01, high=3600.0, tunable=False)
     vertical_opening_deg: float = parameter(
         22.0, "height of the beam", unit="deg", low=0.0, high=150.0, thesis_name="opening"
     )

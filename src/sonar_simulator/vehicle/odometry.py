@@ -17,9 +17,7 @@ _NOISE_TIME = 1.0  # s: correlation time, about that of a vehicle's own dynamics
 class OdometryParameters(ParameterSet):
     """The errors of the odometry. Depth has none, because it comes from a pressure sensor (thesis 4.3.2)."""
 
-    scale_error: float = parameter(
-        0.02, "true distances are 1 + scale_error times those of the odometry", low=-0.9, high=10.0
-    )
+    scale_error: float = parameter(0.02, "true distances are 1 + scale_error times the odometry's", low=-0.9, high=10.0)
     heading_drift_deg_per_minute: float = parameter(
         0.0, "the odometry's heading drifts from the true one at this rate", unit="deg/min", low=-360.0, high=360.0
     )

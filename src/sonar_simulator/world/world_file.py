@@ -103,9 +103,7 @@ class _Reader:
         scope = Scope(parent, self.warn)
         for child in parent:
             if child.tag in _NOT_LOADED:
-                self.warn(
-                    place.inside(np.eye(4), child, place.material).name, f"<{child.tag}> is not supported, left out"
-                )
+                self.warn(place.inside(np.eye(4), child, place.material).name, f"<{child.tag}> is not known, left out")
             elif child.tag in ("model", "link", "include"):
                 self._read_placed(child, scope, place)
 
