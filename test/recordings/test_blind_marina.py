@@ -14,7 +14,7 @@ from recordings.reader import Request
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 # Longer than the solver's window, so that frozen scans take part.
-_SCANS = 80
+_SCANS = 60
 
 
 @pytest.fixture(scope="module")

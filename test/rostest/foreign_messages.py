@@ -89,9 +89,7 @@ def _fill_ping_360(message: Any, step: int, strengths: bytes) -> None:
 def _fill_scan_line(message: Any, step: int, strengths: bytes) -> None:
     message.angle, message.bin_distance_step = _DEGREES_PER_STEP * step - 180.0, _RANGE / len(strengths)
     one = message_classes("micron_driver_ros/ScanLine")["micron_driver_ros/IntensityBin"]
-    message.bins = [
-        one((number + 1) * message.bin_distance_step, strength) for number, strength in enumerate(strengths)
-    ]
+    message.bins = [one(number * message.bin_distance_step, strength) for number, strength in enumerate(strengths, 1)]
 
 
 _FILLED: Dict[str, Callable[[Any, int, bytes], None]] = {

@@ -156,11 +156,8 @@ def _subscribed(processes: Dict[str, int]) -> Dict[str, str]:
     topics: Dict[str, Any] = {
         topic: dict(kinds).get(topic, "*") for topic, nodes in subscribers if set(nodes) & set(processes)
     }
-    return {
-        topic: TAKEN_AS_ANY_TYPE[topic] if kind == "*" else kind
-        for topic, kind in topics.items()
-        if topic not in NOT_FUZZED
-    }
+    fuzzed = [(topic, kind) for topic, kind in topics.items() if topic not in NOT_FUZZED]
+    return {topic: TAKEN_AS_ANY_TYPE[topic] if kind == "*" else kind for topic, kind in fuzzed}
 
 
 def _lives(pid: int) -> bool:

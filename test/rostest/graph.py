@@ -202,11 +202,8 @@ def wait_for_subscribers(topic: str, number: int, timeout: float = PATIENCE) -> 
 
 def wait_for_links(topic: str, number: int = 1, timeout: float = PATIENCE) -> None:
     """Wait until somebody publishes a topic, `number` nodes listen to it, and all are connected."""
-    wait_until(
-        lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number),
-        timeout,
-        told=f"{topic}: no publisher with {number} connected listeners",
-    )
+    told = f"{topic}: no publisher with {number} connected listeners"
+    wait_until(lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number), timeout, told=told)
 
 
 def _is_heard(topic: str, number: int) -> bool:

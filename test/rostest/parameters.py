@@ -118,9 +118,7 @@ class Parameters(unittest.TestCase):
             client.close()
             diagnostics.wait_for(node, REFUSED, counted + refused)
             held = rospy.get_param(f"/{node}")
-            accepted += [
-                f"{node} holds {key} = {held[key]!r}" for key in before.keys() & held if held[key] != before[key]
-            ]
+            accepted += [f"{node}: {key} = {held[key]!r}" for key in before.keys() & held if held[key] != before[key]]
             sent += refused
         print(f"{sent} bad values sent")
         self.assertEqual(accepted, [])

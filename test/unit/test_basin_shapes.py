@@ -23,9 +23,7 @@ _REMOVER = OutlierRemover(OutlierRemoverParameters())
 def anywhere(seed):
     """Return the (4, 4) pose of a sonar somewhere in the basin, 7 m or more from its walls."""
     rng = np.random.default_rng([1, seed])
-    return pose_matrix(
-        (rng.uniform(-50.0, 50.0), rng.uniform(-18.0, 18.0), DEPTH), (0.0, 0.0, rng.uniform(-math.pi, math.pi))
-    )
+    return pose_matrix((rng.uniform(-50, 50), rng.uniform(-18, 18), DEPTH), (0.0, 0.0, rng.uniform(-math.pi, math.pi)))
 
 
 def near_buoy(seed, distance=10.0):
@@ -42,7 +40,7 @@ def is_found(normal, reach, sonar, lines):
     """Return whether one of the lines is a wall `reach` m from the sonar to 15 cm and 1 degree."""
     foot = sonar + reach * normal
     return any(
-        abs(line.normal @ normal) >= math.cos(math.radians(1.0)) and line.distance_from(foot) <= 0.15 for line in lines
+        abs(line.normal @ normal) >= np.cos(np.radians(1.0)) and line.distance_from(foot) <= 0.15 for line in lines
     )
 
 

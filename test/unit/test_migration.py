@@ -84,9 +84,7 @@ def test_every_message_comes_out_as_one_of_ours_with_its_bytes_topic_and_time(fi
         (topic, message._type, message._md5sum, serialized(message), START + genpy.Duration(second))
         for second, (topic, message) in enumerate(_recorded())
     ]
-    assert expected == [
-        (topic, message._type, message._md5sum, serialized(message), time) for topic, message, time in fixed
-    ]
+    assert expected == [(topic, one._type, one._md5sum, serialized(one), time) for topic, one, time in fixed]
 
 
 def test_the_package_exports_the_rules():

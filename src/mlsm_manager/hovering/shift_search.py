@@ -1,4 +1,4 @@
-"""Climbs from several paths of a run to ones that its echoes speak for more, by shifting all that follows some moment.
+"""Climbs from several paths of a run to ones that its echoes support better, by shifting all that follows some moment.
 
 A batch fit moves each scan to the nearest place where it fits, and a search that goes forward in time chooses before it
 has heard all. Here a whole path is known, and each step weighs the whole run (basin hopping, Wales and Doye 1997).

@@ -32,9 +32,8 @@ _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the ol
 _FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
 _NO_DISTANCE = 1e-9  # m: keeps groups at one place from dividing by zero
 _FORGOTTEN_DELAY = 2.0
-"""Factor of the delay's deviation as it was known before the window. Comparisons follow where points go, and what is
-frozen keeps what it was frozen with, so that they tell less than they seem to: taken at their word, windows 41 scans
-apart kept a delay of their own each, in turn 0.68 and 0.86 s, where the whole run says 1.00 s."""
+"""Inflates the earlier deviation of the delay. Frozen scans keep the delay they were frozen with, so comparing with
+them overstates what is known: windows 41 scans apart settled on 0.68 and 0.86 s where the whole run gives 1.00 s."""
 _MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
 
 

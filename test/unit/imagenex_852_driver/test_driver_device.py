@@ -123,9 +123,7 @@ def test_the_next_command_may_ask_for_something_else(device):
         (Fault.TRUNCATED, "bad_frames", "bad reply"),
     ],
 )
-def test_a_reply_that_does_not_come_in_time_is_a_timeout_and_a_spoilt_one_a_bad_frame(
-    device, faults, fault, count, told
-):
+def test_a_reply_that_does_not_come_in_time_is_a_timeout_and_a_spoilt_one_is_bad(device, faults, fault, count, told):
     faults.order(fault)
     assert device.ping(COMMAND) is None
     assert getattr(device.stats, count) == device.stats.timeouts + device.stats.bad_frames == 1

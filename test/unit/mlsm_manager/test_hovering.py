@@ -154,9 +154,8 @@ def test_a_part_of_a_turn_that_heard_nothing_changes_no_weight():
 
 def test_some_particles_are_led_to_where_posts_meet():
     rng, particles, far = np.random.RandomState(0), resting(400, 2), np.full((400, 2), 100.0)
-    ends, speeds = led(
-        particles, (far, np.zeros((400, 2))), one_post(1, [3.0, 0.0], 1.0), one_post(0, [6.0, 1.0]), PART, rng
-    )
+    sources, targets = one_post(1, [3.0, 0.0], 1.0), one_post(0, [6.0, 1.0])
+    ends, speeds = led(particles, (far, np.zeros((400, 2))), sources, targets, PART, rng)
     moved = ends[:, 0] < 50.0
     assert 50 < moved.sum() < 200
     np.testing.assert_allclose(ends[moved], np.tile([3.0, 1.0], (moved.sum(), 1)), atol=1.5)

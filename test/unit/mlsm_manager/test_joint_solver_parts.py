@@ -163,7 +163,7 @@ def test_points_per_echo_do_not_depend_on_their_order(points, random):
     shuffled = points[:]
     random.shuffle(shuffled)
     counts = [
-        dict(zip(some, points_per_echo(*np.array(some, dtype=float).reshape(-1, 2).T))) for some in (points, shuffled)
+        dict(zip(one, points_per_echo(*np.array(one, dtype=float).reshape(-1, 2).T))) for one in (points, shuffled)
     ]
     assert counts[0].keys() == counts[1].keys()
     np.testing.assert_allclose([counts[0][point] for point in points], [counts[1][point] for point in points])

@@ -115,9 +115,7 @@ def test_a_turned_truth_is_an_error():
 
 
 def test_distances_count_at_the_stamps_of_the_truth():
-    error = position_error(
-        SECONDS, AHEAD, Truth(np.array([0.0, 2.5, 7.5]), np.array([[0.0, 0], [2.5, 3.0], [7.5, 0.0]]))
-    )
+    error = position_error(SECONDS, AHEAD, Truth(np.array([0.0, 2.5, 7.5]), np.array([[0, 0], [2.5, 3], [7.5, 0]])))
     assert error == {"mean": 1.0, "sd": 1.414, "max": 3.0}
 
 

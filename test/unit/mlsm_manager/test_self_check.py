@@ -126,9 +126,7 @@ def test_a_deviation_that_compass_and_lengths_explain_is_no_doubt():
 
 
 def test_deviations_are_told_per_minute():
-    np.testing.assert_allclose(
-        per_minute(np.array([0.0, 30.0, 61.0, 130.0]), np.array([1.0, 3.0, 5.0, 7.0])), [2, 5, 7]
-    )
+    np.testing.assert_allclose(per_minute(np.array([0.0, 30, 61, 130]), np.array([1.0, 3, 5, 7])), [2, 5, 7])
 
 
 def test_windows_that_overlap_make_one_stretch():

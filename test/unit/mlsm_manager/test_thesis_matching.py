@@ -143,9 +143,7 @@ def test_a_point_inside_a_blocks_spread_has_no_error():
 def test_it_goes_on_below_the_error_threshold_as_long_as_the_error_falls():
     """The 2015 code took the first pose below the threshold."""
     scan = scan_of(harbour(), still())
-    strict, loose = (
-        match(scan, map_of(harbour()), [0.6, 0.4, 0.0], error_threshold=limit).pose for limit in (0.01, 5.0)
-    )
+    strict, loose = (match(scan, map_of(harbour()), [0.6, 0.4, 0.0], error_threshold=most).pose for most in (0.01, 5.0))
     np.testing.assert_array_equal(strict, loose)
 
 

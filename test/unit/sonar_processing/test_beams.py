@@ -126,9 +126,7 @@ def _projected(beam, pose=None, sides=1, width=0.0436):
 @given(ANGLES, SHIFTS, st.tuples(ANGLES, ANGLES, ANGLES))
 def test_every_bin_goes_through_the_transform(angle, shift, rotation):
     beam, pose = beam_of(range(20), angle), _pose(shift, rotation)
-    expected = [
-        pose @ (distance * math.cos(angle), distance * math.sin(angle), 0.0, 1.0) for distance in np.arange(20) + 0.5
-    ]
+    expected = [pose @ (apart * math.cos(angle), apart * math.sin(angle), 0.0, 1.0) for apart in np.arange(20) + 0.5]
     np.testing.assert_allclose(_projected(beam, pose)[:, :3], np.array(expected)[:, :3], rtol=1e-5, atol=1e-4)
 
 

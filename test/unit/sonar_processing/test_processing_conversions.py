@@ -128,9 +128,7 @@ def test_a_cloud_that_says_it_is_finite_and_is_not_is_broken():
 
 
 def test_a_laser_scan_holds_at_one_moment_and_its_angles_grow():
-    turn = PlanarLaserScan(
-        np.array([1.0, np.inf, 3.0, 4.0], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0
-    )
+    turn = PlanarLaserScan(np.array([1, np.inf, 3, 4], np.float32), np.arange(4, dtype=np.float32), 0.5, 50.0, 16.0)
     scan = _sent(laser_scan_message(turn, STAMP_NS, "sonar"), LaserScan)
     assert (scan.header.frame_id, scan.header.stamp.to_nsec()) == ("sonar", STAMP_NS)
     assert (scan.angle_min, scan.angle_increment) == (pytest.approx(-math.pi), pytest.approx(math.pi / 2))

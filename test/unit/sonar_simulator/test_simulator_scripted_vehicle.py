@@ -64,9 +64,7 @@ def test_speed_and_turn_rate_are_the_greatest_of_a_move_or_it_takes_the_seconds_
 
 
 def test_a_tilt_is_commanded_when_the_entries_before_it_are_done_and_takes_no_time():
-    script = VehicleScript.from_yaml_data(
-        [{"wait": 2.0}, {"tilt_deg": 30.0}, {"x": 1.0, "seconds": 3.0}, {"tilt_deg": 0}]
-    )
+    script = VehicleScript.from_yaml_data([{"wait": 2.0}, {"tilt_deg": 30}, {"x": 1, "seconds": 3}, {"tilt_deg": 0}])
     assert script.duration == 5.0
     assert [(c.time, round(math.degrees(c.angle))) for c in script.tilt_commands] == [(2.0, 30), (5.0, 0)]
     np.testing.assert_allclose(script.pose(5.0), pose_matrix((1.0, 0.0, -2.0)))
@@ -106,9 +104,7 @@ THESIS = load_script(ROOT / "yaml" / "thesis_moves.yaml")
 def _whole_still_turns(script):
     """Return the numbers of the head's 16 s turns in which the vehicle never moves."""
     turns = range(int(script.duration // 16.0))
-    return [
-        turn for turn in turns if all(script.state(time).is_still for time in 16.0 * turn + np.linspace(0, 16, 121))
-    ]
+    return [turn for turn in turns if all(script.state(time).is_still for time in 16 * turn + np.linspace(0, 16, 121))]
 
 
 @pytest.mark.parametrize(("name", "scans"), [("basin", 12), ("harbour", 10), ("tank", 4)])
