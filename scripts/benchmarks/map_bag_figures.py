@@ -38,7 +38,7 @@ def carving_rows() -> List[Row]:
 def _carving_row(estimator: EstimatorName) -> Row:
     options = map_bag_arguments([str(recorded(PART)), "--out", "nowhere", "--set", f"estimator={estimator.value}"])
     recording = read_recording(recorded(PART), options.request)
-    parameters = with_odometry(options.parameters, odometry_of(recording.track).kind, options.fixed)
+    parameters = with_odometry(options.parameters, odometry_of(recording).kind, options.fixed)
     carving, plain = (
         parameters.changed({"carve": carve}).build_localiser(recording.sonar_in_base) for carve in (True, False)
     )

@@ -16,6 +16,7 @@ from recordings.bags.bag import RecordingError
 from recordings.bags.bag_writer import BagWriter
 from recordings.motion.frame_tree import Link
 from recordings.motion.pose_track import PoseTrack
+from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import Content, ReadingParameters, Request, add_reading_arguments, read, request_of
 from sonar_processing.beams.beam import Beam
 
@@ -46,6 +47,8 @@ def convert_bag(arguments: List[str]) -> str:
     check_output(options.out, [options.recording], options.overwrite, ".bag")
     request = request_of(options, ReadingParameters.from_mapping(assigned_values(options.set)))
     content = read(options.recording, request)
+    if content.motion.source is MotionSource.UNSAID:
+        raise RecordingError(f"{options.recording}: {content.motion.notes[0]}")
     for note in content.notes:
         print(f"convert_bag: {options.recording}: {note}", file=sys.stderr)
     write_converted(options.out, content, request)

@@ -13,7 +13,14 @@ from recordings.makers_logs import is_makers_log, makers_beams
 from recordings.motion.frame_tree import FrameTree, pose_track
 from recordings.motion.motion_table import is_table, motion_of_csv
 from recordings.motion.pose_track import PoseTrack
-from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, declared_motion, motion_of_bag
+from recordings.motion.vehicle_motion import (
+    Motion,
+    MotionNames,
+    MotionSource,
+    declared_motion,
+    motion_of_bag,
+    unsaid_motion,
+)
 from sonar_processing.beams.parameters import MountingParameters
 from sonar_processing.messages.reader import BeamMessageParameters
 
@@ -65,7 +72,7 @@ def read(path: Path, request: Request) -> Content:
         problems: List[str] = []
         topic = tried(problems, lambda: None if main is None else beam_topic(main, request.beams))
         truth = tried(problems, lambda: _truth([bag for bag in bags if bag is not None], request))
-        motion = tried(problems, lambda: _motion(bags[1] or main, request))
+        motion = tried(problems, lambda: motion_for(bags[1] or main, request))
         if problems:
             raise RecordingError(f"{path}: {'; '.join(problems)}")
         recorded = makers_beams(path) if main is None else beams_of_bag(main, topic, request.parameters)
@@ -108,17 +115,15 @@ def tried(problems: List[str], step: Callable[[], Optional[_Result]]) -> Optiona
         return None
 
 
-def _motion(bag: Optional[Bag], request: Request) -> Motion:
+def motion_for(bag: Optional[Bag], request: Request) -> Motion:
+    """Return the motion that a request asks for; `bag` may hold it. Raises RecordingError."""
     if request.vehicle is not None and is_table(request.vehicle):
         return motion_of_csv(request.vehicle, request.motion)
     if bag is not None:
         return motion_of_bag(bag, request.motion, request.truth)
     if request.motion.declared is not None:
         return declared_motion(FrameTree(), request.motion)
-    raise RecordingError(
-        "the log of a sonar does not say where the vehicle was: give a bag or a table with --vehicle, or --standing, "
-        "or --unknown-motion"
-    )
+    return unsaid_motion(FrameTree(), request.motion, "beams only")
 
 
 def _truth(bags: List[Bag], request: Request) -> Optional[PoseTrack]:

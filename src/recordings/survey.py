@@ -1,4 +1,4 @@
-"""Everything that can be said of a bag before its beams are read, and the same in words."""
+"""Everything that can be said of a recording before it is mapped, and the same in words."""
 
 import re
 import shlex
@@ -9,16 +9,15 @@ from typing import Any, Dict, List, Optional
 
 import numpy as np
 
-from node_support.errors import RefusedInput
-from recordings.bags.bag import Bag, RecordingError, Topic
+from recordings.bags.bag import Bag, Topic
 from recordings.bags.topic_roles import Role, with_role
-from recordings.beams import RecordedBeams, beam_topic
-from recordings.makers_logs import is_makers_log
+from recordings.beam_survey import beam_lines
+from recordings.beams import RecordedBeams, beam_topic, beams_of_bag
+from recordings.makers_logs import is_makers_log, makers_beams
 from recordings.motion.frame_tree import FrameTree, frame_tree
 from recordings.motion.pose_track import PoseTrack
-from recordings.motion.vehicle_motion import Motion, MotionSource, motion_of_bag
-from recordings.reader import Request, mounted, tried
-from sonar_processing.messages.reader import BeamReader
+from recordings.motion.vehicle_motion import Motion, MotionSource
+from recordings.reader import Request, motion_for, mounted, tried
 
 _NED = re.compile(r"(^|[_/])(ned|frd)($|[_/])")
 _IMU_MESSAGES = 200  # that are looked at; a vehicle does not pitch for that long
@@ -30,60 +29,62 @@ _SHOWN = (Role.BEAMS, Role.ODOMETRY, Role.HEADING, Role.DEPTH, Role.VELOCITY, Ro
 
 @dataclass(frozen=True)
 class Survey:
-    """What a bag holds.
+    """What a recording holds.
 
-    topics: by their roles, the likeliest first. tree: tf as recorded. beams: topic that would be used, or None.
-    z_down: signs of it. assumed, missing: sentences.
+    kind: of the file, in words. topics: by their roles, the likeliest first. tree: tf as recorded. beams: topic that
+    would be used, or None. heard: what its beams are. z_down: signs of it. heard, assumed, missing: sentences.
     """
 
     path: Path
-    is_ros2: bool
+    kind: str
     topics: Dict[Role, List[Topic]]
     tree: FrameTree
     beams: Optional[str]
+    heard: List[str]
     z_down: List[str]
     assumed: List[str]
     missing: List[str]
 
 
 def survey(path: Path, request: Request) -> Survey:
-    """Return what a bag holds and lacks for a request. Raises RecordingError only for a file that cannot be read."""
+    """Return what a recording holds and lacks for a request.
+
+    Raises RecordingError only for a file that cannot be read.
+    """
     if is_makers_log(path):
-        raise RecordingError(
-            f"{path}: the log of a sonar holds beams only; give the motion with --vehicle, or --standing, or "
-            "--unknown-motion"
-        )
-    with Bag(path) as bag:
-        tree = frame_tree(bag)
         missing: List[str] = []
-        assumed: List[str] = []
-        topic = tried(missing, lambda: beam_topic(bag, request.beams))
-        motion = tried(missing, lambda: motion_of_bag(bag, request.motion, request.truth))
-        if motion is not None:
-            assumed += motion.notes
-        if topic is not None:
-            first = _first_beams(bag, topic, request)
-            assumed += first.notes
-            missing += [] if first.beams else [f"none of the first messages of {topic} holds a beam that can be used"]
-            if motion is not None and first.beams:
-                _look_at_place(motion, first, request, assumed, missing)
-        signs = _signs_of_z_down(bag, tree.frames)
-        if signs and not request.motion.z_is_down:
-            assumed.append("the odometry counts x, y left, z up; if it counts north, east, down, give --ned")
-        topics = {role: with_role(bag.topics, role) for role in Role}
-        return Survey(path, bag.is_ros2, topics, tree, topic, signs, assumed, missing)
+        recorded = makers_beams(path)
+        motion = tried(missing, lambda: motion_for(None, request))
+        assumed = _assumed(motion, recorded, request, missing)
+        heard = beam_lines(recorded)
+        return Survey(path, "the log of a sonar's maker", {}, FrameTree(), None, heard, [], assumed, missing)
+    with Bag(path) as bag:
+        return _survey_of_bag(path, bag, request)
 
 
-def _first_beams(bag: Bag, topic: str, request: Request) -> RecordedBeams:
-    """Return the beams of the first message that holds some."""
-    reader = BeamReader(request.parameters)
-    for _, message in bag.messages(topic):
-        try:
-            reading = reader.read(bag.topics[topic].type, message)
-        except RefusedInput:
-            continue
-        return RecordedBeams(reading.beams, [False] * len(reading.beams), notes=reading.notes)
-    return RecordedBeams([], [])
+def _survey_of_bag(path: Path, bag: Bag, request: Request) -> Survey:
+    tree = frame_tree(bag)
+    missing: List[str] = []
+    topic = tried(missing, lambda: beam_topic(bag, request.beams))
+    motion = tried(missing, lambda: motion_for(bag, request))
+    recorded = RecordedBeams([], []) if topic is None else beams_of_bag(bag, topic, request.parameters)
+    assumed = _assumed(motion, recorded, request, missing)
+    if topic is not None and not recorded.beams:
+        missing.append(f"none of {recorded.refused} messages of {topic} holds a beam that can be used")
+    signs = _signs_of_z_down(bag, tree.frames)
+    if signs and not request.motion.z_is_down:
+        assumed.append("the odometry counts x, y left, z up; if it counts north, east, down, give --ned")
+    topics = {role: with_role(bag.topics, role) for role in Role}
+    heard = beam_lines(recorded) if recorded.beams else []
+    return Survey(path, f"a bag of ROS {2 if bag.is_ros2 else 1}", topics, tree, topic, heard, signs, assumed, missing)
+
+
+def _assumed(motion: Optional[Motion], recorded: RecordedBeams, request: Request, missing: List[str]) -> List[str]:
+    """Return what is assumed of motion and beams, and add to what is missing."""
+    assumed = [*(motion.notes if motion is not None else []), *recorded.notes]
+    if motion is not None and recorded.beams:
+        _look_at_place(motion, recorded, request, assumed, missing)
+    return assumed
 
 
 def _look_at_place(
@@ -128,15 +129,16 @@ def _felt(message: Any) -> Optional[float]:
 
 def report(survey: Survey, request: Request) -> str:
     """Return what a bag holds, what will be assumed, what is missing, and a command line to start with."""
-    lines = [f"{survey.path}: a bag of ROS {2 if survey.is_ros2 else 1}"]
-    for role in _SHOWN:
+    lines = [f"{survey.path}: {survey.kind}", *_section("heard", survey.heard or ["nothing"])]
+    for role in _SHOWN if survey.topics else ():
         lines_of_role = [f"{topic.name} ({topic.type}, {topic.count} messages)" for topic in survey.topics[role]]
         lines += _section(role.value, lines_of_role or ["none"])
     links = [
         f"{parent} -> {child}: {_known_time(track)}" for (parent, child), track in sorted(survey.tree.tracks.items())
     ]
-    lines += _section("frames", links or ["none"])
-    lines += _section("signs of z down", survey.z_down or ["none"])
+    if survey.topics:
+        lines += _section("frames", links or ["none"])
+        lines += _section("signs of z down", survey.z_down or ["none"])
     lines += _section("assumed", survey.assumed or ["nothing"])
     lines += _section("missing", survey.missing or ["nothing"])
     if not survey.missing:
@@ -157,7 +159,11 @@ def _known_time(track: PoseTrack) -> str:
 
 def _command(survey: Survey, request: Request) -> str:
     motion = request.motion
-    words = ["map_bag", str(survey.path), "--out", f"{survey.path.stem}_map", "--beams", survey.beams or ""]
+    words = ["rosrun", "underwater_map_construction", "map_bag", str(survey.path), "--out", f"{survey.path.stem}_map"]
+    words += ["--refine"]
+    words += ["--beams", survey.beams] if survey.beams else []
+    words += ["--vehicle", str(request.vehicle)] if request.vehicle else []
+    words += ["--offset", f"{request.offset:g}"] if request.offset else []
     words += ["--odometry-topic", motion.odometry] if motion.odometry else []
     words += [_DECLARED[motion.declared]] if motion.declared is not None else []
     words += ["--ned"] if motion.z_is_down else []

@@ -24,6 +24,7 @@ from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
+from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
@@ -61,7 +62,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
     named = options.odometry not in (None, OdometryKind.AUTO)
     if not named:
-        odometry = odometry_of(recording.track)
+        odometry = odometry_of(recording, options.declared is MotionSource.STANDING)
     recording = recording.corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
     with _bar(len(recording.beams), "beam", "echoes") as bar:
@@ -69,7 +70,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
         found = scans_of(recording, extractor) if chain is None else chain.scans(recording)
         scans = whole_turns(options.bags[0], len(recording.beams), found, bar.update)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
-    parameters = with_odometry(extracting, odometry.kind, options.fixed)
+    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)
     replayed = _replayed(recording, scans, parameters)

@@ -79,17 +79,30 @@ class Recording:
 
 
 def scans_of(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Scan, int]]:
-    """Yield one scan of echoes per turn of the head, with its number of beams; see clouds_with_odometry."""
+    """Yield one scan of echoes per turn or sweep of the head, with its number of beams; see clouds_with_odometry."""
     return clouds_with_odometry(recording, _echoes(recording, extractor))
 
 
 def _echoes(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Cloud, int]]:
-    collector, cloud = RevolutionCollector(), SonarToCloudParameters()
-    for placed in recording.beams:
+    cloud = SonarToCloudParameters()
+    for turn in _turns(recording.beams):
+        with suppress(RefusedInput):
+            yield extractor(PolarScan.of(turn).cloud(cloud)), len(turn)
+
+
+def _turns(beams: List[PlacedBeam]) -> Iterator[List[PlacedBeam]]:
+    """Yield the beams of each turn or sweep; of a head that finished none, the longest part of one."""
+    collector = RevolutionCollector()
+    start, length, has_finished = 0, 0, False
+    for index, placed in enumerate(beams):
         turn = collector.add(placed)
         if turn is not None:
-            with suppress(RefusedInput):
-                yield extractor(PolarScan.of(turn).cloud(cloud)), len(turn)
+            has_finished = True
+            yield turn
+        elif len(collector) > length:
+            start, length = index + 1 - len(collector), len(collector)
+    if not has_finished and length:
+        yield beams[start : start + length]
 
 
 def clouds_with_odometry(recording: Recording, clouds: Iterable[Tuple[Cloud, int]]) -> Iterator[Tuple[Scan, int]]:
@@ -118,7 +131,7 @@ def whole_turns(
         scans.append(scan)
         on_beams(number)
     if not scans:
-        raise RecordingError(f"{bag}: {beams} beams make no whole turn of the head; a scan needs one")
+        raise RecordingError(f"{bag}: {beams} beams make no turn, sweep or part of one of which echoes can be told")
     return scans
 
 

@@ -22,7 +22,7 @@ def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: 
     parameters = mapped.parameters
     return {
         **mapped.run.counts,
-        "odometry": {"profile": mapped.odometry.kind.value.lower(), "reason": mapped.odometry.reason},
+        "odometry": {"profile": mapped.odometry.name, "reason": mapped.odometry.reason},
         "beams_without_transform": mapped.recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(mapped.recording.seconds / seconds, 1),

@@ -1,6 +1,6 @@
 """What a recording tells of its odometry, and the parameters that suit it."""
 
-from typing import Collection, NamedTuple, Optional
+from typing import Collection, Dict, NamedTuple, Optional
 
 import numpy as np
 
@@ -8,38 +8,78 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.reported_motion import ReportedMotion
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.map_checks import scans_go_on
+from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts
 
 _WORTH_TRYING = 0.75
 """Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
 strafing ones 0.57 and 0.66."""
 
 
+# A pose that is known to stay; and one that drifts as a head on a cable or a moored vehicle: 0.05 m/s for a minute.
+_STILL = {
+    "scale_deviation": 0.0, "direction_deviation": 0.0, "speed_deviation": 1e-4, "heading_deviation": 1e-3,
+}  # fmt: skip
+_DRIFTING = {
+    **_STILL, "speed_deviation": 0.05, "rate_correlation_time": 60.0, "heading_deviation": 0.0,
+    "turn_rate_deviation": 0.003,
+}  # fmt: skip
+_WITHOUT_MOTION: Dict[Optional[SweepMotion], Dict[str, float]] = {
+    SweepMotion.STILL: _STILL,
+    SweepMotion.UNTOLD: _STILL,
+    SweepMotion.DRIFTING: _DRIFTING,
+}
+
+
 class OdometryFound(NamedTuple):
-    """kind: of the odometry. reason: one line that says why."""
+    """kind: of the odometry. reason: one line that says why. motion: what sweeps tell where nothing was recorded."""
 
     kind: OdometryKind
     reason: str
+    motion: Optional[SweepMotion] = None
+
+    @property
+    def name(self) -> str:
+        """What people call it."""
+        if self.motion in (None, SweepMotion.MOVING):
+            return self.kind.value.lower()
+        return "drifting" if self.motion is SweepMotion.DRIFTING else "standing"
 
 
-def odometry_of(track: Track) -> OdometryFound:
-    """Return what a recording's T_odom_base tells of the vehicle's motion."""
+def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:
+    """Return what a recording tells of the vehicle's motion: its T_odom_base, or the echoes where that never changes.
+
+    standing: somebody says that the vehicle stood still.
+    """
     motion = ReportedMotion()
-    motion.learn(track)
+    motion.learn(recording.track)
     if motion.has_positions:
-        reason = f"positions change by up to {motion.extent:.1f} m"
-    elif motion.has_headings:
-        reason = f"the position never changes, the heading by {np.degrees(motion.turned):.0f} degrees"
-    else:
-        reason = "neither position nor heading changes, so the vehicle stands still; if it moved, say --unknown-motion"
-    return OdometryFound(motion.kind, reason)
+        return OdometryFound(motion.kind, f"positions change by up to {motion.extent:.1f} m")
+    if motion.has_headings:
+        turned = np.degrees(motion.turned)
+        return OdometryFound(motion.kind, f"the position never changes, the heading by {turned:.0f} degrees")
+    return _without_motion(sweep_shifts(placed.beam for placed in recording.beams), standing)
 
 
-def with_odometry(parameters: ReplayParameters, kind: OdometryKind, fixed: Collection[str]) -> ReplayParameters:
-    """Return `parameters` with the profile of an odometry, but for those that are `fixed`."""
-    return parameters.changed({key: value for key, value in profile_values(kind).items() if key not in fixed})
+def _without_motion(shifts: SweepShifts, standing: bool) -> OdometryFound:
+    if standing:
+        doubt = f", but it seems to be {shifts.motion.value}: {shifts}" if shifts.motion.is_motion else ""
+        return OdometryFound(OdometryKind.DVL, f"--standing says so{doubt}", SweepMotion.STILL)
+    kind = OdometryKind.NONE if shifts.motion is SweepMotion.MOVING else OdometryKind.DVL
+    return OdometryFound(kind, f"no position or heading changes, and {shifts}", shifts.motion)
+
+
+def with_odometry(
+    parameters: ReplayParameters, kind: OdometryKind, fixed: Collection[str], motion: Optional[SweepMotion] = None
+) -> ReplayParameters:
+    """Return `parameters` with the profile of an odometry, but for those that are `fixed`.
+
+    motion: what sweeps tell where the odometry tells none.
+    """
+    values = {**profile_values(kind), **_WITHOUT_MOTION.get(motion, {})}
+    return parameters.changed({key: value for key, value in values.items() if key not in fixed})
 
 
 def may_strafe(ahead: Optional[LiveSolver]) -> bool:

@@ -24,6 +24,7 @@ class MotionSource(Enum):
     HEADING = "heading only"
     STANDING = "declared as standing"
     UNKNOWN = "declared as unknown"
+    UNSAID = "not recorded"
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,10 @@ class Motion:
 
 
 def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> Motion:
-    """Return the motion that a bag tells; its topic `truth` is not used. Raises RecordingError where it tells none."""
+    """Return the motion that a bag tells, UNSAID where nothing in it moves; its topic `truth` is not used.
+
+    Raises RecordingError where something moves, but nothing that is known to be the vehicle.
+    """
     tree = frame_tree(bag)
     if names.declared is not None:
         return declared_motion(tree, names)
@@ -67,7 +71,19 @@ def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> 
     topic = _likeliest(bag, Role.HEADING, truth)
     if topic is not None:
         return _of_heading(bag, tree, topic, names)
-    raise RecordingError(_nothing(bag, tree, names))
+    if tree.moving_stamps.size:
+        raise RecordingError(_nothing(bag, tree, names))
+    return unsaid_motion(tree, names, ", ".join(sorted(bag.topics)) or "no topics")
+
+
+def unsaid_motion(tree: FrameTree, names: MotionNames, held: str) -> Motion:
+    """Return one pose for ever, for a recording of which only what is `held` is known; echoes may tell more."""
+    note = (
+        f"nothing says where the vehicle was, there are {held}: the echoes tell whether it moved; --vehicle FILE, "
+        "--standing and --unknown-motion tell more"
+    )
+    fixed = linked(tree, names, PoseTrack.fixed(_NO_SHIFT, _NO_TURN))
+    return Motion(fixed, MotionSource.UNSAID, [note])
 
 
 def declared_motion(tree: FrameTree, names: MotionNames) -> Motion:

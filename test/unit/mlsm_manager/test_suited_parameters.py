@@ -12,10 +12,12 @@ from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
 from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Track
 from node_support.health import Health
+from recordings.motion.sweep_shifts import SweepMotion
 from recordings.motion.vehicle_motion import MotionSource
 
 TIMES = np.linspace(0.0, 100.0, 50)
@@ -32,11 +34,20 @@ def track(x=0.0, y=0.0, yaw=0.0):
         (track(x=TIMES, yaw=TIMES / 50.0), OdometryKind.AUTO),
         (track(x=3.0, yaw=np.sin(TIMES)), OdometryKind.HEADING),
         (track(x=1e-3 * np.sin(TIMES), yaw=np.sin(TIMES)), OdometryKind.HEADING),
-        (track(x=3.0, y=1.0, yaw=0.4), OdometryKind.AUTO),
     ],
 )
 def test_what_changes_tells_the_odometry(reported, kind):
-    assert odometry_of(reported).kind is kind
+    assert odometry_of(Recording([], 0, reported, None)).kind is kind
+
+
+def test_a_pose_that_never_changes_is_held_unless_sweeps_show_a_motion():
+    standing = odometry_of(Recording([], 0, track(x=3.0, y=1.0, yaw=0.4), None))
+    assert (standing.name, standing.motion) == ("standing", SweepMotion.UNTOLD)
+    held, drifting = (
+        with_odometry(ReplayParameters(), standing.kind, (), motion)
+        for motion in (SweepMotion.UNTOLD, SweepMotion.DRIFTING)
+    )
+    assert held.speed_deviation < 1e-3 < drifting.speed_deviation
 
 
 @pytest.mark.parametrize("kind", list(OdometryKind))

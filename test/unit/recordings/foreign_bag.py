@@ -82,10 +82,10 @@ def add_velocities(bag, topic="/dvl/twist", frame="base_link", y=0.0):
         bag.write(topic, message, nanoseconds(time))
 
 
-def add_fixed(bag, parent, child, x=0.0):
+def add_fixed(bag, parent, child, x=0.0, topic="/tf_static"):
     message = stamped(bag, "geometry_msgs/TransformStamped", START, parent)
     message.child_frame_id = child
     message.transform.translation.x, message.transform.rotation.w = x, 1.0
     transforms = bag.make("tf2_msgs/TFMessage")
     transforms.transforms = [message]
-    bag.write("/tf_static", transforms, nanoseconds(START))
+    bag.write(topic, transforms, nanoseconds(START))

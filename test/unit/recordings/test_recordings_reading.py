@@ -11,8 +11,10 @@ from imagenex_852_driver.log_record import LoggedPing
 from imagenex_852_driver.protocol.reply import Reply, ReplyKind
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
+from recordings.convert_bag import convert_bag
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import ReadingParameters, Request, read
+from recordings.survey import report, survey
 
 BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 LOCAL_POSITION = "/mavros/local_position/pose"
@@ -63,7 +65,15 @@ def test_a_mount_that_tf_does_not_tell_is_that_of_the_parameters(tmp_path):
 def test_poses_that_are_no_odometry_are_not_taken_for_one(tmp_path, topic):
     with foreign.of_beams(tmp_path / "a.bag") as bag:
         foreign.add_poses(bag, topic)
-    with pytest.raises(RecordingError, match="no topic holds odometry"):
+    motion = read(tmp_path / "a.bag", Request()).motion
+    assert motion.source is MotionSource.UNSAID
+    assert "nothing says where the vehicle was" in motion.notes[0]
+
+
+def test_a_bag_in_which_something_else_moves_is_refused(tmp_path):
+    with foreign.of_beams(tmp_path / "a.bag") as bag:
+        foreign.add_fixed(bag, "earth", "ship", topic="/tf")
+    with pytest.raises(RecordingError, match="tf does not say where the vehicle was"):
         read(tmp_path / "a.bag", Request())
 
 
@@ -121,7 +131,7 @@ def test_everything_that_is_missing_is_said_at_once(tmp_path):
         foreign.add_poses(bag, "/goal")
     with pytest.raises(RecordingError) as refused:
         read(tmp_path / "a.bag", Request(truth="/gps"))
-    for part in ("no topic holds beams", "no topic /gps", "no topic holds odometry", "--standing"):
+    for part in ("no topic holds beams", "no topic /gps"):
         assert part in str(refused.value)
 
 
@@ -191,6 +201,13 @@ def test_a_sonars_log_is_mapped_with_a_table(log, tmp_path):
     assert np.degrees(turned[-1]) == pytest.approx(29.8, abs=1e-3)
 
 
-def test_a_sonars_log_alone_is_told_what_it_lacks(log):
-    with pytest.raises(RecordingError, match="give a bag or a table with --vehicle, or --standing"):
-        read(log, Request())
+def test_a_sonars_log_alone_says_nothing_of_the_motion_and_is_not_converted(log, tmp_path):
+    assert read(log, Request()).motion.source is MotionSource.UNSAID
+    with pytest.raises(RecordingError, match="nothing says where the vehicle was"):
+        convert_bag([str(log), str(tmp_path / "out.bag")])
+
+
+def test_a_sonars_log_is_surveyed_with_a_command_that_maps_it(log):
+    told = report(survey(log, Request()), Request())
+    assert "100 beams in" in told
+    assert f"map_bag {log} --out turn_map --refine" in told

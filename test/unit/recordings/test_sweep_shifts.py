@@ -1,0 +1,68 @@
+"""Sweeps in a room with a bay: of a head that stands, that swings and that travels."""
+
+import numpy as np
+import pytest
+
+from recordings.beam_survey import beam_lines
+from recordings.beams import RecordedBeams
+from recordings.motion.sweep_shifts import SweepMotion, sweep_shifts
+from sonar_processing.beams.beam import Beam
+
+STEP, BINS, RESOLUTION = np.radians(1.8), 300, 0.05
+TURN = 200
+WALLS = np.array([[-5.0, -4.0], [6.0, -4.0], [6.0, 1.0], [9.0, 1.0], [9.0, 5.0], [-5.0, 5.0], [-5.0, -4.0]])
+
+
+def distance(place, angle):
+    """Return how far the nearest wall is in one direction."""
+    ahead = np.array([np.cos(angle), np.sin(angle)])
+    along, starts = np.diff(WALLS, axis=0), WALLS[:-1] - place
+    cross = ahead[0] * along[:, 1] - ahead[1] * along[:, 0]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        reach = (starts[:, 0] * along[:, 1] - starts[:, 1] * along[:, 0]) / cross
+        share = (starts[:, 0] * ahead[1] - starts[:, 1] * ahead[0]) / cross
+    return reach[(reach > 0.0) & (share >= 0.0) & (share <= 1.0)].min()
+
+
+def beams(place_at, steps=range(4 * TURN)):
+    """Return beams, ten per second, of a head that is at `place_at(seconds)`, with speckle."""
+    generator = np.random.default_rng(1)
+    made = []
+    for index, step in enumerate(steps):
+        angle = step * STEP
+        strengths = generator.exponential(8.0, BINS)
+        first = int(distance(np.asarray(place_at(0.1 * index)), angle) / RESOLUTION)
+        strengths[first : first + 6] += 120.0
+        echoes = np.minimum(strengths, 255.0).astype(np.uint8)
+        made.append(Beam((index + 10) * 10**8, "sonar", angle, echoes, RESOLUTION))
+    return made
+
+
+@pytest.mark.parametrize(
+    ("place_at", "motion"),
+    [
+        (lambda _: (0.0, 0.0), SweepMotion.STILL),
+        (lambda time: (0.6 * np.sin(0.05 * time), 0.0), SweepMotion.DRIFTING),
+        (lambda time: (0.08 * time - 3.0, 0.02 * time), SweepMotion.MOVING),
+    ],
+)
+def test_sweeps_tell_whether_the_head_stood_still(place_at, motion):
+    assert sweep_shifts(beams(place_at)).motion is motion
+
+
+def test_one_turn_or_noise_tells_no_motion():
+    assert sweep_shifts(beams(lambda _: (0.0, 0.0))[: TURN + 5]).motion is SweepMotion.UNTOLD
+    noise = np.random.default_rng(2).integers(0, 60, (3 * TURN, BINS)).astype(np.uint8)
+    heard = [Beam(index + 1, "sonar", index * STEP, one, RESOLUTION) for index, one in enumerate(noise)]
+    assert sweep_shifts(heard).motion is SweepMotion.UNTOLD
+
+
+def test_head_settings_gaps_and_motion_are_told():
+    made = beams(lambda _: (0.0, 0.0), 4 * [*range(50), *range(49, -1, -1)])
+    late = [Beam(one.stamp_ns + 10**11, "sonar", one.angle, one.intensities, 0.1) for one in made[:10]]
+    told = beam_lines(RecordedBeams(made + late, [], refused=3))
+    assert told[0] == "410 beams in 100.9 s; 3 messages were damaged or held none"
+    assert told[1] == "9 sweeps to and fro of 88 degrees, steps of 1.8 degrees"
+    assert told[2] == "range: 15 m in 300 bins from 0.0 s, 30 m in 300 bins from 100.0 s"
+    assert told[3] == "1 gaps longer than 1 s, the longest 60.1 s after 39.9 s"
+    assert told[4].startswith("motion as sweeps show it: still; ")
