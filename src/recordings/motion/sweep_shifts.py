@@ -65,10 +65,9 @@ class SweepShifts:
         """Return in words what was measured."""
         if self.motion is SweepMotion.UNTOLD:
             return f"only {len(self.ratios)} sectors sound alike in two sweeps, which does not tell whether it moved"
-        return (
-            f"three of four of {len(self.ratios)} sectors fit the sweep before at least {max(self._quarter, 0.0):.0%} as "
-            f"well as they would shifted; {_STILL:.0%} speak for a head that stands"
-        )
+        fit = f"at least {max(self._quarter, 0.0):.0%} as well as they would shifted"
+        needed = f"{_STILL:.0%} speak for a head that stands"
+        return f"three of four of {len(self.ratios)} sectors fit the sweep before {fit}; {needed}"
 
 
 def sweep_shifts(beams: Iterable[Beam]) -> SweepShifts:
