@@ -95,11 +95,11 @@ def extract_echoes(
     """
     is_dense = parameters.mode is ExtractionMode.DENSE
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
-    first_bin = max(_whole_bins(parameters.min_range / range_resolution - 0.5), 0)
+    first_bin = max(_bins_above(parameters.min_range / range_resolution - 0.5), 0)
     smooth = matched_filter(strengths, sigma, first_bin)
     ring, spread = ring_of(smooth, parameters.ring_quantile, sigma)
     response = np.maximum(smooth - ring, 0.0, out=smooth)
-    peaks = find_peaks(response, apart=_whole_bins(2.0 * sigma))
+    peaks = find_peaks(response, apart=_bins_above(2.0 * sigma))
     least = np.maximum(parameters.min_contrast * spread, parameters.min_height)
     peaks = peaks.select(peaks.heights >= least[np.rint(peaks.bins).astype(np.int64)])
     share = 1.0 if is_dense else parameters.threshold_share
@@ -137,12 +137,12 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
     ranks = [int(share * (beams - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
     ordered = np.partition(smooth, ranks, axis=0)
     ring, upper = ordered[ranks[0]], ordered[ranks[1]]
-    return ring, uniform_filter1d(upper - ring, 2 * _whole_bins(_SPREAD_SIGMAS * sigma) + 1)
+    return ring, uniform_filter1d(upper - ring, 2 * _bins_above(_SPREAD_SIGMAS * sigma) + 1)
 
 
-def _whole_bins(bins: float) -> int:
-    """Return the number of bins that holds `bins`; a whole number stays what it is, whatever rounding adds to it."""
-    return math.ceil(bins - _ROUNDING)
+def _bins_above(width: float) -> int:
+    """Return the least number of bins above a width [bins], also above a whole number from which rounding takes."""
+    return math.floor(width + _ROUNDING) + 1
 
 
 def height_threshold(heights: np.ndarray) -> float:

@@ -28,6 +28,7 @@ class SonarImage(rospy.SubscribeListener):
         self.health = make_health("sonar_image")
         self.healths = [self.health]
         self._lock = threading.Lock()
+        self._drawing = threading.Lock()
         self._beams: Optional[BeamSubscriber] = None
         self._next_image = 0.0
         self._live = ReconfigurableParameters(SonarImageParameters, namespace, self.health, self._use_parameters)
@@ -44,8 +45,8 @@ class SonarImage(rospy.SubscribeListener):
         """Begin to draw for the first subscriber."""
         with self._lock:
             if self._beams is None:
-                self._picture.clear()
-                self._beams = BeamSubscriber(self._take, self._live.current, self.health, self._picture.clear)
+                self._clear()
+                self._beams = BeamSubscriber(self._take, self._live.current, self.health, self._clear)
 
     def peer_unsubscribe(self, _topic: str, others: int) -> None:
         """Stop when the last subscriber has gone."""
@@ -54,14 +55,19 @@ class SonarImage(rospy.SubscribeListener):
                 self._beams.unregister()
                 self._beams = None
 
+    def _clear(self) -> None:
+        with self._drawing:
+            self._picture.clear()
+
     def _take(self, beam: Beam) -> None:
         picture = self._picture
-        with self.health.timed():
+        # Each connection has a thread of its own, and several sonars may send beams of several lengths.
+        with self._drawing, self.health.timed():
             image = picture.draw(beam)
-        now = time.monotonic()
-        if now >= self._next_image:
-            self._next_image = now + 1.0 / self._live.current.max_rate
-            self._publish(image, picture.metres_per_pixel, beam)
+            now = time.monotonic()
+            if now >= self._next_image:
+                self._next_image = now + 1.0 / self._live.current.max_rate
+                self._publish(image, picture.metres_per_pixel, beam)
 
     def _publish(self, image: np.ndarray, metres_per_pixel: float, beam: Beam) -> None:
         self.health.count("images")

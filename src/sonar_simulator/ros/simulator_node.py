@@ -2,7 +2,6 @@
 
 import itertools
 import math
-import struct
 import threading
 from typing import Iterator
 
@@ -22,6 +21,7 @@ from sonar_simulator.simulation.moment_messages import map_origin
 from sonar_simulator.simulation.simulation import Drive, Head, Moment
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription
+from underwater_map_construction.msg import StampedIntensityCloud
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 _WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
@@ -36,12 +36,11 @@ class Echoes:
     def __init__(self) -> None:
         self._interval = UsualInterval()
         self._condition = threading.Condition()
-        rospy.Subscriber(topics.ECHOES, rospy.AnyMsg, self._take, queue_size=10)
+        rospy.Subscriber(topics.ECHOES, StampedIntensityCloud, self._take, queue_size=10)
 
-    def _take(self, echoes: rospy.AnyMsg) -> None:
-        _, seconds, nanoseconds = struct.unpack_from("<3I", echoes._buff)
+    def _take(self, echoes: StampedIntensityCloud) -> None:
         with self._condition:
-            self._interval.take(seconds + 1e-9 * nanoseconds)
+            self._interval.take(echoes.header.stamp.to_sec())
             self._condition.notify()
 
     def wait_for(self, stamp: float) -> None:
