@@ -114,7 +114,7 @@ def outcome(recording: Recording, named: Sequence[str]) -> Outcome:
     """Map a recording whose truth is known."""
     options = map_bag_arguments(["recording", "--out", "nowhere", "--refine", *named])
     mapped = mapped_bag(recording, options)
-    found = mapped.replayed.solver.odometry_told or mapped.odometry.kind.value
+    found = mapped.replayed.hypotheses.told or mapped.odometry.kind.value
     milliseconds = 1e3 * float(np.median(mapped.replayed.seconds))
     return Outcome(_live(mapped, recording), _refined(mapped, recording), found, milliseconds)
 

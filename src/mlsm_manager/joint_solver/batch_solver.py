@@ -22,7 +22,7 @@ from mlsm_manager.joint_solver.normal_equations import (
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
-from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
+from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian
 from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
@@ -37,7 +37,8 @@ _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 class BatchResult:
     """The whole run. steps: how many were taken. converged: the last one was as short as the parameters ask for.
 
-    node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2).
+    node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2). told: what the echoes
+    alone tell of the unknowns of a mixture of priors; None without one.
     """
 
     state: State
@@ -46,6 +47,7 @@ class BatchResult:
     run_covariance: np.ndarray
     steps: int
     converged: bool
+    told: Optional[Gaussian]
 
 
 @dataclass(frozen=True)
@@ -115,7 +117,7 @@ def solved(
     steps, converged = problem.converge()
     poses, run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(live, problem.state))
-    return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged)
+    return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged, problem.told())
 
 
 def fit_path(live: LiveSolver, start: State) -> State:
@@ -156,7 +158,7 @@ class _Batch:
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
         self._loops, self._start, self._fixed_steps = list(loops), self.state.copy(), fixed_steps
         self._solution = None
-        self._move = np.zeros(self._layout.size)
+        self._move, self._is_begun = np.zeros(self._layout.size), False
         self._lists: Optional[Neighbours] = None
         scans = np.arange(log.scan_count)
         self._posts = PostComparisons(solution, scans, np.ones(len(scans)))
@@ -180,9 +182,12 @@ class _Batch:
         newest = self._layout.node_start(self._layout.last)
         self._prior.add(equations, newest, self.state.nodes[-1])
         self._solution = solution_of(equations)
-        self._move = self._solution.step + _MOMENTUM * self._move
-        self.state.nodes += self._nodes_of(self._move)
-        self.state.run += self._move[self._layout.run_start :]
+        move = self._solution.step + _MOMENTUM * self._move
+        self.state.nodes += self._nodes_of(move)
+        self.state.run += move[self._layout.run_start :]
+        # The first step makes equal what is constant along a run and which the live path found anew at each node.
+        self._move = move if self._is_begun else np.zeros_like(move)
+        self._is_begun = True
         self._prior.learn(newest, self.state.nodes[-1], self._covariance)
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
@@ -234,6 +239,13 @@ class _Batch:
         places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
         by_scale = scale_covariance(places, self._parameters.world_scale_deviation(self._run.log))
         return np.concatenate(poses) + by_scale, self._covariance(run)
+
+    def told(self) -> Optional[Gaussian]:
+        """Return what the echoes alone tell of the unknowns of a mixture of priors; None without one."""
+        mixture = self._odometry.mixture
+        if mixture is None:
+            return None
+        return mixture.without(self._prior.term, self.state.nodes[-1], self.newest_covariance())
 
     def newest_covariance(self) -> np.ndarray:
         """Return that of the newest node's and the run's unknowns (width + 2, width + 2)."""

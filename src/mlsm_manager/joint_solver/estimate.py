@@ -1,12 +1,12 @@
 """What the live solver knows when a scan has ended: of one scan, of whole turns of the head, and as arrays to store."""
 
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, field, fields, is_dataclass
 from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
 
 import numpy as np
 
 from mlsm_manager.joint_solver.motion_models import DRIFT_SCALE, Drift
-from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, RANGE_SCALE, RUN_COLUMNS
+from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS
 from mlsm_manager.joint_solver.odometry_log import as_complex
 
 
@@ -22,7 +22,8 @@ class LiveEstimate:
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
     mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
     prior_term: (k, k + 1) what a mixture of priors added, see PriorTerm; k is 0 for models without one.
-    misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place.
+    misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place. doubt: (3, 3) what
+    another odometry that the vehicle may have adds to the covariance of the pose.
     """
 
     time: float
@@ -42,12 +43,14 @@ class LiveEstimate:
     surfaces: np.ndarray
     prior_term: np.ndarray
     misfit_variance: float = 0.0
+    doubt: np.ndarray = field(default_factory=lambda: np.zeros((POSE_COLUMNS, POSE_COLUMNS)))
 
     @property
     def pose_covariance(self) -> np.ndarray:
         """(3, 3) of T_map_base: m^2, m rad, rad^2; what the world's scale adds grows from the map's origin."""
         by_scale = scale_covariance(self.T_map_base[np.newaxis], self.world_scale_deviation)[0]
-        return self.covariance[POSE, POSE] + by_scale + misfit_covariance(np.array([self.misfit_variance]))[0]
+        by_misfit = misfit_covariance(np.array([self.misfit_variance]))[0]
+        return self.covariance[POSE, POSE] + by_scale + by_misfit + self.doubt
 
     @property
     def stated_deviation(self) -> float:
@@ -161,12 +164,12 @@ def stacked(items: Sequence[Any], prefix: str = "") -> Dict[str, np.ndarray]:
     if not items:
         return {}
     arrays = {}
-    for field in fields(items[0]):
-        values = [getattr(item, field.name) for item in items]
+    for own in fields(items[0]):
+        values = [getattr(item, own.name) for item in items]
         if is_dataclass(values[0]):
-            arrays.update(stacked(values, f"{prefix}{field.name}."))
+            arrays.update(stacked(values, f"{prefix}{own.name}."))
         else:
-            arrays[prefix + field.name] = np.array(values)
+            arrays[prefix + own.name] = np.array(values)
     return arrays
 
 
@@ -177,7 +180,7 @@ def unstacked(kind: type, arrays: Mapping[str, np.ndarray], prefix: str = "") ->
     """
     if not any(name.startswith(prefix) for name in arrays):
         return []
-    columns = [_column(field.type, arrays, prefix + field.name) for field in fields(kind)]
+    columns = [_column(own.type, arrays, prefix + own.name) for own in fields(kind)]
     if len({len(column) for column in columns}) != 1:
         raise ValueError(f"{prefix}: {[len(column) for column in columns]} elements")
     return [kind(*values) for values in zip(*columns)]

@@ -204,27 +204,13 @@ class LiveSolver:
         return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
 
     @property
-    def odometry_told(self) -> str:
-        """What the echoes tell of the odometry; empty where its profile was named."""
-        told = self._told
-        return "" if told is None else self.odometry.mixture.line(told)
-
-    @property
-    def reported_deviation(self) -> float:
-        """Relative standard deviation of reported distances as the likeliest odometry has it, before any echo."""
-        told = self._told
-        if told is None:
-            return self.odometry.distance_deviation
-        return float(self.odometry.mixture.likeliest(told).deviations[0])
-
-    @property
-    def _told(self) -> Optional[Gaussian]:
+    def told(self) -> Optional[Gaussian]:
         """What the echoes alone tell of the unknowns of a mixture of priors; None without a mixture or estimates."""
         mixture = self.odometry.mixture
         if mixture is None or not self.estimates:
             return None
         newest = self.estimates[-1]
-        return mixture.without(PriorTerm.of_array(newest.prior_term), newest.node, newest.own_covariance)
+        return mixture.without(PriorTerm.of_array(newest.prior_term), newest.node, newest.covariance)
 
     def expected_deviations(self, estimates: Sequence[LiveEstimate]) -> np.ndarray:
         """Return by how much (n,) [m] the positions of `estimates` are uncertain whatever the water tells.

@@ -4,14 +4,14 @@ Here are the interface, the terms that models share, and the models of odometrie
 the velocity is unknown are in velocity_models.
 """
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import Dict, NamedTuple, Optional, Protocol
 
 import numpy as np
 
 from mlsm_manager.joint_solver.normal_equations import POSE, YAW, Layout, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
-from mlsm_manager.joint_solver.prior_mixture import PriorComponent, PriorMixture
+from mlsm_manager.joint_solver.prior_mixture import PriorMixture
 from mlsm_manager.scan_matching.prediction import Fading
 
 FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
@@ -49,6 +49,11 @@ class OdometryModel(Protocol):
     @property
     def mixture(self) -> Optional[PriorMixture]:
         """Priors of some unknowns of a node, of which one holds for the whole run; None where there is one only."""
+        return None
+
+    @property
+    def rival(self) -> "Optional[OdometryModel]":
+        """The model of another odometry that the vehicle may have; None where its kind was named."""
         return None
 
     @property
@@ -165,24 +170,6 @@ class DvlOdometry:
     direction_walk: float
     scale: float
     scale_deviation: float
-
-
-class OdometryDoubt(NamedTuple):
-    """Of an odometry that is a DVL's or not. dvl_share: the probability that it is.
-
-    scale_deviation, current_deviation [m/s]: if it is not. no_current: m/s, stands for none. scale_told, current_told:
-    standard deviations from which on the echoes are asked. scale_walk [1/sqrt(s)], current_walk [m/s/sqrt(s)]: how
-    fast what the echoes told is forgotten.
-    """
-
-    dvl_share: float
-    scale_deviation: float
-    current_deviation: float
-    no_current: float
-    scale_told: float
-    current_told: float
-    scale_walk: float
-    current_walk: float
 
 
 @dataclass(frozen=True)
@@ -333,44 +320,6 @@ class ThrusterFactors(DvlFactors):
 
     def _carriers(self, axis: int) -> tuple:
         return (CURRENT_X + axis,)
-
-
-class AutoFactors(ThrusterFactors):
-    """As ThrusterFactors, of an odometry of which nobody knows whether it is a DVL's or reckoned from thrusters.
-
-    Scale and current do not walk within the window of the live solver, nor within a run that is refined.
-    """
-
-    def __init__(self, dvl: DvlOdometry, doubt: OdometryDoubt) -> None:
-        own = {field.name: getattr(dvl, field.name) for field in fields(DvlOdometry)}
-        own["scale_deviation"] = doubt.scale_deviation
-        super().__init__(
-            ThrusterOdometry(**own, scale_walk=0.0, current_deviation=doubt.current_deviation, current_walk=0.0)
-        )
-        self._distance_deviation = dvl.scale_deviation
-        still, flowing = doubt.no_current, doubt.current_deviation
-        share = (1.0 - doubt.dvl_share) / 2.0
-        components = (
-            PriorComponent("DVL", doubt.dvl_share, np.array([dvl.scale_deviation, still, still])),
-            PriorComponent("THRUSTERS", share, np.array([doubt.scale_deviation, still, still])),
-            PriorComponent("THRUSTERS in a current", share, np.array([doubt.scale_deviation, flowing, flowing])),
-        )
-        self._mixture = PriorMixture(
-            (SCALE, CURRENT_X, CURRENT_Y),
-            np.array([dvl.scale, 0.0, 0.0]),
-            components[-1].deviations,
-            np.array([doubt.scale_told, doubt.current_told, doubt.current_told]),
-            np.array([doubt.scale_walk, doubt.current_walk, doubt.current_walk]),
-            components,
-        )
-
-    @property
-    def distance_deviation(self) -> float:
-        return self._distance_deviation
-
-    @property
-    def mixture(self) -> PriorMixture:
-        return self._mixture
 
 
 def walk(deviation: float, durations: np.ndarray) -> Change:

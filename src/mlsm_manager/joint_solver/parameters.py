@@ -31,8 +31,8 @@ class JointSolverParameters(ParameterSet):
         low=0.0, high=5.0, tunable=False,
     )  # fmt: skip
     plateau_scale_deviation: float = parameter(
-        0.05, "least range_scale_deviation where echoes are plateaus", low=0.0, high=0.5, tunable=False,
-        expert="plateaus lengthen with range, and their middle moves outwards by some percent of it; 0 once calibrated",
+        0.03, "least range_scale_deviation where echoes are plateaus", low=0.0, high=0.5, tunable=False,
+        expert="in a marina plateaus lengthen by 1.6 % of range, so their middle moves outwards; 0 once calibrated",
     )  # fmt: skip
     echo_deviation: float = parameter(
         0.5, "standard deviation of a point square-on to its surface: half an echo's length",

@@ -76,7 +76,8 @@ class PriorMixture:
 
     A component counts only once the echoes tell the unknowns that it knows better than `widest` to `told` (k,): until
     then a narrow prior that is wrong would draw a map that seems to confirm it. One component has the deviations
-    `widest`. walks: (k,) per root second, how fast what the echoes told is forgotten.
+    `widest`. walks: (k,) per root second, how fast what the echoes told is forgotten. rival: a prior that another
+    solver assumes, which is not mixed; the echoes tell here whether it is right.
     """
 
     columns: Tuple[int, ...]
@@ -85,6 +86,7 @@ class PriorMixture:
     told: np.ndarray
     walks: np.ndarray
     components: Sequence[PriorComponent]
+    rival: PriorComponent
 
     def without(self, term: PriorTerm, node: np.ndarray, covariance: np.ndarray) -> Gaussian:
         """Return what is known of the mixed ones of a node's unknowns (width,) without a term that was added.
@@ -117,16 +119,18 @@ class PriorMixture:
         told = np.diag(known.covariance) <= self.told**2
         return np.array([(told | (one.deviations >= self.widest)).all() for one in self.components])
 
+    def rival_lead(self, known: Gaussian) -> float:
+        """Return by how many nats `rival` is likelier than the components where widest prior and echoes say `known`.
+
+        It is the ratio of densities of Savage and Dickey (Dickey 1971): no run that assumes the rival need be asked,
+        in which the map would confirm it.
+        """
+        logs = [self._posterior(known, component)[1] for component in self.components]
+        return self._posterior(known, self.rival)[1] - float(np.logaddexp.reduce(logs))
+
     def likeliest(self, known: Gaussian) -> PriorComponent:
         """Return the component that is the most probable where the widest prior and all echoes say `known`."""
         return self.components[int(np.argmax(self.judged(known).log_probabilities))]
-
-    def line(self, known: Gaussian) -> str:
-        """Return which component is the likeliest, as text for people: `DVL, by 3.1 nats over THRUSTERS`."""
-        logs = self.judged(known).log_probabilities
-        best, second = np.argsort(-logs)[:2]
-        lead = f"by {logs[best] - logs[second]:.1f} nats over {self.components[second].name}"
-        return f"{self.components[best].name}, {lead}"
 
     def _posterior(self, known: Gaussian, component: PriorComponent) -> Tuple[Gaussian, float]:
         """Return what is known if a component is the prior, and the logarithm of its probability times a constant."""

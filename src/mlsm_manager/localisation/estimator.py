@@ -7,6 +7,7 @@ from typing import Deque, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
+from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
@@ -92,9 +93,14 @@ class Estimator(ABC):
         return 0.0
 
     @property
-    def solver(self) -> Optional[LiveSolver]:
-        """The joint solver of the current run; None where none runs."""
+    def hypotheses(self) -> Optional[Hypotheses]:
+        """The joint solvers of the current run; None where none runs."""
         return None
+
+    @property
+    def solver(self) -> Optional[LiveSolver]:
+        """The joint solver that is believed; None where none runs."""
+        return None if self.hypotheses is None else self.hypotheses.shown
 
     @property
     def odometry(self) -> str:

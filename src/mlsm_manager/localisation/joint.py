@@ -6,7 +6,8 @@ from typing import List, Mapping, NamedTuple, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.fixes import Fix
-from mlsm_manager.joint_solver.live_solver import ODOMETRY, LiveSolver, name_of
+from mlsm_manager.joint_solver.hypotheses import Hypotheses
+from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
@@ -101,18 +102,17 @@ class Joint(Estimator):
         return [] if self._session is None else self._session.verdicts()
 
     @property
-    def solver(self) -> Optional[LiveSolver]:
-        """The solver of the current run; None where none runs."""
-        return self._session.solver if self._session is not None else None
+    def hypotheses(self) -> Optional[Hypotheses]:
+        return self._session.hypotheses if self._session is not None else None
 
     @property
     def odometry(self) -> str:
         """What was found out about an odometry whose kind was not named, as text for people; empty where it was."""
-        if self._without_positions is None or self._session is None:
+        if self._session is None:
             return ""
-        if self.parameters is self._without_positions.parameters:
+        if self._without_positions is not None and self.parameters is self._without_positions.parameters:
             return "HEADING, because positions never change"
-        return self._session.solver.odometry_told
+        return self._session.hypotheses.told
 
     @property
     def target(self) -> BlockSource:
@@ -300,7 +300,7 @@ class Joint(Estimator):
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
-        if session.solver.closed is not None:
+        if session.solver.closed is not None or session.hypotheses.switched:
             self._maps.redraw(session)
         self._maps.matched.add(MapCloud.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)

@@ -7,6 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
 from mlsm_manager.joint_solver.fixes import Fix
+from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
@@ -18,6 +19,7 @@ from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.odometry_checks import odometry_decided
 from mlsm_manager.self_check.path_checks import position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, inverse, transformed, wrapped
@@ -41,16 +43,21 @@ _PATH_POINTS = 17
 
 @dataclass
 class JointSession:
-    """One solver's run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
+    """One run. T_map_odom: (3,) at its beginning; scans are moved by it, so that corrections stay small.
 
     scans: all that it took, as they came, and scans without echoes for pauses; none after a long run.
     """
 
-    solver: LiveSolver
+    hypotheses: Hypotheses
     T_map_odom: np.ndarray
     scans: List[Scan] = field(default_factory=list)
     _taken: int = 0
     _shares: Dict[int, float] = field(default_factory=dict)
+
+    @property
+    def solver(self) -> LiveSolver:
+        """The solver that is believed."""
+        return self.hypotheses.shown
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
@@ -59,7 +66,7 @@ class JointSession:
         return self._add(scan, fix)
 
     def _add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
-        estimate = self.solver.add(_moved(scan, self.T_map_odom), fix)
+        estimate = self.hypotheses.add(_moved(scan, self.T_map_odom), fix)
         self._taken += 1
         self.scans.append(scan)
         if self._taken > _MOST_STORED:
@@ -77,7 +84,7 @@ class JointSession:
     ) -> "JointSession":
         """Return a run that goes on after `scans`; see LiveSolver.resumed."""
         moved = [_moved(scan, T_map_odom) for scan in scans]
-        return cls(LiveSolver.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans), len(scans))
+        return cls(Hypotheses.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans), len(scans))
 
     @classmethod
     def begun(
@@ -90,11 +97,11 @@ class JointSession:
     ) -> "JointSession":
         """Return a new run in a map of blocks with means at `known` (n, 2) m; `start`: see LiveSolver."""
         surfaces = KnownSurfaces(known) if len(known) else None
-        return cls(LiveSolver(parameters, sonar_in_base, start, surfaces), T_map_odom)
+        return cls(Hypotheses.begun(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def solved_with(self, parameters: SolverParameters) -> "JointSession":
         """Return a run of the same scans with other parameters."""
-        other = JointSession(self.solver.begun_with(parameters), self.T_map_odom)
+        other = JointSession(self.hypotheses.begun_with(parameters), self.T_map_odom)
         for scan in self.scans:
             other._add(scan)
         return other
@@ -119,6 +126,7 @@ class JointSession:
             *(self._uncertainty(estimates[-1]) for _ in turns.times[1:2]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.distance_deviation),
             *in_submaps(turns.times, turns.apart),
+            *odometry_decided(self.hypotheses.doubt),
         ]
 
     def _uncertainty(self, newest: LiveEstimate) -> Verdict:
@@ -152,12 +160,13 @@ class JointSession:
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""
-        solver = self.solver
-        return self.resumed(solver.parameters, solver.log.sonar_in_base, self.T_map_odom, self.scans, solver.stored())
+        hypotheses = self.hypotheses
+        sonar = self.solver.log.sonar_in_base
+        return self.resumed(hypotheses.parameters, sonar, self.T_map_odom, self.scans, hypotheses.stored())
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""
-        self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
+        self.hypotheses.follow(_moved_track(track, self.T_map_odom), time)
 
     def heard(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:
         """Return the points (n, 4) of a cloud in map, and where the sonar was when it heard each, (n, 2) m."""

@@ -9,16 +9,15 @@ import numpy as np
 from mlsm_manager.joint_solver.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import (
-    AutoFactors,
     Compass,
     DvlFactors,
     DvlOdometry,
-    OdometryDoubt,
     OdometryModel,
     ThrusterFactors,
     ThrusterOdometry,
 )
 from mlsm_manager.joint_solver.parameters import NodeSearch
+from mlsm_manager.joint_solver.unsure_odometry import OdometryDoubt, UnsureFactors
 from mlsm_manager.joint_solver.velocity_models import (
     HeadingFactors,
     HeadingOdometry,
@@ -35,14 +34,13 @@ _NO_COMPASS = 1e-5
 # rad/sqrt(s): the solver needs some freedom of the heading from scan to scan; of an unknown turn rate, besides it.
 _LEAST_WALK = 1e-6
 _TURN_NOISE = 3.5e-4
-# Data sheets are usually right; the speed at a thrust is known to a third. 10 % of the scale, and half the speed of a
-# slow current, are some turns' worth of echoes.
+# Data sheets are usually right; the speed at a thrust is known to a third. Half the speed of a slow current are some
+# turns' worth of echoes.
 _DOUBT = OdometryDoubt(
     dvl_share=0.8,
     scale_deviation=0.3,
     current_deviation=0.1,
     no_current=0.003,
-    scale_told=0.1,
     current_told=0.05,
     scale_walk=0.1 / np.sqrt(600.0),
     current_walk=0.002,
@@ -165,7 +163,7 @@ def _dvl(own: OdometryChoice) -> OdometryModel:
 
 
 def _auto(own: OdometryChoice) -> OdometryModel:
-    return AutoFactors(DvlOdometry(**_positions(own)), _DOUBT)
+    return UnsureFactors(DvlOdometry(**_positions(own)), _DOUBT)
 
 
 def _thrusters(own: OdometryChoice) -> OdometryModel:

@@ -80,16 +80,16 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
         again = _replayed(recording, scans, changed)
         if again.solver is not None and strafes(replayed.solver, again.solver):
             odometry, parameters, replayed = other, changed, again
-    if replayed.solver is not None and replayed.solver.odometry_told:
-        odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.solver.odometry_told}")
     _tell_of_refused(replayed, options)
     refined, refitted = None, []
     if options.refine:
         with _bar(None, "", "refine"):
-            refined = refine(recording.track, replayed.scans, replayed.solver, parameters.map_settings())
+            refined = refine(recording.track, replayed.scans, replayed.hypotheses, parameters.map_settings())
     if options.check:
         with _bar(None, "", "check"):
             refitted = refitted_verdicts(replayed.solver, refined.batch)
+    if replayed.hypotheses is not None and replayed.hypotheses.told:
+        odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted])
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)

@@ -18,6 +18,7 @@ from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.self_check.headline import headline
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.odometry_checks import odometry_decided
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
@@ -182,6 +183,7 @@ def _trust(
         *in_submaps(turns.times, turns.apart),
         as_expected(before.names, before.values, before.deviations, calibration.values),
         *_halves(solver),
+        *odometry_decided(replayed.hypotheses.doubt),
     ]
     return Trust([*verdicts, *further], times, covariances, replayed.matched)
 
@@ -203,7 +205,7 @@ def _against_odometry_or_before(
         return (scans_go_on(ends, shares_heard_before(solution, 0)),)
     return against_odometry(
         replayed.times, replayed.odometry, path,
-        scale_deviation=solver.reported_deviation, position_walk=solver.odometry.position_walk,
+        scale_deviation=solver.odometry.distance_deviation, position_walk=solver.odometry.position_walk,
     )  # fmt: skip
 
 

@@ -6,6 +6,7 @@ from typing import List, Mapping, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, solved, with_loops_closed
+from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
@@ -41,9 +42,14 @@ class Refined:
         return self.closing.batch
 
 
-def refine(track: Track, scans: Sequence[Scan], solver: LiveSolver, settings: MapSettings) -> Refined:
-    """Return the run of all `scans` that `solver` has taken, fitted at once; the live run is where the fit begins."""
-    closing = with_loops_closed(solver, fitted(solver))
+def refine(track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings: MapSettings) -> Refined:
+    """Return the run of all `scans` that the solvers have taken, fitted at once; live runs are where fits begin.
+
+    Of several odometries the likelier one is believed from then on.
+    """
+    best = hypotheses.believed([fitted(solver) for solver in hypotheses.solvers])
+    solver = hypotheses.shown
+    closing = with_loops_closed(solver, best)
     solution = solver.solution.with_state(closing.batch.state)
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:

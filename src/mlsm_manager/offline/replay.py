@@ -7,6 +7,7 @@ from typing import Callable, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.localiser import Localiser
@@ -50,8 +51,13 @@ class Replayed:
         return [update.scan for update in self.updates]
 
     @property
+    def hypotheses(self) -> Optional[Hypotheses]:
+        """The joint solvers that have taken all scans; None where each was matched alone."""
+        return self.estimator.hypotheses
+
+    @property
     def solver(self) -> Optional[LiveSolver]:
-        """The joint solver that has taken all scans; None where each was matched alone."""
+        """The one of them that is believed."""
         return self.estimator.solver
 
     @property

@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import inverse, rotated, transformed
+from node_support.geometry import composed, inverse, rotated, transformed
 
 TURN = 14.0  # s per turn of the head
 BEAMS = 120
@@ -72,6 +72,14 @@ def that_heard(scan: Scan, truth: Track, places: np.ndarray) -> Scan:
     points = scan.points.copy()
     points[:, :2] = transformed(scan.track.at(scan.times), transformed(inverse(truth.at(scan.times)), places))
     return replace(scan, points=points)
+
+
+def reporting(scan: Scan, factor: float) -> Scan:
+    """Return a scan whose odometry reports distances that are `factor` times the true ones."""
+    track = scan.track
+    scaled = Track(track.times, track.poses * [factor, factor, 1.0])
+    moves = composed(scaled.at(scan.times), inverse(track.at(scan.times)))
+    return replace(scan, points=transformed(moves, scan.points), track=scaled)
 
 
 def with_wild_odometry(scan: Scan) -> Scan:

@@ -191,7 +191,7 @@ def test_a_run_that_does_not_fit_leaves_the_map_alone(stored, name, array):
 
 def test_a_run_with_another_odometry_profile_is_refused(stored):
     other = PARAMETERS.changed({"odometry": "THRUSTERS"}).build_localiser(SONAR_IN_BASE)
-    told = "it was stored with another odometry profile: AutoFactors, not ThrusterFactors"
+    told = "it was stored with another odometry profile: DvlFactors, not ThrusterFactors"
     assert other.restore(stored, same_odometry=True) == told
     assert other.estimator.solver is None
     assert other.block_count == len(stored.shown)

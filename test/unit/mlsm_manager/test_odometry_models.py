@@ -1,11 +1,10 @@
 """Odometry models: derivatives, what they expect, and that they use of the odometry only what they say."""
 
-from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
 import pytest
-from made_harbour import CANAL, ahead, along_canal, deaf, selected, tour
+from made_harbour import CANAL, ahead, along_canal, deaf, reporting, selected, tour
 from made_models import followed
 
 from mlsm_manager.joint_solver.batch_solver import solved
@@ -15,7 +14,6 @@ from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse, transformed
 
 pytestmark = pytest.mark.long
 
@@ -156,27 +154,10 @@ def test_a_velocity_that_nobody_reported_is_found_with_its_deviation(made, solve
         assert (deviation < 0.2).all()
 
 
-def test_an_odometry_that_is_right_is_taken_for_a_dvl(solver_of):
-    named, found = solver_of(OdometryKind.DVL), solver_of(OdometryKind.AUTO)
-    assert found.odometry_told.startswith("DVL, by ")
-    assert found.distance_deviation < 0.02
-    for one, other in zip(named.estimates[10:], found.estimates[10:]):
-        np.testing.assert_allclose(other.T_map_base[:2], one.T_map_base[:2], atol=0.15)
-    assert named.odometry_told == ""
-
-
-def scaled(scan, factor):
-    """Return a scan whose odometry reports distances that are `factor` times the true ones."""
-    track = scan.track
-    shrunk = Track(track.times, track.poses * [factor, factor, 1.0])
-    move = composed(shrunk.at(scan.times), inverse(track.at(scan.times)))
-    return replace(scan, points=transformed(move, scan.points), track=shrunk)
-
-
 @pytest.mark.newest_only("dear; the tests above follow the same tour")
 @pytest.mark.parametrize("kind", [OdometryKind.THRUSTERS, OdometryKind.AUTO])
 def test_a_scale_that_is_30_percent_off_is_found(kind, made):
-    solver = followed([scaled(scan, 1.0 / 1.3) for scan in made.scans], parameters(kind))
+    solver = followed([reporting(scan, 1.0 / 1.3) for scan in made.scans], parameters(kind))
     newest = solver.estimates[-1]
     column = solver.odometry.calibrated["odometry_scale"]
     assert newest.node[column] == pytest.approx(0.3, abs=0.06)

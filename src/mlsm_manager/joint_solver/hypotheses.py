@@ -1,0 +1,210 @@
+"""Two solvers of the same scans where nobody knows which odometry a vehicle has; the echoes tell which one is right."""
+
+from dataclasses import replace
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
+
+import numpy as np
+
+from mlsm_manager.joint_solver.batch_solver import BatchResult
+from mlsm_manager.joint_solver.estimate import LiveEstimate
+from mlsm_manager.joint_solver.fixes import Fix
+from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
+from mlsm_manager.joint_solver.live_solver import ODOMETRY, LiveSolver, name_of
+from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS
+from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.prior_mixture import Gaussian
+from mlsm_manager.scan_matching.scan import Scan, Track
+from node_support.errors import RefusedInput
+
+_OTHER = "rival."  # before the names in stored maps
+# Nats: from 20 : 1 on the DVL is believed, which nothing corrects if it is none; the other model errs less, and is
+# believed again below 3 : 1. Beyond 10^5 : 1 against it the DVL is followed no more.
+_CLEAR, _DOUBTED, _EXCLUDED = 3.0, 1.0, -12.0
+
+
+class Doubt(NamedTuple):
+    """lead: nats by which the shown odometry is likelier than the `other` one. apart: m between both newest places.
+
+    deviation: m, standard deviation that the other one adds to the newest position. own: m, that without it.
+    """
+
+    lead: float
+    other: str
+    apart: float
+    deviation: float
+    own: float
+
+
+class Hypotheses:
+    """The solvers of a run: one, or, where its odometry has a rival, one for each.
+
+    shown: the solver that is believed. other: that of the other odometry; None where there is none, or it is out of the
+    question. switched: whether `shown` was the other one before the newest scan. doubt: None without an other one.
+    """
+
+    def __init__(self, shown: LiveSolver, other: Optional[LiveSolver]) -> None:
+        self.shown, self.other = shown, other
+        self.switched = False
+        self.doubt: Optional[Doubt] = None
+        self._dvl_lead = np.nan
+
+    @classmethod
+    def begun(
+        cls, parameters: SolverParameters, sonar_in_base: np.ndarray, start: Optional[np.ndarray] = None,
+        known: Optional[KnownSurfaces] = None,
+    ) -> "Hypotheses":  # fmt: skip
+        """Return those of a new run; arguments as LiveSolver's."""
+        solver = LiveSolver(parameters, sonar_in_base, start, known)
+        return cls(solver, _of_rival(solver))
+
+    def begun_with(self, parameters: SolverParameters) -> "Hypotheses":
+        """Return those with other parameters that begin where these began and have taken no scan."""
+        solver = self.shown.begun_with(parameters)
+        return Hypotheses(solver, _of_rival(solver))
+
+    @property
+    def parameters(self) -> SolverParameters:
+        """What `resumed` needs to have both odometries, where there are two."""
+        return self.shown.parameters if self.other is None else self._unsure.parameters
+
+    @property
+    def solvers(self) -> List[LiveSolver]:
+        """All of them, that which is believed first."""
+        return [solver for solver in (self.shown, self.other) if solver is not None]
+
+    def follow(self, track: Track, time: float) -> None:
+        """Learn the odometry up to `time` [s], which `track` holds."""
+        for solver in self.solvers:
+            solver.log.odometry.extend(track, time)
+
+    def stored(self) -> Dict[str, np.ndarray]:
+        """Return all but the scans that `resumed` needs; see LiveSolver.stored."""
+        other = {} if self.other is None else self.other.stored()
+        return {**self.shown.stored(), **{_OTHER + name: array for name, array in other.items()}}
+
+    @classmethod
+    def resumed(
+        cls, parameters: SolverParameters, sonar_in_base: np.ndarray, scans: Sequence[Scan],
+        stored: Mapping[str, np.ndarray],
+    ) -> "Hypotheses":  # fmt: skip
+        """Return those that go on after `scans`; arguments and errors as LiveSolver.resumed."""
+        other = {name[len(_OTHER) :]: array for name, array in stored.items() if name.startswith(_OTHER)}
+        shown, *others = (
+            LiveSolver.resumed(_as_stored(parameters, one), sonar_in_base, scans, one)
+            for one in (stored, other)
+            if one is stored or (one and parameters.odometry.rival is not None)
+        )
+        return cls(shown, others[0] if others else None)
+
+    @property
+    def told(self) -> str:
+        """What the echoes tell of the odometry; empty where it was named."""
+        if self.doubt is not None:
+            names = self._name(self.shown), self.doubt.other
+            first, second = names if self.doubt.lead >= 0.0 else names[::-1]
+            return f"{first}, by {abs(self.doubt.lead):.1f} nats over {second}"
+        if self.shown.odometry.mixture is None or np.isnan(self._dvl_lead):
+            return ""
+        return f"{self._name(self.shown)}, by {-self._dvl_lead:.1f} nats over {self._dvl}"
+
+    def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
+        """Take the next scan; see LiveSolver.add. fix: in the map of `shown`."""
+        self.switched = False
+        self.shown.add(scan, fix)
+        if self.other is not None:
+            try:
+                self.other.add(scan)
+                self._weigh()
+            except RefusedInput:
+                self.other = self.doubt = None
+        return self.shown.estimates[-1]
+
+    def _weigh(self) -> None:
+        """Show the solver that the echoes speak for, and say how uncertain the other one makes it."""
+        self._dvl_lead = self._lead_of_dvl(self._unsure.told)
+        is_dvl = self.shown is not self._unsure
+        if self._dvl_lead < _DOUBTED if is_dvl else self._dvl_lead > _CLEAR:
+            self.show_other()
+            self.switched = True
+        newest, other = self.shown.estimates[-1], self.other.estimates[-1]
+        poses = np.array([[one.T_map_base] for one in (newest, other)])
+        lead = self._lead_of_shown(self._dvl_lead)
+        added = _added(lead, *poses, newest.pose_covariance[np.newaxis], other.pose_covariance[np.newaxis])
+        self.shown.estimates[-1] = replace(newest, doubt=added[0])
+        self._know(lead, *poses[:, :, :2], added, newest.stated_deviation)
+        if self._dvl_lead < _EXCLUDED:
+            self.other = self.doubt = None
+
+    def believed(self, fits: Sequence[BatchResult]) -> BatchResult:
+        """Show the solver whose fit of the whole run the echoes speak for; return that with what the other one adds.
+
+        fits: of `shown`, and of `other` where there is one.
+        """
+        if self.other is None:
+            return fits[0]
+        fit, other = fits
+        unsure = fit if self.shown is self._unsure else other
+        self._dvl_lead = self._lead_of_dvl(unsure.told)
+        if self._lead_of_shown(self._dvl_lead) < 0.0:
+            self.show_other()
+            fit, other = other, fit
+        lead, log = self._lead_of_shown(self._dvl_lead), self.shown.log
+        reported = log.node_poses(np.arange(len(fit.node_times)))
+        places, others = (reported + one.state.nodes[:, :POSE_COLUMNS] for one in (fit, other))
+        added = _added(lead, places, others, fit.pose_covariances, other.pose_covariances)
+        own = float(np.sqrt(np.trace(fit.pose_covariances[-1, :2, :2])))
+        self._know(lead, places, others, added, own)
+        return replace(fit, pose_covariances=fit.pose_covariances + added)
+
+    def show_other(self) -> None:
+        """Show the solver of the other odometry."""
+        self.shown, self.other = self.other, self.shown
+
+    @property
+    def _unsure(self) -> LiveSolver:
+        return self.other if self.shown.odometry.mixture is None else self.shown
+
+    def _lead_of_dvl(self, told: Gaussian) -> float:
+        return self._unsure.odometry.mixture.rival_lead(told)
+
+    def _lead_of_shown(self, dvl_lead: float) -> float:
+        return -dvl_lead if self.shown is self._unsure else dvl_lead
+
+    @property
+    def _dvl(self) -> str:
+        return self._unsure.odometry.mixture.rival.name
+
+    def _name(self, solver: LiveSolver) -> str:
+        return self._dvl if solver is not self._unsure else solver.odometry.mixture.likeliest(solver.told).name
+
+    def _know(self, lead: float, places: np.ndarray, others: np.ndarray, added: np.ndarray, own: float) -> None:
+        """Keep the doubt where it is the largest."""
+        apart = np.hypot(*(others - places)[:, :2].T)
+        deviation = np.sqrt(np.maximum(np.trace(added[:, :2, :2], axis1=1, axis2=2), 0.0))
+        self.doubt = Doubt(lead, self._name(self.other), float(apart.max()), float(deviation.max()), own)
+
+
+def _of_rival(solver: LiveSolver) -> Optional[LiveSolver]:
+    """Return a solver of the odometry that the one of `solver` may be instead; None where that is certain."""
+    rival = solver.odometry.rival
+    return None if rival is None else solver.begun_with(replace(solver.parameters, odometry=rival))
+
+
+def _as_stored(parameters: SolverParameters, stored: Mapping[str, np.ndarray]) -> SolverParameters:
+    """Return the parameters with the rival of their odometry, if that is what was stored. Raises KeyError."""
+    rival = parameters.odometry.rival
+    if rival is None or not np.array_equal(stored[ODOMETRY], name_of(rival)):
+        return parameters
+    return replace(parameters, odometry=rival)
+
+
+def _added(
+    lead: float, poses: np.ndarray, others: np.ndarray, covariances: np.ndarray, other_covariances: np.ndarray
+) -> np.ndarray:
+    """Return what other poses (n, 3), less likely by `lead` nats, add to the covariances (n, 3, 3) of `poses` (n, 3).
+
+    With it the covariances are those of the squared error where either may be true.
+    """
+    apart = others - poses
+    share = 1.0 / (1.0 + np.exp(lead))
+    return share * (np.einsum("na,nb->nab", apart, apart) + other_covariances - covariances)

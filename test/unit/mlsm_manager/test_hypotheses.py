@@ -1,0 +1,112 @@
+"""Where nobody named the odometry, two solvers follow the vehicle, and the echoes tell which of them is right."""
+
+from functools import lru_cache
+
+import numpy as np
+import pytest
+from made_harbour import SONAR_IN_BASE, ahead, reporting, tour
+from made_models import followed
+
+from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.hypotheses import Doubt, Hypotheses
+from mlsm_manager.joint_solver.motion_models import SCALE
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.self_check.odometry_checks import odometry_decided
+
+pytestmark = pytest.mark.long
+
+MADE = tour(16, path=ahead)
+PARAMETERS = {
+    kind: MlsmCoreParameters().changed(profile_values(kind)).solver_parameters()
+    for kind in (OdometryKind.AUTO, OdometryKind.DVL)
+}
+AUTO = PARAMETERS[OdometryKind.AUTO]
+
+
+def scans_of(scale):
+    """Return the tour's scans with an odometry that reports distances too short by `scale`."""
+    return [reporting(scan, 1.0 / (1.0 + scale)) for scan in MADE.scans]
+
+
+def taken(hypotheses, scans):
+    """Return the estimates after each of `scans`, as shown then."""
+    return [hypotheses.add(scan) for scan in scans]
+
+
+@lru_cache(maxsize=None)
+def run(scale):
+    """Return the solvers after the whole tour, and what was shown on the way."""
+    hypotheses = Hypotheses.begun(AUTO, SONAR_IN_BASE)
+    return hypotheses, taken(hypotheses, scans_of(scale))
+
+
+def test_an_odometry_that_is_right_is_taken_for_a_dvl():
+    hypotheses, shown = run(0.0)
+    named = followed(MADE.scans, PARAMETERS[OdometryKind.DVL])
+    assert hypotheses.told.startswith("DVL, by ")
+    assert hypotheses.shown.odometry is AUTO.odometry.rival
+    for estimate, other in zip(shown[10:], named.estimates[10:]):
+        np.testing.assert_allclose(estimate.T_map_base, other.T_map_base, atol=1e-9)
+        assert np.trace(estimate.pose_covariance) >= np.trace(other.pose_covariance)
+
+
+def test_an_odometry_that_is_30_percent_off_is_not():
+    hypotheses, shown = run(0.3)
+    assert hypotheses.told.startswith("THRUSTERS, by ")
+    assert shown[-1].node[SCALE] == pytest.approx(0.3, abs=0.06)
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.1, 0.3])
+def test_the_stated_deviation_covers_the_error_before_and_after_the_echoes_tell(scale):
+    hypotheses, shown = run(scale)
+    start = hypotheses.shown.log.node_poses(np.array([0]))[0] - MADE.truth.at(0.0)
+    for estimate in shown:
+        error = estimate.T_map_base - MADE.truth.at(estimate.time) - start
+        assert np.hypot(*error[:2]) < 3.0 * estimate.stated_deviation + 0.1
+
+
+def test_a_model_that_is_out_of_the_question_is_followed_no_more():
+    hypotheses, _ = run(0.6)
+    assert hypotheses.other is None
+    assert hypotheses.told.endswith("nats over DVL")
+    assert odometry_decided(hypotheses.doubt) == ()
+
+
+def test_a_named_odometry_has_no_rival():
+    named = Hypotheses.begun(PARAMETERS[OdometryKind.DVL], SONAR_IN_BASE)
+    taken(named, MADE.scans[:2])
+    assert named.solvers == [named.shown]
+    assert named.told == ""
+
+
+def test_a_stored_run_goes_on_with_both():
+    whole, begun = (Hypotheses.begun(AUTO, SONAR_IN_BASE) for _ in range(2))
+    estimates = taken(whole, MADE.scans[:8])
+    taken(begun, MADE.scans[:6])
+    resumed = Hypotheses.resumed(AUTO, SONAR_IN_BASE, MADE.scans[:6], begun.stored())
+    later = taken(resumed, MADE.scans[6:8])
+    np.testing.assert_allclose(later[-1].pose_covariance, estimates[-1].pose_covariance, rtol=1e-6)
+    assert resumed.told == whole.told
+
+
+@pytest.mark.parametrize("scale", [0.0, 0.3])
+def test_the_fit_of_a_whole_run_takes_what_all_its_echoes_speak_for(scale):
+    hypotheses = Hypotheses.begun(AUTO, SONAR_IN_BASE)
+    taken(hypotheses, scans_of(scale))
+    hypotheses.show_other()  # what is wrong
+    fit = hypotheses.believed([solved(solver) for solver in hypotheses.solvers])
+    assert fit.state.nodes[-1, SCALE] == pytest.approx(scale, abs=0.05)
+    assert fit.state.nodes.shape[1] == hypotheses.shown.odometry.width
+
+
+def test_a_scale_that_does_not_change_is_the_same_all_along_a_fit():
+    scales = solved(run(0.3)[0].shown).state.nodes[:, SCALE]
+    assert np.ptp(scales) < 1e-6
+
+
+@pytest.mark.parametrize(("deviation", "fires"), [(0.5, False), (2.4, False), (2.6, True)])
+def test_the_check_fires_where_the_other_odometry_is_the_largest_doubt(deviation, fires):
+    (verdict,) = odometry_decided(Doubt(lead=1.0, other="THRUSTERS", apart=4.0, deviation=deviation, own=2.5))
+    assert verdict.fires == fires
+    assert "1.0 nats over THRUSTERS" in verdict.text
