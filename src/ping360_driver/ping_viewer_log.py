@@ -65,8 +65,8 @@ class PingViewerLog:
         if found is not None:
             time, start = found
             end = start + _length(self._data, start - 4)
-            # Where another part begins within the data of one, its own end is lost.
-            if end <= min(start + _LONGEST_PART, len(self._data)) and self._next_time(start, end) is None:
+            # Where another part begins within the data of one, or with their length, its own end is lost.
+            if end <= min(start + _LONGEST_PART, len(self._data)) and self._next_time(start - 4, end) is None:
                 return LoggedPart(time, self._data[start:end]), end
         self.damaged += 1
         following = self._next_time(position + 1, len(self._data))

@@ -4,7 +4,7 @@ import struct
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from ping360_driver.ping_viewer_log import TITLE, NoLogError, PingViewerLog
@@ -140,6 +140,7 @@ def test_a_log_without_beams_is_refused(tmp_path):
 
 
 @given(st.integers(0, 100), st.binary(max_size=40))
+@example(28, b"")  # what is left ends where the length of its data began
 def test_what_is_damaged_costs_no_other_part(place, rubbish):
     parts = [(1.0 + index, bytes([index]) * 20) for index in range(5)]
     whole = log_bytes(parts)
