@@ -22,7 +22,7 @@ sys.path.insert(0, str(PACKAGE_ROOT / "test/unit/sonar_driver"))
 from emulated_drivers import free_udp_port
 
 # Another program may take the processor during one attempt.
-ATTEMPTS = 4
+ATTEMPTS = 8
 # Steps of a loop, and how many s of processor time they take on the machine for which limits of shares are given.
 STEPS, SECONDS = 1000000, 0.06
 # One turn of the 852: travel there and back over 5 m, 27 bytes out and 513 back at 115200 baud.

@@ -14,7 +14,7 @@ LIMIT = 2.0
 # What its help takes on a machine with nothing else to do.
 QUIET = 0.7
 # Another program may take the processor during one attempt.
-ATTEMPTS = 5
+ATTEMPTS = 8
 
 
 def test_ctrl_c_ends_it_within_two_seconds_and_leaves_nothing(tmp_path):

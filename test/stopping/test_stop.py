@@ -8,7 +8,7 @@ LIMIT = 2.0
 # What roslaunch takes for its master alone on a machine with nothing else to do.
 QUIET = 0.7
 # Another program may take the processor during one attempt.
-ATTEMPTS = 5
+ATTEMPTS = 8
 
 
 @pytest.mark.parametrize(

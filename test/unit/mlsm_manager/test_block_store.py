@@ -4,7 +4,7 @@ import threading
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import map_with
 
@@ -122,7 +122,6 @@ def changed(surface_map, rng):
     surface_map.count_crossings(rows, np.ones(len(rows), dtype=np.uint16))
 
 
-@settings(max_examples=30, deadline=None)
 @given(seed=st.integers(0, 2**31), steps=st.integers(0, 6))
 def test_changes_between_two_pieces_are_not_in_the_copy(seed, steps):
     surface_map, rng = map_of(seed), np.random.RandomState(seed)

@@ -4,7 +4,7 @@ from dataclasses import fields, replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solution_of, solver_parameters
@@ -72,7 +72,6 @@ def weights(residual, pairs, sources, targets, parameters, cut):
 
 
 @given(st.integers(0, 10**6), st.integers(1, 200), st.sampled_from([[-2], [0], [3, 4, 9], list(range(40))]))
-@settings(max_examples=50)
 def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
     rng, parameters = np.random.RandomState(seed), solver_parameters()
     sources, targets = some_points(rng, 30, list(range(50, 60))), some_points(rng, 40, scans)
@@ -183,7 +182,6 @@ def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
 
 
 @given(st.integers(0, 10**6), st.integers(0, 100))
-@settings(max_examples=30)
 def test_comparisons_fade_out_with_distance_and_angle(seed, count):
     rng, parameters = np.random.RandomState(seed), solver_parameters()
     sources, targets = some_points(rng, 30, [5, 6]), some_points(rng, 40, [0, 1, 2])
@@ -202,7 +200,6 @@ def test_comparisons_fade_out_with_distance_and_angle(seed, count):
 
 
 @given(st.integers(0, 10**6), st.integers(0, 20))
-@settings(max_examples=30)
 def test_terms_are_added_in_their_columns_of_a_matrix(seed, count):
     rng = np.random.RandomState(seed)
     columns, terms = rng.randint(0, 7, (count, 3)), rng.normal(0.0, 1.0, (count, 3, 3))

@@ -89,7 +89,6 @@ def likelihoods(particles, sources, targets):
 
 
 @given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 60))
-@settings(max_examples=30, deadline=None)
 def test_each_source_counts_by_its_nearest_target(seed, sources, targets):
     particles, heard, nearby = heard_and_nearby(seed, sources, targets, count=100)
     expected = np.zeros(100)
@@ -100,7 +99,6 @@ def test_each_source_counts_by_its_nearest_target(seed, sources, targets):
 
 
 @given(st.integers(0, 10**6), st.integers(1, 30), st.integers(1, 60))
-@settings(max_examples=30, deadline=None)
 def test_each_source_pulls_to_its_nearest_target(seed, sources, targets):
     particles, heard, nearby = heard_and_nearby(seed, sources, targets, count=40)
     matrices, forces = np.tile(0.7**-2.0 * np.eye(2), (40, 1, 1)), np.zeros((40, 2))
@@ -250,7 +248,7 @@ def stray(scan, length):
 
 
 @given(st.integers(0, 10**6))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_path_is_worth_what_its_scans_are_worth_one_after_the_other(seed):
     path = TRUE + np.random.RandomState(seed).normal(0.0, 1.0, TRUE.shape)
     total = 0.0
@@ -262,7 +260,7 @@ def test_a_path_is_worth_what_its_scans_are_worth_one_after_the_other(seed):
 
 
 @given(st.integers(1, SCANS - 1), st.integers(-20, 20))
-@settings(max_examples=10, deadline=None)
+@settings(max_examples=10)
 def test_a_gain_is_what_the_shifted_path_is_worth_more(scan, length):
     # What is heard just at a node moves as that node does.
     at_nodes = replace(HEARD, shares=np.zeros(len(HEARD)))

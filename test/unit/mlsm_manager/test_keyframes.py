@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import random_points
 
@@ -51,7 +51,6 @@ def assert_same(found, wanted):
 STEP = st.tuples(st.sampled_from(["add", "draw", "insert"]), st.integers(-4, 4))
 
 
-@settings(max_examples=40)
 @given(st.lists(STEP, max_size=10), st.integers(-4, 4))
 def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
     shown, keyframes, inserted = KeyframeMap(RESOLUTION, LIMIT), [], []
@@ -131,7 +130,6 @@ def cells(blocks):
 ECHO = st.tuples(st.integers(-8, 8).map(float), st.integers(-8, 8).map(lambda y: y + 0.3))
 
 
-@settings(max_examples=40)
 @given(st.lists(st.lists(ECHO, max_size=12), min_size=1, max_size=8), st.integers(-4, 4), st.integers(-4, 4))
 def test_what_is_settled_is_as_if_every_keyframe_had_carved_once_from_its_last_place(frames, early, last):
     clouds = [cloud(number, *echoes) for number, echoes in enumerate(frames)]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
@@ -85,7 +85,6 @@ def default_values(node):
     return yaml.safe_load((ROOT / f"yaml/{node}_default.yaml").read_text())
 
 
-@settings(max_examples=40)
 @given(ANY_PARAMETERS, ANY_FRAME, ANY_FRAME)
 def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     """Over their default files, as launch files load it."""

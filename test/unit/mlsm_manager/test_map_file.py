@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import content, in_order, map_with, partition, random_map, stored_map
 
@@ -33,7 +33,6 @@ def _loaded(blocks):
 
 
 @given(st.integers(0, 2**31), st.integers(0, 400), st.sampled_from([0.1, 0.5, 3.0]))
-@settings(max_examples=30)
 def test_cell_bottom_top_number_of_points_and_crossings_are_kept_exactly(seed, count, resolution):
     blocks = random_map(seed, count, resolution, extent=3.0).blocks
     crossed = np.arange(len(blocks), dtype=np.uint16)

@@ -6,7 +6,7 @@ import sys
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import in_order, map_with, partition, random_points, stored_map
 from programs import ROOT
@@ -125,7 +125,6 @@ def _total(blocks):
 
 
 @given(seeds, st.integers(-9, 9), st.integers(-9, 9), st.sampled_from([-2.0, 0.0, 0.25, 3.5]), st.integers(-3, 4))
-@settings(max_examples=50)
 def test_where_cells_align_merging_makes_the_map_of_all_points(seed, x, y, z, quarters):
     transform = LevelTransform(x * RESOLUTION, y * RESOLUTION, z, quarters * np.pi / 2.0)
     assert transform.keeps_cells(RESOLUTION)
@@ -141,7 +140,6 @@ def test_where_cells_align_merging_makes_the_map_of_all_points(seed, x, y, z, qu
 
 
 @given(seeds, st.floats(-9, 9), st.floats(-9, 9), st.floats(-9, 9), st.floats(-np.pi, np.pi))
-@settings(max_examples=50)
 def test_where_cells_do_not_align_the_points_as_a_whole_keep_number_mean_height_and_strength(seed, x, y, z, yaw):
     transform = LevelTransform(x, y, z, yaw)
     first, second = random_points(seed, 200, 4.0), random_points(seed + 1, 200, 4.0)

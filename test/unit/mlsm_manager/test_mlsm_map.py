@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import in_order, map_with, partition, random_map
 
@@ -162,7 +162,6 @@ def test_blocks_beyond_the_limit_are_counted_by_their_points():
 
 
 @given(st.integers(0, 2**31), st.lists(st.floats(-12, 12), min_size=4, max_size=4))
-@settings(max_examples=60)
 def test_a_box_holds_the_blocks_that_a_look_at_all_finds_in_the_same_order(seed, corners):
     low, high = np.minimum(corners[:2], corners[2:]), np.maximum(corners[:2], corners[2:])
     surface_map = random_map(seed, count=1500)

@@ -2,7 +2,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
@@ -50,7 +50,6 @@ def test_80_percent_of_a_command_are_reached_after_3_time_constants():
     assert vehicle.state(3.0).twist[0] == pytest.approx(0.8 * 0.8, rel=0.01)
 
 
-@settings(max_examples=30)
 @given(st.lists(st.tuples(st.integers(1, 60), *[st.floats(-2.0, 2.0)] * 4), min_size=1, max_size=6))
 def test_speed_and_acceleration_never_jump_whatever_is_commanded(commands):
     vehicle, twists = _vehicle(command_timeout=1.0), []

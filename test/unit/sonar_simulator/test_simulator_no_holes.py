@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from least_distance import nearest_range
 
@@ -88,7 +88,6 @@ def test_a_rope_between_the_rays_is_heard():
     assert faces[0] >= 12
 
 
-@settings(max_examples=50)
 @given(
     st.tuples(st.floats(2.0, 30.0), st.floats(-3.0, 3.0), st.floats(-5.0, 5.0)),
     st.tuples(*(st.floats(-math.pi, math.pi) for _ in range(3))),

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
@@ -67,7 +67,6 @@ def test_noise_lies_around_the_nearest_contact():
     assert ranges.mean() == pytest.approx(10.0, abs=1.5)
 
 
-@settings(max_examples=30)
 @given(st.floats(0.0, 255.0), st.floats(0.0, 255.0))
 def test_noise_never_leaves_0_to_127(mean, sd):
     strengths = _echoes(np.full(50, 25.0), noise_strength_mean=mean, noise_strength_sd=sd, noise_echoes=500)
