@@ -8,8 +8,8 @@ from typing import Dict, Type
 import numpy as np
 
 from node_support.headers import StampParameters
-from node_support.parameters import ParameterError, ParameterSet, parameter
-from sonar_simulator.echoes.echo_model import ECHO_MODELS, EchoModel
+from node_support.parameters import ParameterSet, parameter
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, EchoModel, EchoModelName
 from sonar_simulator.rays.ray_grid import Rays, contacts_of_grid
 from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
@@ -52,13 +52,8 @@ class GazeboSonarParameters(StampParameters):
         "sonar_servo_joint", "joint of /joint_states that tilts the sonar, for sensorAngle; empty: none", tunable=False,
         may_be_empty=True,
     )  # fmt: skip
-    echo_model: str = parameter("laser_cone", f"one of {', '.join(ECHO_MODELS)}", tunable=False)
+    echo_model: EchoModelName = parameter(EchoModelName.LASER_CONE, "how contacts become echoes", tunable=False)
     seed: int = parameter(1, "seed of all random numbers", low=0, high=2**31 - 1, tunable=False)
-
-    def check(self) -> None:
-        """Refuse an echo model that does not exist."""
-        if self.echo_model not in ECHO_MODELS:
-            raise ParameterError(f"echo_model = {self.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
 
 
 GROUPS: Dict[str, Type[ParameterSet]] = {name: kind.parameters for name, kind in ECHO_MODELS.items()}

@@ -1,10 +1,11 @@
 """The interface of echo models, and the table from which a parameter selects one."""
 
+from enum import Enum
 from typing import Any, Callable, Dict, Mapping, NamedTuple, Protocol, Type
 
 import numpy as np
 
-from node_support.parameters import ParameterError, ParameterSet
+from node_support.parameters import ParameterSet
 from sonar_simulator.echoes.physical import Physical, PhysicalParameters
 from sonar_simulator.echoes.thesis_models import Collision, CollisionParameters, LaserCone, LaserConeParameters
 from sonar_simulator.rays.beam_pattern import BeamPattern, RayPattern
@@ -33,19 +34,22 @@ class EchoModelKind(NamedTuple):
     build: Callable[[Any], EchoModel]
 
 
+class EchoModelName(Enum):
+    """Which model turns contacts into echoes."""
+
+    LASER_CONE = "laser_cone"
+    COLLISION = "collision"
+    PHYSICAL = "physical"
+
+
 ECHO_MODELS: Dict[str, EchoModelKind] = {
-    "laser_cone": EchoModelKind(LaserConeParameters, LaserCone),
-    "collision": EchoModelKind(CollisionParameters, Collision),
-    "physical": EchoModelKind(PhysicalParameters, Physical),
+    EchoModelName.LASER_CONE.value: EchoModelKind(LaserConeParameters, LaserCone),
+    EchoModelName.COLLISION.value: EchoModelKind(CollisionParameters, Collision),
+    EchoModelName.PHYSICAL.value: EchoModelKind(PhysicalParameters, Physical),
 }
 
 
 def make_echo_model(name: str, values: Mapping[str, Any]) -> EchoModel:
-    """Build the model called `name` from plain parameter values.
-
-    Raises ParameterError for a name or a value that is not allowed.
-    """
-    if name not in ECHO_MODELS:
-        raise ParameterError(f"echo_model = {name!r}: must be one of {', '.join(ECHO_MODELS)}")
+    """Build the model called `name` from plain parameter values; raises ParameterError for one that is not allowed."""
     kind = ECHO_MODELS[name]
     return kind.build(kind.parameters.from_mapping(values))

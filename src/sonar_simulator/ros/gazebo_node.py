@@ -103,7 +103,7 @@ class GazeboSonar:
         values = dict(rospy.get_param("~", {}))
         groups = {name: kind.from_group(name, values.pop(name, {})) for name, kind in GROUPS.items()}
         self._parameters = GazeboSonarParameters.from_mapping(values)
-        name = self._parameters.echo_model
+        name = self._parameters.echo_model.value
         self._beams = GazeboBeams(make_echo_model(name, groups[name].to_mapping()), self._parameters.seed)
         self._head = SonarHead(self._parameters.beams_per_turn, _ANY_TIME)
         self._next_beam = 0

@@ -7,6 +7,7 @@ from typing import Iterator, List, Optional, Sequence, Union
 import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
+from sonar_simulator.echoes.echo_model import EchoModelName
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead
 from sonar_simulator.vehicle.odometry import Estimate, NoOdometry, Odometry
 from sonar_simulator.vehicle.robot import Servo, ServoParameters, tilted
@@ -43,9 +44,7 @@ class SimulatorParameters(ParameterSet):
     script: str = parameter(
         "yaml/basin_tour.yaml", "the vehicle's moves; relative to the package's folder", tunable=False
     )
-    echo_model: str = parameter(
-        "laser_cone", "model that turns contacts into echoes: laser_cone, collision or physical", tunable=False
-    )
+    echo_model: EchoModelName = parameter(EchoModelName.LASER_CONE, "how contacts become echoes", tunable=False)
     drive: Drive = parameter(
         Drive.SCRIPT,
         "what moves the vehicle: the script, or commands (then the script only gives the start)",

@@ -48,16 +48,14 @@ class Settings:
         own = dict(values)
         groups = {name: kind.from_group(name, own.pop(name, {})) for name, kind in GROUPS.items()}
         simulator = SimulatorParameters.from_mapping(own)
-        if simulator.echo_model not in ECHO_MODELS:
-            raise ParameterError(f"echo_model = {simulator.echo_model!r}: must be one of {', '.join(ECHO_MODELS)}")
-        echo = groups[simulator.echo_model]
+        echo = groups[simulator.echo_model.value]
         parts = {name: group for name, group in groups.items() if name not in ECHO_MODELS}
         return cls(simulator=simulator, echo=echo, **parts)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return plain values, as `from_mapping` takes them; with only the selected echo model."""
         groups = {name: getattr(self, name) for name in GROUPS if name not in ECHO_MODELS}
-        groups[self.simulator.echo_model] = self.echo
+        groups[self.simulator.echo_model.value] = self.echo
         return {**self.simulator.to_mapping(), **{name: group.to_mapping() for name, group in groups.items()}}
 
 
@@ -80,7 +78,7 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
     `warn` receives a line for each part of the world that could not be loaded. Raises ParameterError.
     """
     parameters = settings.simulator
-    model = make_echo_model(parameters.echo_model, settings.echo.to_mapping())
+    model = make_echo_model(parameters.echo_model.value, settings.echo.to_mapping())
     script = _loaded(lambda: load_script(folder / Path(parameters.script).expanduser()))
     T_base_sonar = _loaded(lambda: robot.mount(BASE_FRAME, SONAR_FRAME))
     world = _loaded(lambda: _load_world(folder / Path(parameters.world).expanduser(), warn))

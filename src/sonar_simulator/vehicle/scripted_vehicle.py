@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any, List, Mapping, NamedTuple, Protocol, Sequence, Tuple, Union
 
 import numpy as np
-import yaml
 
 from node_support.geometry import pose_matrix
+from node_support.parameter_files import read_values
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 
@@ -215,12 +215,10 @@ _KEYS = ("start", "moves")
 def load_script(path: Union[str, Path]) -> VehicleScript:
     """Return the script in a file. Raises ScriptError, naming the file, if it cannot be read or followed."""
     try:
-        data = yaml.safe_load(Path(path).read_text(encoding="utf-8"))
-    except OSError as error:
-        raise ScriptError(f"{path}: {error.strerror}") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
-        raise ScriptError(f"{path}: not yaml: {' '.join(str(error).split())}") from error
-    if not isinstance(data, dict) or set(data) - set(_KEYS):
+        data = read_values(Path(path))
+    except ParameterError as error:
+        raise ScriptError(str(error)) from error
+    if set(data) - set(_KEYS):
         raise ScriptError(f"{path}: must hold the keys {' and '.join(_KEYS)} and no others")
     try:
         return VehicleScript.from_yaml_data(data.get("moves"), data.get("start"))

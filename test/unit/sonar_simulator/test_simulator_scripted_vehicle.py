@@ -159,7 +159,7 @@ def test_the_thesis_moves_are_4_3_and_minus_8_m_of_odometry():
     ("text", "reason"),
     [
         ("moves: [", "not yaml"),
-        ("- wait: 1", "must hold the keys start and moves"),
+        ("- wait: 1", "must hold lines of KEY: VALUE"),
         ("moves: [{wait: 1}]\nspeed: 2", "must hold the keys start and moves"),
         ("moves: [{wait: x}]", "entry 1: wait = 'x'"),
         ("moves: [{wait: 1}]\nstart: {depth: 2}", "start: depth = 2"),
