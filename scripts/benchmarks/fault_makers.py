@@ -9,7 +9,6 @@ from typing import Callable, Optional
 
 import numpy as np
 
-from benchmarks.tours import with_track
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, matrices
@@ -21,7 +20,7 @@ _LOUDEST = 127  # the sonars' own largest strength
 
 def _odometry(recording: Recording, poses: np.ndarray) -> Recording:
     """Return a recording of which the odometry said `poses` (m, 3)."""
-    return with_track(recording, Track(recording.track.times, poses))
+    return recording.with_track(Track(recording.track.times, poses))
 
 
 def _after(recording: Recording, at: float) -> np.ndarray:

@@ -17,8 +17,9 @@ import numpy as np
 from benchmarks import fault_makers as broken
 from benchmarks.fault_makers import Fault
 from benchmarks.harness import benchmark_parser, recorded
-from benchmarks.tours import simulated, with_track
+from benchmarks.tours import simulated
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import Recording, read_recording, track_between
 from mlsm_manager.offline.run_files import position_error
@@ -96,7 +97,7 @@ def source(name: str, seconds: float) -> Recording:
     """Return the beginning of an unbroken recording."""
     if name.endswith(_COMPASS):
         whole = source(name[: -len(_COMPASS)], seconds)
-        return with_track(whole, Track(whole.track.times, whole.track.poses * _HEADING))
+        return whole.with_track(Track(whole.track.times, whole.track.poses * _HEADING))
     if name == "marina":
         return shortened(read_recording(recorded("marina_first.bag"), Request()), seconds)
     return shortened(simulated("harbour_ahead_tour").with_dvl(1), seconds)
@@ -157,9 +158,8 @@ def outcome(found: MappedBag, whole: MappedBag) -> Outcome:
     )  # fmt: skip
 
 
-def _first_cause(trust: object) -> str:
-    causes = getattr(trust, "causes", ())
-    return causes[0].text if causes else "-"
+def _first_cause(trust: Trust) -> str:
+    return trust.causes[0].line(float(trust.times[0])) if trust.causes else "-"
 
 
 def main() -> None:

@@ -18,7 +18,7 @@ from benchmarks.harness import benchmark_parser, recorded
 from benchmarks.matching_figures import start_rows
 from benchmarks.paths import PathFigures, judged
 from benchmarks.scans import KINDS, SonarKind
-from benchmarks.tours import simulated, with_track
+from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TWINS
 from benchmarks.twins import twin_of
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
@@ -86,7 +86,7 @@ def _scaled_rows() -> Iterator[Tuple[str, Row]]:
 def _marina(factors: np.ndarray, _seed: int) -> Recording:
     """Return the recording with an odometry that reports so many times (3,) its poses."""
     recording = read_recording(recorded(_MARINA), Request(truth=_TRUTH))
-    return with_track(recording, Track(recording.track.times, recording.track.poses * factors))
+    return recording.with_track(Track(recording.track.times, recording.track.poses * factors))
 
 
 def _scaled(tour: str, error: float, seed: int) -> Recording:
@@ -103,7 +103,7 @@ def _head(world: str, kind: SonarKind, seed: int) -> Recording:
 
 def _compass(tour: str, seed: int) -> Recording:
     recording = simulated(f"{tour}_tour").with_dvl(seed, direction=0.0)
-    return with_track(recording, Track(recording.track.times, recording.track.poses * _HEADING))
+    return recording.with_track(Track(recording.track.times, recording.track.poses * _HEADING))
 
 
 def _twin(name: str, _seed: int) -> Recording:

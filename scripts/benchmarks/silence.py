@@ -13,7 +13,7 @@ import numpy as np
 
 from benchmarks.harness import benchmark_parser, recorded
 from benchmarks.paths import replay_input
-from benchmarks.tours import simulated, with_track
+from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording, read_recording
@@ -122,7 +122,7 @@ def marina(kind: OdometryKind) -> Tuple[str, Recording, Track]:
     recording = read_recording(recorded("marina_first.bag"), Request())
     whole = replayed(recording, OdometryKind.DVL)
     if kind is OdometryKind.HEADING:
-        recording = with_track(recording, Track(recording.track.times, recording.track.poses * [0.0, 0.0, 1.0]))
+        recording = recording.with_track(Track(recording.track.times, recording.track.poses * [0.0, 0.0, 1.0]))
     return "marina", recording, Track(whole.times, whole.corrected)
 
 

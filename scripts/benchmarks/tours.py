@@ -1,6 +1,5 @@
 """Simulated tours: what the sonar hears on them, and recordings of them with an odometry of one's choice."""
 
-from dataclasses import replace
 from typing import List, NamedTuple
 
 import numpy as np
@@ -11,7 +10,7 @@ from benchmarks.scans import RAYS, SonarKind
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse, matrices
+from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_simulator.simulation.simulation_setup import Settings, make_setup
 from sonar_simulator.vehicle.robot import RobotDescription
@@ -70,13 +69,3 @@ def simulated(name: str, kind: SonarKind = HEAD, seed: int = 1) -> Tour:
             beams.append(Beam(round(1e9 * time), "sonar", ping.angle, ping.strengths, setup.sonar.range_resolution))
     path, steps = Track(np.array(times), np.array(poses)), np.arange(times[0], times[-1], _STEP)
     return Tour(Track(steps, path.at(steps)), beams, setup.T_base_sonar)
-
-
-def with_track(recording: Recording, track: Track) -> Recording:
-    """Return a recording of which the odometry said `track`, at the same times."""
-    times = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
-    moves = matrices(composed(track.at(times), inverse(recording.track.at(times))))
-    beams = [
-        replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in zip(recording.beams, moves)
-    ]
-    return replace(recording, beams=beams, track=track)

@@ -1,4 +1,4 @@
-"""A small recording: a vehicle circles in a walled basin, without a simulator."""
+"""A small recording: a vehicle tours an angular basin, without a simulator."""
 
 import numpy as np
 
@@ -9,29 +9,45 @@ from sonar_processing.beams.beam import Beam, PlacedBeam
 
 SECONDS = 300.0
 _START = 1000.0
-_RADIUS, _WALL = 8.0, 20.0  # m
-_BINS, _RESOLUTION = 100, 0.3
-_BEAM, _STEP = 0.5, np.radians(12.0)
+_CORNERS = np.array(
+    [[-25.0, -18.0], [20.0, -18.0], [20.0, -6.0], [30.0, -6.0], [30.0, 20.0], [4.0, 20.0], [4.0, 14.0], [-25.0, 14.0]]
+)  # m
+_BINS, _RESOLUTION = 200, 0.3
+_BEAM, _STEP = 0.1, np.radians(3.6)
 
 
-def circling() -> Recording:
-    """Return 300 s of it, with a beam each half second and a pose each tenth."""
+def touring() -> Recording:
+    """Return 300 s of a vehicle that goes ahead on an ellipse, with a beam and a pose each tenth."""
     times = _START + np.arange(0.0, SECONDS + 0.05, 0.1)
-    angle = 2.0 * np.pi * (times - _START) / SECONDS
-    track = Track(times, np.column_stack([_RADIUS * np.cos(angle), _RADIUS * np.sin(angle), angle + np.pi / 2.0]))
-    beams = []
-    for number, time in enumerate(np.arange(_START + 1.0, _START + SECONDS - 1.0, _BEAM)):
-        pose, head = track.at(np.array(time)), number * _STEP
-        beam = Beam(round(1e9 * time), "sonar", head, _heard(pose, head), _RESOLUTION)
-        beams.append(PlacedBeam(beam, matrices(pose[np.newaxis])[0], True))
+    angle = 4.0 * np.pi * (times - _START) / SECONDS
+    x, y = 12.0 * np.cos(angle) - 2.0, 8.0 * np.sin(angle)
+    yaw = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))
+    track = Track(times, np.column_stack([x, y, yaw]))
+    stamps = np.arange(_START + 1.0, _START + SECONDS - 1.0, _BEAM)
+    poses, heads = track.at(stamps), _STEP * np.arange(len(stamps))
+    ranges = _ranges(poses[:, :2], poses[:, 2] + heads)
+    places = matrices(poses)
+    beams = [
+        PlacedBeam(Beam(round(1e9 * stamp), "sonar", head, _strengths(distance), _RESOLUTION), place, True)
+        for stamp, head, distance, place in zip(stamps, heads, ranges, places)
+    ]
     return Recording(beams, 0, track, None)
 
 
-def _heard(pose: np.ndarray, head: float) -> np.ndarray:
-    """Return strengths (bins,) of a beam in a square basin."""
-    ahead = np.array([np.cos(pose[2] + head), np.sin(pose[2] + head)])
-    away = np.where(ahead > 0.0, _WALL - pose[:2], _WALL + pose[:2]) / np.maximum(np.abs(ahead), 1e-9)
+def _ranges(origins: np.ndarray, bearings: np.ndarray) -> np.ndarray:
+    """Return the distances (n,) [m] of the walls from (n, 2) along bearings (n,) [rad]."""
+    ahead = np.column_stack([np.cos(bearings), np.sin(bearings)])[:, np.newaxis]
+    first, wall = _CORNERS - origins[:, np.newaxis], np.roll(_CORNERS, -1, axis=0) - _CORNERS
+    crossed = ahead[..., 0] * wall[:, 1] - ahead[..., 1] * wall[:, 0]
+    crossed = np.where(np.abs(crossed) < 1e-9, 1e-9, crossed)
+    along = (first[..., 0] * wall[:, 1] - first[..., 1] * wall[:, 0]) / crossed
+    share = (first[..., 0] * ahead[..., 1] - first[..., 1] * ahead[..., 0]) / crossed
+    return np.where((along > 0.0) & (share >= 0.0) & (share <= 1.0), along, np.inf).min(axis=1)
+
+
+def _strengths(distance: float) -> np.ndarray:
+    """Return strengths (bins,) of an echo at a distance [m]."""
     strengths = np.zeros(_BINS, dtype=np.uint8)
-    place = int(away.min() / _RESOLUTION)
+    place = min(int(distance / _RESOLUTION), _BINS - 3)
     strengths[place : place + 3] = 100
     return strengths

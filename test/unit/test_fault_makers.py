@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 from benchmarks.faults import faults
-from made_recordings import SECONDS, circling
+from made_recordings import SECONDS, touring
 
 from mlsm_manager.offline.recording import Recording
 
-WHOLE = circling()
+WHOLE = touring()
 FAULTS = {name: make for name, make in faults(SECONDS).items() if name != "nothing"}
 
 

@@ -2,17 +2,19 @@
 
 import threading
 import time as wall
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Callable, List, Mapping, Optional, Tuple
+from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.localisation.clouds import MapCloud
+from mlsm_manager.localisation.continuous_input import continuous_cloud, continuous_scan
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
+from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
 from mlsm_manager.scan_matching.scan import Matcher, Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
@@ -20,6 +22,7 @@ from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from node_support.errors import RefusedInput
+from node_support.geometry import composed
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
@@ -53,13 +56,21 @@ class Localiser:
     """Safe to use from several threads: a correction can be asked for while a scan is being matched."""
 
     def __init__(
-        self, estimator: Estimator, settings: LocaliserSettings, clock: Callable[[], float] = wall.monotonic
+        self,
+        estimator: Estimator,
+        settings: LocaliserSettings,
+        limits: MotionLimits,
+        clock: Callable[[], float] = wall.monotonic,
     ) -> None:
-        """`clock`: s, tells how long ago the newest scan came where the odometry has no stamps."""
+        """limits: of the odometry's steps; those beyond are left out.
+
+        clock: s, tells how long ago the newest scan came where the odometry has no stamps.
+        """
         self.estimator = estimator
         self._lock = threading.RLock()
         self._changes = 0
         self._live = LiveCorrection(settings.blend_time)
+        self._odometry = ContinuousOdometry(limits)
         self._clock = clock
         self._came: Optional[Tuple[float, float]] = None
         self._newest: Optional[Scan] = None
@@ -118,6 +129,7 @@ class Localiser:
         with self._lock:
             self.notice_time(scan.reference_time)
             self._changes += 1
+            reported, scan = scan, continuous_scan(self._odometry, scan)
             self._newest = scan
             self._came = scan.reference_time, self._clock()
             update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
@@ -128,14 +140,14 @@ class Localiser:
             if self._settings.map_input is MapInput.MATCHED:
                 clouds.append(self.estimator.add_cloud(MapCloud.of_scan(scan)))
             clouds += iter(self.estimator.add_waiting, None)
-        return ScanResult(update, clouds)
+        return ScanResult(replace(update, scan=reported), clouds)
 
     def take_cloud(self, cloud: MapCloud) -> CloudUpdate:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)
             self._changes += 1
-            return self.estimator.add_cloud(cloud)
+            return self.estimator.add_cloud(continuous_cloud(self._odometry, cloud))
 
     def take_points(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
@@ -145,7 +157,9 @@ class Localiser:
 
     def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
         """Return T_map_odom (3,) to be shown at `time` [s], when the odometry says T_odom_base (3,)."""
-        return self._live.sample(time, odometry)
+        self._odometry.take(Track(np.array([time]), odometry[np.newaxis]))
+        fix = self._odometry.fixes(np.array(time))
+        return composed(self._live.sample(time, composed(fix, odometry)), fix)
 
     def standing_correction(self, odometry: np.ndarray) -> np.ndarray:
         """Return T_map_odom (3,) to be shown now by an odometry without stamps, as a static transform is.
@@ -162,7 +176,12 @@ class Localiser:
     @property
     def last_correction(self) -> np.ndarray:
         """T_map_odom (3,) as the newest scan told it."""
-        return self.estimator.correction
+        return composed(self.estimator.correction, self._odometry.fixes(np.array(np.inf)))
+
+    @property
+    def steps(self) -> Sequence[Step]:
+        """What the odometry did that no vehicle does, oldest first; it was left out."""
+        return self._odometry.steps
 
     def notice_time(self, time: float) -> float:
         """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did."""
@@ -194,7 +213,8 @@ class Localiser:
     def follow(self, track: Track, time: float) -> None:
         """Bring the belief to `time` [s] by the odometry, which `track` knows from `silent_since` on."""
         with self._lock:
-            self.estimator.follow(track, time)
+            self._odometry.take(track)
+            self.estimator.follow(self._odometry.followed(track), time)
 
     def relocalise(self) -> Optional[ScanUpdate]:
         """Search the whole map for the newest scan, and take the place that is found as the vehicle's.
@@ -275,8 +295,9 @@ class Localiser:
         """
         with self._lock:
             belief, copies = self.estimator.belief, {one: self.estimator.map_of(one).begin_copy() for one in Layer}
-            keyframes = self.estimator.keyframes if run else {}
-            correction = self.estimator.correction.copy()
+            # After a step a run goes on only in this process, which knows it.
+            keyframes = self.estimator.keyframes if run and not self.steps else {}
+            correction = self.last_correction
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
         layers = {layer: finished(copy, self._lock) for layer, copy in copies.items()}
         return StoredMap(frame, layers, calibration, made, arrays, run)
@@ -313,4 +334,5 @@ class Localiser:
 
     def _forget_scans(self) -> None:
         self._live.clear()
+        self._odometry.clear()
         self._newest = self._came = self._resumed_at = None

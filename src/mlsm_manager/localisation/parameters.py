@@ -12,6 +12,7 @@ from mlsm_manager.localisation.joint import Assumed, Joint
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind, profile_values
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
+from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.scan_matching.distribution_matcher import EVERYWHERE, NEARBY, DistributionMatcher, MatcherLimits
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Matcher
@@ -81,7 +82,7 @@ class MapParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class LocaliserParameters(
-    ThesisMatcherParameters, EstimatorParameters, CarvingParameters, MapParameters
+    ThesisMatcherParameters, EstimatorParameters, CarvingParameters, MapParameters, MotionLimits
 ):  # fmt: skip
     """All that a localiser is made from."""
 
@@ -90,7 +91,7 @@ class LocaliserParameters(
         settings = self.localiser_settings()
         estimator = self._build_estimator(settings.matcher, sonar_in_base)
         estimator.matching = self.matches_from_start
-        return Localiser(estimator, settings)
+        return Localiser(estimator, settings, self.part(MotionLimits))
 
     def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
         given = self.map_settings(), self.part(OdometryErrors), matcher, sonar_in_base

@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import List, Optional, Sequence
 
+from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import MatchResult, Scan
 from mlsm_manager.self_check.verdict import Verdict
@@ -91,6 +92,13 @@ def report_turn(health: Health, seconds: float, longest: float) -> None:
     if seconds > longest:
         detail = f"{seconds:.0f} s, must be at most {longest:g} s where no speed is measured"
         health.problem("turns of the head too slow", f"{detail}; take larger steps, fewer samples or a shorter range")
+
+
+def report_steps(health: Health, steps: Sequence[Step], told: int) -> None:
+    """Warn of steps of the odometry that no vehicle makes; `told`: how many were told before."""
+    for step in steps[told:]:
+        detail = f"{step.text} at {step.time:.1f} s; the step is left out, check the odometry"
+        health.problem("steps of the odometry that no vehicle makes", detail)
 
 
 def report_verdicts(health: Health, verdicts: Sequence[Verdict]) -> None:

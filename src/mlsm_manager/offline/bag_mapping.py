@@ -12,6 +12,8 @@ from tqdm import tqdm
 
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
+from mlsm_manager.odometry.steps import MotionLimits
+from mlsm_manager.offline.causes import with_odometry_mended
 from mlsm_manager.offline.findings import Findings, Trust
 from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import Refined, refine, refitted_verdicts
@@ -21,6 +23,9 @@ from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.self_check.causes import ranked
+from mlsm_manager.self_check.echo_causes import echo_findings
+from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
@@ -59,16 +64,20 @@ class MappedBag:
 
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
+    recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
     odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
     named = options.odometry not in (None, OdometryKind.AUTO)
     if not named:
         odometry = odometry_of(recording, options.declared is MotionSource.STANDING)
     recording = recording.corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
-    with _bar(len(recording.beams), "beam", "echoes") as bar:
-        chain = options.chain
-        found = scans_of(recording, extractor) if chain is None else chain.scans(recording)
-        scans = whole_turns(options.bags[0], len(recording.beams), found, bar.update)
+    scans = _scans(recording, extractor, options)
+    echoes = echo_findings(scans, recording.sonar_in_base)
+    if options.fix_mount and echoes.mount != AS_TOLD:
+        recording = recording.mounted(echoes.mount.turn, echoes.mount.is_over)
+        scans = _scans(recording, extractor, options)
+        causes += [replace(cause, is_mended=True, turn=0.0) for cause in echoes.causes[:1]]
+        echoes = echo_findings(scans, recording.sonar_in_base)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
@@ -90,12 +99,20 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
             refitted = refitted_verdicts(replayed.solver, refined.batch)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted])
+    causes = ranked([*causes, *echoes.causes])
+    findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted], causes)
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
     return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
+
+
+def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:
+    with _bar(len(recording.beams), "beam", "echoes") as bar:
+        chain = options.chain
+        found = scans_of(recording, extractor) if chain is None else chain.scans(recording)
+        return whole_turns(options.bags[0], len(recording.beams), found, bar.update)
 
 
 def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:

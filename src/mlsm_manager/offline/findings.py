@@ -16,6 +16,7 @@ from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
+from mlsm_manager.self_check.causes import Cause, widened
 from mlsm_manager.self_check.headline import headline
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.odometry_checks import odometry_decided
@@ -111,18 +112,19 @@ class Calibration:
 class Trust:
     """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
 
-    matched: scans that were compared with the surfaces of others.
+    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked.
     """
 
     verdicts: List[Verdict]
     times: np.ndarray
     covariances: np.ndarray
     matched: int
+    causes: Sequence[Cause] = ()
 
     @property
     def line(self) -> str:
         """One line for people."""
-        return headline(self.verdicts, self.matched, float(self.deviations.max()))
+        return headline(self.verdicts, self.matched, float(self.deviations.max()), self.causes, float(self.times[0]))
 
     @property
     def deviations(self) -> np.ndarray:
@@ -153,11 +155,16 @@ class Trust:
         }
         minutes = per_minute(self.times, self.deviations)
         stated = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
-        return {"checks": checks, "deviation_per_minute": stated}
+        causes = [cause.to_mapping(float(self.times[0])) for cause in self.causes]
+        return {"causes": causes, "checks": checks, "deviation_per_minute": stated}
 
 
 def _trust(
-    replayed: Replayed, refined: Optional[Refined], calibration: Calibration, further: Sequence[Verdict]
+    replayed: Replayed,
+    refined: Optional[Refined],
+    calibration: Calibration,
+    further: Sequence[Verdict],
+    causes: Sequence[Cause],
 ) -> Trust:
     """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
     solver = replayed.solver
@@ -167,6 +174,7 @@ def _trust(
     if refined is None:
         path, solution, times = replayed.corrected, solver.solution, np.array([one.time for one in solver.estimates])
         covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
+        places = np.array([one.T_map_base[:2] for one in solver.estimates])
         expected = solver.expected_deviations(solver.estimates)
     else:
         path, solution, times = refined.poses, refined.solution, refined.batch.node_times
@@ -185,7 +193,8 @@ def _trust(
         *_halves(solver),
         *odometry_decided(replayed.hypotheses.doubt),
     ]
-    return Trust([*verdicts, *further], times, covariances, replayed.matched)
+    covariances = widened(covariances, times, places, causes)
+    return Trust([*verdicts, *further], times, covariances, replayed.matched, causes)
 
 
 def _radii(covariances: np.ndarray) -> np.ndarray:
@@ -232,14 +241,19 @@ class Findings:
     closing: Optional[LoopClosure] = None
 
     @classmethod
-    def of(cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict]) -> "Findings":
-        """Return what was found in a run that the joint solver has followed; `further`: what other checks say."""
+    def of(
+        cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict], causes: Sequence[Cause]
+    ) -> "Findings":
+        """Return what was found in a run that the joint solver has followed.
+
+        further: what other checks say. causes: of what is wrong, ranked.
+        """
         solver = replayed.solver
         if refined is None:
             calibration, closing = Calibration.found(solver, solver.estimates[-1]), None
         else:
             calibration, closing = Calibration.of_batch(solver, refined.batch), refined.closing
-        return cls(calibration, _trust(replayed, refined, calibration, further), closing)
+        return cls(calibration, _trust(replayed, refined, calibration, further, causes), closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""

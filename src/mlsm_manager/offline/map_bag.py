@@ -140,6 +140,10 @@ def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
         "how far the paths lie apart",
     )  # fmt: skip
     parser.add_argument(
+        "--fix-mount", action="store_true",
+        help="turn the sonar as the echoes tell, where they tell clearly that it is mounted otherwise than tf says",
+    )  # fmt: skip
+    parser.add_argument(
         "--no-calibrate", dest="calibrate", action="store_false",
         help="use sonar_delay and range_scale as they are set, without estimating how far they are off",
     )  # fmt: skip

@@ -65,6 +65,30 @@ class Recording:
         ]
         return replace(self, beams=beams, unplaced=self.unplaced + len(self.beams) - len(beams))
 
+    def with_track(self, track: Track) -> "Recording":
+        """Return the recording with another T_odom_base, which the beams follow."""
+        times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
+        moves = matrices(composed(track.at(times), inverse(self.track.at(times))))
+        beams = [
+            replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in zip(self.beams, moves)
+        ]
+        return replace(self, beams=beams, track=track)
+
+    def mounted(self, turn: float, is_over: bool) -> "Recording":
+        """Return the recording with the sonar turned by `turn` [rad] in base_link where it is, and the other way round
+        where `is_over`.
+        """
+        poses = self.track.at(np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9)
+        about = np.append(self.sonar_in_base, turn)
+        over = np.diag([1.0, -1.0, -1.0, 1.0]) if is_over else np.eye(4)
+        move = matrices(about[np.newaxis])[0] @ over @ matrices(inverse(np.append(about[:2], 0.0))[np.newaxis])[0]
+        there, back = matrices(poses) @ move, matrices(inverse(poses))
+        beams = [
+            replace(placed, T_target_sonar=one @ other @ placed.T_target_sonar)
+            for placed, one, other in zip(self.beams, there, back)
+        ]
+        return replace(self, beams=beams)
+
     @property
     def sonar_in_base(self) -> np.ndarray:
         """(2,) x y [m] of the sonar in base_link, from the first beam."""

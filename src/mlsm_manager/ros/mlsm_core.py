@@ -14,6 +14,7 @@ from mlsm_manager.localisation.updates import (
     ScanUpdate,
     report_cloud,
     report_scan,
+    report_steps,
     report_turn,
     report_verdicts,
 )
@@ -55,6 +56,7 @@ class MlsmCore:
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
         self._mounted = False
+        self._steps_told = 0
         self._z_down = ZDownSigns()
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
@@ -126,6 +128,8 @@ class MlsmCore:
         if taken.scan.loop:
             rospy.loginfo("%s: %s", self.health.name, taken.scan.loop)
         report_turn(self.health, scan.reference_time - scan.start, self._longest_turn)
+        report_steps(self.health, self._localiser.steps, self._steps_told)
+        self._steps_told = len(self._localiser.steps)
         report_verdicts(self.health, self._localiser.verdicts())
         self.health.show("odometry", self._localiser.odometry or self._live.current.odometry.value)
         self._publish_fix(taken.scan, cloud.stamp_ns)

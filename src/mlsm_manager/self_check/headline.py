@@ -4,32 +4,36 @@ from typing import Sequence
 
 import numpy as np
 
+from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Answer, Verdict
 
 _WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
 _FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds
 
 
-def headline(verdicts: Sequence[Verdict], matched: int, deviation: float) -> str:
+def headline(
+    verdicts: Sequence[Verdict], matched: int, deviation: float, causes: Sequence[Cause] = (), begin: float = 0.0
+) -> str:
     """Return what the checks of a run say.
 
-    matched: scans that were compared with the surfaces of others. deviation: m, the largest stated one, root of the
-    sum of both variances.
+    causes: of what is wrong, ranked, in a run that began at `begin` [s]. matched: scans that were compared with the
+    surfaces of others. deviation: m, the largest stated one, root of the sum of both variances.
     """
     by_answer = {answer: [one for one in verdicts if one.answer is answer] for answer in Answer}
     doubtful, missing = by_answer[Answer.DOUBTFUL], by_answer[Answer.NOT_MEASURED]
     within = f"position within {_WITHIN * deviation:.1f} m"
-    if doubtful:
-        return f"trust: DOUBTFUL: {'; '.join(one.text for one in doubtful)}; at best {within}"
+    wrong = [cause.line(begin) for cause in causes if not cause.is_mended]
+    mended = "".join(f"; mended: {cause.line(begin)}" for cause in causes if cause.is_mended)
+    if wrong or doubtful:
+        said = "; ".join([*wrong, *(one.text for one in doubtful)])
+        return f"trust: DOUBTFUL: {said}{mended}; at best {within}"
     reason = f"{matched} scans matched, {_FEWEST_MATCHED} needed" if matched < _FEWEST_MATCHED else ""
     if not by_answer[Answer.FINE]:
         reason = f"none of {len(verdicts)} checks had enough data"
     if reason:
-        return f"trust: NOT MEASURED: {reason}; nothing can be said of the position"
+        return f"trust: NOT MEASURED: {reason}; nothing can be said of the position{mended}"
     if missing:
-        names = ", ".join(one.name for one in missing)
-        count = len(by_answer[Answer.FINE])
-        return (
-            f"trust: {count} of {len(verdicts)} checks are fine, NOT MEASURED: {names}; {within} if these are fine too"
-        )
-    return f"trust: all {len(verdicts)} checks are fine, nothing contradicts: {within}"
+        names, count = ", ".join(one.name for one in missing), len(by_answer[Answer.FINE])
+        fine = f"{count} of {len(verdicts)} checks are fine, NOT MEASURED: {names}"
+        return f"trust: {fine}; {within} if these are fine too{mended}"
+    return f"trust: all {len(verdicts)} checks are fine, nothing contradicts: {within}{mended}"

@@ -193,3 +193,23 @@ def test_a_named_odometry_is_not_asked_for():
     for scan in SCANS[:3]:
         localiser.take_scan(without_positions(scan))
     assert localiser.odometry == ""
+
+
+@pytest.mark.parametrize("size", [30.0, 5.0])
+def test_a_jump_of_the_odometry_leaves_position_and_map_where_they_are(size):
+    jumped, whole = PARAMETERS.build_localiser(SONAR_IN_BASE), PARAMETERS.build_localiser(SONAR_IN_BASE)
+    moment = SCANS[4].reference_time + 3.0
+    for scan in SCANS[:9]:
+        after, track = scan.times > moment, scan.track
+        poses = track.poses + size * np.outer(track.times > moment, [1.0, 0.5, 0.0])
+        points = scan.points + size * np.outer(after, [1.0, 0.5, 0.0, 0.0])
+        update = jumped.take_scan(replace(scan, points=points, track=Track(track.times, poses))).scan
+        other = whole.take_scan(scan).scan
+        assert np.hypot(*(update.belief.theta - other.belief.theta)[:2]) < 0.5
+    (step,) = jumped.steps
+    assert step.time == pytest.approx(moment, abs=0.5)
+    now, pose = SCANS[8].reference_time, SCANS[8].reference_pose
+    places = [composed(one.correction(now + 1.0, odom), odom) for one, odom in (
+        (jumped, pose + size * np.array([1.0, 0.5, 0.0])), (whole, pose)
+    )]  # fmt: skip
+    assert np.hypot(*(places[0] - places[1])[:2]) < 0.5

@@ -11,6 +11,7 @@ from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, LocaliserParameters, MlsmCoreParameters
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
+from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.scan_matching.distribution_matcher import EVERYWHERE, NEARBY, DistributionMatcher, relocalised
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchStatus
@@ -145,7 +146,8 @@ class Clock:
 
 def test_under_an_odometry_without_stamps_a_fix_is_blended_in_and_then_holds():
     clock = Clock()
-    localiser = Localiser(PARAMETERS.build_localiser().estimator, PARAMETERS.localiser_settings(), clock)
+    settings = PARAMETERS.localiser_settings()
+    localiser = Localiser(PARAMETERS.build_localiser().estimator, settings, MotionLimits(), clock)
     np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))
     localiser.take_scan(scan_of(harbour(), still()))
     np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))

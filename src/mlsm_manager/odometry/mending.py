@@ -1,0 +1,83 @@
+"""A recorded odometry mended where it says of itself that it was wrong: held poses, steps of compass and position."""
+
+from typing import Iterator, List, NamedTuple, Tuple
+
+import numpy as np
+
+from mlsm_manager.odometry.steps import LEAST_STEP, ContinuousOdometry, MotionLimits, Step, StepKind, impossible_steps
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import rotated, wrapped
+
+_STANDS_FOR = 10.0  # s of equal poses: longer than any odometry waits between two of them
+_COURSE = 20.0  # s before and after a step in which the vehicle shows which way it goes against its heading
+_GOES = 1.0  # m in these: less does not tell a course
+_FOLLOWS = 0.5  # share of a step of the heading, halfway between a course that turns against it and one that does not
+
+
+class Mended(NamedTuple):
+    """track: without what no vehicle does. steps: that were left out. held: s, beginnings and ends of poses that were
+    held until they jumped to where the vehicle was.
+    """
+
+    track: Track
+    steps: List[Step]
+    held: List[Tuple[float, float]]
+
+
+def mended(track: Track, limits: MotionLimits) -> Mended:
+    """Return a track that a vehicle can have gone, and what was mended."""
+    track, held = _with_holds_bridged(track, limits)
+    track, compass = _with_headings_mended(track, limits)
+    odometry = ContinuousOdometry(limits)
+    odometry.take(track)
+    steps = sorted([*compass, *odometry.steps], key=lambda step: step.time)
+    return Mended(odometry.followed(track), steps, held)
+
+
+def standing_stretches(track: Track) -> Iterator[Tuple[int, int]]:
+    """Yield first and last number of stretches of ten seconds or more in which the pose does not change at all.
+
+    A heading that is measured trembles, so that a pose stands only where nobody measures it, or in a simulation.
+    """
+    same = np.concatenate([[False], (np.diff(track.poses, axis=0) == 0.0).all(axis=1), [False]])
+    for first, last in np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2):
+        if track.times[last] - track.times[first] >= _STANDS_FOR:
+            yield int(first), int(last)
+
+
+def _with_holds_bridged(track: Track, limits: MotionLimits) -> Tuple[Track, List[Tuple[float, float]]]:
+    """Leave out poses that stood until they jumped as far as a vehicle goes meanwhile."""
+    impossible, kept, held = set(impossible_steps(track, limits).tolist()), np.ones(len(track.times), dtype=bool), []
+    for first, last in standing_stretches(track):
+        if last + 1 in impossible:
+            seconds = float(track.times[last] - track.times[first])
+            if np.hypot(*(track.poses[last + 1] - track.poses[last])[:2]) <= limits.max_speed * seconds:
+                kept[first + 1 : last + 1] = False
+                held.append((float(track.times[first]), float(track.times[last])))
+    return Track(track.times[kept], track.poses[kept]), held
+
+
+def _with_headings_mended(track: Track, limits: MotionLimits) -> Tuple[Track, List[Step]]:
+    """Turn headings back after a step of the compass that positions did not follow: the course shows it."""
+    steps = []
+    for number in impossible_steps(track, limits):
+        move = track.poses[number] - track.poses[number - 1]
+        turn, time = float(wrapped(move[2])), float(track.times[number])
+        before = _course(track, time - _COURSE, float(track.times[number - 1]))
+        after = _course(track, time, time + _COURSE)
+        if wrapped(before - after) * np.sign(turn) > _FOLLOWS * abs(turn) and np.hypot(*move[:2]) < LEAST_STEP[0]:
+            poses = track.poses.copy()
+            poses[number:, 2] -= turn
+            track = Track(track.times, poses)
+            steps.append(Step(StepKind.COMPASS, time, float(np.hypot(*move[:2])), turn))
+    return track, steps
+
+
+def _course(track: Track, start: float, end: float) -> float:
+    """Return the direction [rad] in which the vehicle went against its heading; NaN where it hardly went."""
+    near = (track.times >= start) & (track.times <= end)
+    if np.count_nonzero(near) < 2:
+        return np.nan
+    poses = track.poses[near]
+    moves = rotated(np.diff(poses[:, :2], axis=0), -poses[:-1, 2]).sum(axis=0)
+    return float(np.arctan2(moves[1], moves[0])) if np.hypot(*moves) > _GOES else np.nan

@@ -1,0 +1,163 @@
+"""Odometry as a sequence of steps: those that no vehicle can make are found, and replaced by going on as before."""
+
+import threading
+from dataclasses import dataclass
+from enum import Enum
+from typing import List
+
+import numpy as np
+
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import composed, inverse, wrapped
+from node_support.parameters import ParameterSet, parameter
+
+LEAST_STEP = np.array([0.3, np.radians(4.0)])  # m, rad: less is noise of a DVL or compass
+_LARGEST_ACCELERATION = np.array([5.0, 3.0])  # m/s^2, rad/s^2: half of gravity; from rest to a turn in two seconds
+_OUTSTANDING = 8.0  # times the usual step around
+_AROUND = 10  # poses before and after that tell what is usual
+_AT_ZERO = 0.5  # m: where an odometry is that began again
+
+
+@dataclass(frozen=True)
+class MotionLimits(ParameterSet):
+    """What no vehicle can do."""
+
+    max_speed: float = parameter(
+        3.0, "odometry that steps faster is taken to have jumped: the step is left out, and said", unit="m/s", low=0.5,
+        high=100.0, tunable=False,
+    )  # fmt: skip
+    max_turn_rate: float = parameter(
+        2.0, "a heading that turns faster is taken to have jumped: the turn is left out, and said", unit="rad/s",
+        low=0.2, high=100.0, tunable=False,
+    )  # fmt: skip
+
+
+class StepKind(Enum):
+    """What an impossible step looks like."""
+
+    JUMPED = "odometry jumped by {size:.1f} m"
+    RESTARTED = "odometry started again from zero, {size:.1f} m off"
+    COMPASS = "compass stepped by {turn:.0f} deg"
+
+
+@dataclass(frozen=True)
+class Step:
+    """An impossible step. time: s, of the first pose after it. size: m. turn: rad."""
+
+    kind: StepKind
+    time: float
+    size: float
+    turn: float
+
+    @property
+    def text(self) -> str:
+        """What happened, without the time."""
+        return self.kind.value.format(size=self.size, turn=np.degrees(self.turn))
+
+
+class ContinuousOdometry:
+    """Follows T_odom_base and says what has to be put before it, so that it never jumps.
+
+    A step is left out in the vehicle's frame: it goes on with the speed of the step before. So positions and headings
+    after a step hang together as they were reported.
+
+    Safe to use from several threads: one gives it scans, another asks for what holds now.
+    """
+
+    def __init__(self, limits: MotionLimits) -> None:
+        self._limits = limits
+        self._lock = threading.Lock()
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, because time jumped."""
+        self.steps: List[Step] = []
+        self._begins: List[float] = []
+        self._starts = [-np.inf]
+        self._fixes = [np.zeros(3)]
+        self._newest = Track(np.zeros(1), np.zeros((1, 3)))
+        self._known = False
+        self._usual = self._expected = np.zeros(3)
+
+    def take(self, track: Track) -> None:
+        """Learn the poses of `track` that are newer than those known."""
+        with self._lock:
+            self._take(track)
+
+    def _take(self, track: Track) -> None:
+        if self._known:
+            newer = track.times > self._newest.times[-1]
+            if not newer.any():
+                return
+            times = np.append(self._newest.times, track.times[newer])
+            track = Track(times, np.concatenate([self._newest.poses, track.poses[newer]]))
+            known = len(self._newest.times)
+        else:
+            known = 1
+        for number in impossible_steps(track, self._limits):
+            if number >= known:
+                self._leave_out(track, number)
+        self._newest = Track(track.times[-_AROUND:], track.poses[-_AROUND:])
+        self._known = True
+
+    def _leave_out(self, track: Track, number: int) -> None:
+        """Let the odometry go on without the step to pose `number`."""
+        before, after = track.poses[number - 1], track.poses[number]
+        if number > 1 and track.times[number - 1] not in self._starts:
+            duration = track.times[number - 1] - track.times[number - 2]
+            share = min((track.times[number] - track.times[number - 1]) / duration, 1.0)
+            self._usual = share * composed(inverse(track.poses[number - 2]), before)
+        step = after - before
+        # Where the last pose was a step itself its place is known better than from a large step and back.
+        place = self._expected if self._starts[-1] == track.times[number - 1] else composed(self._fixes[-1], before)
+        self._expected = composed(place, self._usual)
+        fix = composed(self._expected, inverse(after))
+        self.steps.append(Step(_kind(after, step, self._limits), float(track.times[number]),
+                               float(np.hypot(*step[:2])), float(wrapped(step[2]))))  # fmt: skip
+        self._begins.append(float(track.times[number - 1]))
+        # The fix comes first: others search the starts.
+        self._fixes.append(fix)
+        self._starts.append(float(track.times[number]))
+
+    def fixes(self, times: np.ndarray) -> np.ndarray:
+        """Return T_continuous_odom (..., 3) at `times` (...) s."""
+        return np.array(self._fixes)[np.searchsorted(self._starts, times, side="right") - 1]
+
+    def followed(self, track: Track) -> Track:
+        """Return T_continuous_base of a track that was taken, without what was interpolated within a step."""
+        if not self.steps:
+            return track
+        within = np.zeros(len(track.times), dtype=bool)
+        for begin, step in zip(self._begins, self.steps):
+            within |= (track.times > begin) & (track.times < step.time)
+        times, poses = track.times[~within], track.poses[~within]
+        return Track(times, composed(self.fixes(times), poses)) if len(times) else track
+
+
+def impossible_steps(track: Track, limits: MotionLimits) -> np.ndarray:
+    """Return the numbers (k,) of the poses that no vehicle reaches from the one before.
+
+    The step is faster than the limits, or so fast between slow ones that no vehicle accelerates and stops so.
+    """
+    if len(track.times) < 2:
+        return np.empty(0, dtype=int)
+    durations = np.diff(track.times)[:, np.newaxis]
+    moves = np.diff(track.poses, axis=0)
+    steps = np.column_stack([np.hypot(*moves[:, :2].T), np.abs(wrapped(moves[:, 2]))])
+    speeds = steps / durations
+    beside = np.maximum(np.roll(speeds, 1, axis=0), np.roll(speeds, -1, axis=0))
+    beside[0], beside[-1] = speeds[min(1, len(speeds) - 1)], np.inf
+    sudden = speeds > beside + _LARGEST_ACCELERATION * durations
+    too_fast = speeds > np.array([limits.max_speed, limits.max_turn_rate])
+    found = (steps > LEAST_STEP) & (too_fast | sudden)
+    for number in np.flatnonzero(found.any(axis=1)):
+        near = np.delete(steps[max(number - _AROUND, 0) : number + _AROUND + 1], min(number, _AROUND), axis=0)
+        if len(near):
+            found[number] &= steps[number] > _OUTSTANDING * np.median(near, axis=0)
+    return np.flatnonzero(found.any(axis=1)) + 1
+
+
+def _kind(after: np.ndarray, step: np.ndarray, limits: MotionLimits) -> StepKind:
+    if np.hypot(*step[:2]) < LEAST_STEP[0]:
+        return StepKind.COMPASS
+    return StepKind.RESTARTED if np.hypot(*after[:2]) < _AT_ZERO else StepKind.JUMPED

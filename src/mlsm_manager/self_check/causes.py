@@ -1,0 +1,56 @@
+"""What is wrong with a run, when and by how much; the evidence ranks several."""
+
+from dataclasses import dataclass
+from typing import Any, Dict, Iterable, List, Sequence
+
+import numpy as np
+
+from mlsm_manager.self_check.verdict import moment
+
+
+@dataclass(frozen=True)
+class Cause:
+    """Something that is wrong with sonar, odometry or mounting.
+
+    text: what and how much, one clause. evidence: nats over "nothing is wrong". begin: s, when it began; NaN where it
+    holds for the whole run. is_mended: whether the run went on without it.
+    turn: rad, length: relative, metres: by how much the path from `begin` on may be turned, too long, and shifted.
+    """
+
+    text: str
+    evidence: float
+    begin: float = np.nan
+    is_mended: bool = False
+    turn: float = 0.0
+    length: float = 0.0
+    metres: float = 0.0
+
+    def to_mapping(self, run_begin: float) -> Dict[str, Any]:
+        """Return it for summary.json; run_begin: s."""
+        second = None if np.isnan(self.begin) else round(self.begin - run_begin, 1)
+        return {
+            "cause": self.text, "second": second, "evidence": round(self.evidence, 1), "mended": self.is_mended
+        }  # fmt: skip
+
+    def line(self, run_begin: float) -> str:
+        """Return it for people; run_begin: s."""
+        return self.text if np.isnan(self.begin) else f"{self.text} at {moment(self.begin, run_begin)}"
+
+
+def ranked(causes: Iterable[Cause]) -> List[Cause]:
+    """Return causes, those with most evidence first; what was mended comes last."""
+    return sorted(causes, key=lambda cause: (cause.is_mended, -cause.evidence))
+
+
+def widened(
+    covariances: np.ndarray, times: np.ndarray, places: np.ndarray, causes: Sequence[Cause]
+) -> np.ndarray:  # fmt: skip
+    """Return covariances (k, 2, 2) [m^2] of places (k, 2) [m] at `times` (k,) [s] with what causes add to them."""
+    added = np.zeros(len(times))
+    for cause in causes:
+        # A fit of the whole run bends what was before a cause, too, where the cause was not mended.
+        begin = cause.begin if cause.is_mended and not np.isnan(cause.begin) else times[0]
+        start = [np.interp(begin, times, places[:, axis]) for axis in (0, 1)]
+        way = np.hypot(*(places - start).T) * np.hypot(2.0 * np.sin(min(cause.turn, np.pi) / 2.0), cause.length)
+        added += np.where(times >= begin, way**2 + cause.metres**2, 0.0) / 2.0
+    return covariances + added[:, np.newaxis, np.newaxis] * np.eye(2)

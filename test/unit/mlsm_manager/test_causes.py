@@ -1,0 +1,101 @@
+"""What is wrong with a recording is found and named, and what a vehicle cannot have done is mended."""
+
+import numpy as np
+import pytest
+from benchmarks import fault_makers as broken
+from made_recordings import SECONDS, touring
+
+from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
+from mlsm_manager.offline.causes import with_odometry_mended
+from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import Cause, ranked, widened
+from mlsm_manager.self_check.echo_causes import echo_findings
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
+
+WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
+START = WHOLE.track.times[0]
+
+
+def found_in(recording):
+    extractor = EchoExtractor(EchoExtractorParameters())
+    return echo_findings([scan for scan, _ in scans_of(recording, extractor)], recording.sonar_in_base)
+
+
+@pytest.mark.parametrize(
+    ("recording", "said"),
+    [
+        (broken.odometry_jumps(WHOLE, MIDDLE, 30.0), "odometry jumped by 30"),
+        (broken.odometry_jumps(WHOLE, MIDDLE, 5.0), "odometry jumped by "),
+        (broken.odometry_restarts(WHOLE, MIDDLE), "odometry started again from zero"),
+        (broken.odometry_glitches(WHOLE, MIDDLE, 50.0), "odometry jumped by 50"),
+        (broken.compass_steps(WHOLE, MIDDLE, 20.0), "compass stepped by 20 deg"),
+        (broken.compass_steps(WHOLE, MIDDLE, -8.0), "compass stepped by -8 deg"),
+        (broken.compass_steps(WHOLE, MIDDLE, 20.0, positions_follow=False), "compass stepped by 20 deg"),
+        (broken.odometry_freezes(WHOLE, MIDDLE, 20.0, goes_on=False), "odometry held for 20 s, and then right again"),
+    ],
+)
+def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
+    mended, causes = with_odometry_mended(recording, LIMITS)
+    assert causes[0].text.startswith(said)
+    assert causes[0].is_mended
+    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
+    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
+    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+
+
+def test_many_steps_are_one_cause():
+    _, causes = with_odometry_mended(broken.odometry_jumps(WHOLE, 30.0, 1.0, every=30.0), LIMITS)
+    assert len(causes) == 1
+    assert causes[0].text.endswith("9 times, first")
+
+
+@pytest.mark.parametrize("noise", [0.0, 0.02])
+def test_an_odometry_without_steps_stays_as_it_is(noise):
+    poses = WHOLE.track.poses + noise * np.random.RandomState(0).normal(size=WHOLE.track.poses.shape)
+    recording = WHOLE.with_track(Track(WHOLE.track.times, poses))
+    mended, causes = with_odometry_mended(recording, LIMITS)
+    assert mended is recording
+    assert causes == []
+
+
+def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
+    recording = broken.odometry_missing(WHOLE, MIDDLE, 60.0)
+    assert not len(impossible_steps(recording.track, LIMITS))
+
+
+@pytest.mark.parametrize(
+    ("recording", "said"),
+    [
+        (broken.mount_turned(WHOLE, 180.0), "the sonar is turned by"),
+        (broken.mount_turned(WHOLE, -45.0), "the sonar is turned by -4"),
+        (broken.mount_upside_down(WHOLE), "the sonar is upside down"),
+        (broken.head_slips(WHOLE, MIDDLE, 40.0), "the head slipped by about"),
+        (broken.delayed(WHOLE, 8.0), "beams were sent"),
+    ],
+)
+def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said):
+    assert found_in(recording).causes[0].text.startswith(said)
+
+
+def test_nothing_is_named_where_nothing_is_wrong():
+    assert found_in(WHOLE).causes == []
+
+
+@pytest.mark.parametrize("fault", [lambda one: broken.mount_turned(one, 120.0), broken.mount_upside_down])
+def test_a_mount_that_is_put_right_has_no_cause_left(fault):
+    recording = fault(WHOLE)
+    mount = found_in(recording).mount
+    assert found_in(recording.mounted(mount.turn, mount.is_over)).causes == []
+
+
+def test_causes_are_ranked_by_evidence_and_what_was_mended_comes_last():
+    small, large, past = Cause("a", 5.0), Cause("b", 50.0), Cause("c", 1e3, is_mended=True)
+    assert ranked([past, small, large]) == [large, small, past]
+
+
+def test_a_cause_makes_what_comes_after_it_uncertain():
+    places, times = np.column_stack([np.arange(5.0), np.zeros(5)]), np.arange(5.0)
+    turned = Cause("turned", 20.0, begin=2.0, is_mended=True, turn=np.radians(60.0))
+    added = np.trace(widened(np.zeros((5, 2, 2)), times, places, [turned]), axis1=1, axis2=2)
+    np.testing.assert_allclose(np.sqrt(added), [0.0, 0.0, 0.0, 1.0, 2.0])
