@@ -5,13 +5,13 @@ dynamic_reconfigure description and a launch file.
 """
 
 import argparse
-import dataclasses
 import inspect
 import sys
 from pathlib import Path
 from typing import Dict, List, Type
 
 import yaml
+from from_2015 import from_2015_page
 
 from dead_reckoning.parameters import DeadReckoningParameters
 from imagenex_852_driver.emulated_852 import EmulatorParameters
@@ -20,7 +20,7 @@ from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, PROFILES, 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table, start_up_yaml
-from node_support.parameters import EXPERT, ParameterSet, config_name, describe
+from node_support.parameters import EXPERT, ParameterSet, config_name
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
 from sonar_processing.filters.stage_table import STAGES
@@ -124,7 +124,9 @@ def generated() -> Dict[Path, str]:
         texts[ROOT / f"cfg/{config_name(name)}.cfg"] = CONFIGURATION.format(**words)
         texts[ROOT / f"launch/{name}.launch"] = LAUNCH.format(**words)
     texts[ROOT / "docs/nodes.md"] = nodes_page()
-    texts[ROOT / "docs/from_2015.md"] = from_2015()
+    texts[ROOT / "docs/from_2015.md"] = from_2015_page(
+        LIVE_NODES, yaml.safe_load((ROOT / "yaml/thesis.yaml").read_text())
+    )
     return texts
 
 
@@ -151,31 +153,6 @@ def _setting(setting: Setting, indent: str) -> List[str]:
     return [f"{indent}# {setting.reason}", f"{indent}{setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
 
 
-FROM_2015 = """\
-# Coming from the package of 2015
-
-*Written by `scripts/document`; do not edit.*
-
-`thesis:=true`, an argument of `vehicle.launch`, `mapping.launch`, `play_bag.launch` and `demo.launch`, and `map_bag
---thesis` set everything as the thesis and its code have it. All of it stands in `yaml/thesis.yaml`, each line with the
-section of the thesis or the file of 2015 that it comes from.
-
-    roslaunch underwater_map_construction play_bag.launch bag:=old.bag thesis:=true
-"""
-
-
-def from_2015() -> str:
-    """Return docs/from_2015.md, with the table that pairs the parameter names of the thesis with ours."""
-    lines = [FROM_2015, "| node | thesis | here |", "| --- | --- | --- |"]
-    for name in sorted(LIVE_NODES):
-        for field in dataclasses.fields(LIVE_NODES[name]):
-            described = describe(field)
-            here = f"{EXPERT}/{field.name}" if described.expert else field.name
-            if described.thesis_name:
-                lines.append(f"| {name} | {described.thesis_name} | `{here}` |")
-    return "\n".join(lines) + "\n"
-
-
 def nodes_page() -> str:
     """Return docs/nodes.md: purpose, topics, services and parameters of every node."""
     sections = [_node_section(name, node, _parameter_tables(name)) for name, node in NODES.items()]
@@ -196,6 +173,8 @@ def _parameter_tables(node: str) -> Dict[str, str]:
     """Return the parameter tables of a node by their titles."""
     if node in LIVE_NODES:
         return {"Parameters": markdown_table(LIVE_NODES[node])}
+    if node not in START_UP_NODES:
+        return {}
     tables = {"Parameters": markdown_table(START_UP_NODES[node], live=False)}
     if node == "sonar_simulator":
         groups = {name: markdown_table(group, live=False) for name, group in GROUPS.items()}

@@ -70,7 +70,7 @@ def test_the_arguments_that_roslaunch_adds_do_not_hide_the_question():
 
 def test_every_node_is_described():
     programs = {
-        "convert_bag", "map_bag", "map_tool", "play_852", "play_bag", "record_852", "simulate_bag",
+        "convert_bag", "map_bag", "map_tool", "migrate_yaml", "play_852", "play_bag", "record_852", "simulate_bag",
     }  # fmt: skip
     assert {*NODES, *HOSTS, *programs} == set(EXECUTABLES)
 

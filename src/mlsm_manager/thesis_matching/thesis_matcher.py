@@ -33,7 +33,7 @@ class ThesisMatcherParameters(ParameterSet):
     )  # fmt: skip
     error_threshold: float = parameter(
         0.3, "THESIS: greatest error of a match that is accepted", unit="m", low=0.0, high=100.0,
-        thesis_name="errorThreshold", expert="as in the thesis, section 6.5.6",
+        expert="errorThreshold of the thesis, section 6.5.6, which only ended the iterations",
     )  # fmt: skip
     n_samples: int = parameter(
         5, "THESIS: places searched in the direction of movement", low=0, high=100, thesis_name="nSamples",

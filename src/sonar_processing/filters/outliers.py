@@ -23,19 +23,20 @@ class OutlierRemoverParameters(ParameterSet):
     """Parameters of outlier_remover."""
 
     mode: OutlierMode = parameter(OutlierMode.STATISTICAL, "which rule removes points", thesis_name="mode")
-    mean_k: int = parameter(20, "STATISTICAL: nearest neighbours whose mean distance counts", low=1, high=1000)
+    mean_k: int = parameter(
+        20, "STATISTICAL: nearest neighbours whose mean distance counts", low=1, high=1000, thesis_name="meanK"
+    )
     stddev_multiplier: float = parameter(
         1.0,
         "STATISTICAL: points are kept up to so many standard deviations above the mean of these distances",
-        low=0.0,
-        high=100.0,
-    )
+        low=0.0, high=100.0, thesis_name="stddevMulThresh",
+    )  # fmt: skip
     min_radius: float = parameter(
         1.0, "RADIUS: distance within which neighbours are counted", unit="m", low=0.001, high=1000.0,
         thesis_name="minRadius",
     )  # fmt: skip
     min_neighbors: int = parameter(
-        20, "RADIUS: a point with fewer neighbours is removed", low=1, high=10000, thesis_name="minNeighbors"
+        20, "RADIUS: a point with fewer neighbours is removed", low=1, high=10000, thesis_name="minNeighbours"
     )
 
 

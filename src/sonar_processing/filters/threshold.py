@@ -40,7 +40,7 @@ class ThresholderParameters(ParameterSet):
     )
     min_threshold: float = parameter(
         0.0, "the threshold is never below this", unit="echo strength", low=0.0, high=255.0,
-        thesis_name="minThresholdValue",
+        thesis_name="minThreshold",
     )  # fmt: skip
 
 

@@ -58,10 +58,15 @@ class ScanParameters(ParameterSet):
     target_frame: str = parameter("odom", "frame the clouds are placed in", tunable=False, thesis_name="targetFrame")
     min_range: float = parameter(0.5, "nearer bins are removed: there the head rings", unit="m", low=0.0, high=100.0)
     height_limit: float = parameter(
-        100.0, "points higher than this in the target frame are removed", unit="m", low=-12000.0, high=12000.0
+        100.0, "points higher than this in the target frame are removed", unit="m", low=-12000.0, high=12000.0,
+        thesis_name="heightLimit",
+    )  # fmt: skip
+    keep_organized: bool = parameter(
+        False, "one row per beam, with NaN in place of removed points", thesis_name="keepOrganized"
     )
-    keep_organized: bool = parameter(False, "one row per beam, with NaN in place of removed points")
-    dispersed_points: int = parameter(1, "points per bin, spread across the width of the beam", low=1, high=15)
+    dispersed_points: int = parameter(
+        1, "points per bin, spread across the width of the beam", low=1, high=15, thesis_name="dispersedPoints"
+    )
     beam_width: float = beam_width_parameter()
     laser_pick: LaserPick = parameter(
         LaserPick.STRONGEST, "the bin that LASER and the laser scan take: the strongest, or the first strong enough"
@@ -75,7 +80,10 @@ class ScanParameters(ParameterSet):
     )
     laser_scan_rays: int = parameter(0, "rays of the laser scan; 0: one for each step of the head", low=0, high=7200)
     velocity_topic: str = parameter(
-        topics.VELOCITY_COMMANDS, "topic with the velocity of the vehicle", tunable=False, thesis_name="velocityTopic"
+        topics.VELOCITY_COMMANDS,
+        "topic with the velocity of the vehicle",
+        tunable=False,
+        thesis_name="velSubscribeTopic",
     )
     velocity_type: VelocityType = parameter(VelocityType.TWIST, "type of the velocity topic", tunable=False)
     velocity_timeout: float = parameter(

@@ -1,0 +1,138 @@
+"""The table of the names of 2015 is true of this package, and migrate_yaml makes today's parameters by it."""
+
+import argparse
+import dataclasses
+import re
+from pathlib import Path
+
+import pytest
+import yaml
+from document import LIVE_NODES
+from test_live_parameters import launched
+
+from mlsm_manager.migrate_yaml import NODES, migrated, migrated_text
+from node_support import topics
+from node_support.help import HOSTS
+from node_support.names_2015 import KEYS, NAMES, Kind
+from node_support.node_table import NODES as DESCRIBED
+from node_support.parameters import ParameterError, describe
+
+ROOT = Path(__file__).resolve().parents[3]
+FILES = {
+    "MLSM_Core_default": {
+        "cloudSubscribeTopic": "/sonar/scan/cleaned", "resolution": 0.6, "sizeXMeters": 120, "fastUpdate": False,
+        "maxIterations": 10, "errorThreshold": 0.3,
+    },
+    "OutlierRemover_default": {"mode": "STATISTICAL", "stddevMulThresh": 0, "meanK": 100},
+    "SonarToCloud_default": {
+        "mode": "SONAR", "sonarSubscribeTopic": "/charle/sonar", "velSubscribeTopic": "/cmd_vel", "dispersedPoints": 10,
+    },
+    "Thresholder_default": {"mode": "OTSU", "keepOrganized": False},
+    "Wall2DDetector_default": {"mode": "RANSAC", "RANSACDistance": 0.1, "RANSACMaxIterations": 1000000},
+}  # fmt: skip
+"""As the files of 2015 are."""
+
+
+def named(kind):
+    return pytest.mark.parametrize("name", [one.here for one in NAMES if one.kind is kind and one.here])
+
+
+@named(Kind.NODE)
+def test_every_node_exists(name):
+    assert name in {**DESCRIBED, **HOSTS}
+
+
+@named(Kind.LAUNCH)
+def test_every_launch_file_exists(name):
+    assert (ROOT / "launch" / name).is_file()
+
+
+@named(Kind.TOPIC)
+def test_every_topic_exists(name):
+    known = [value for value in vars(topics).values() if isinstance(value, str)]
+    assert any(name == one or name.rpartition("/")[0] == one for one in known)
+
+
+@named(Kind.SERVICE)
+def test_every_service_exists(name):
+    node, _, service = name.partition("/")
+    assert f"~{service}" in [one.name for one in DESCRIBED[node].interfaces]
+
+
+@named(Kind.FIELD)
+def test_every_message_and_field_exists(name):
+    message, _, field = name.partition(".")
+    assert re.search(rf"\s{field}$" if field else "", (ROOT / f"msg/{message}.msg").read_text(), re.MULTILINE)
+
+
+@pytest.mark.parametrize("key", [key for key in KEYS if key.here], ids=lambda key: f"{key.owner} {key.key}")
+def test_the_default_of_2015_becomes_todays_parameter(key):
+    values = yaml.safe_load(migrated_text({key.owner: {key.key: key.before}}))[key.node]
+    assert NODES[key.node].from_mapping(values).to_mapping()[key.here] == key.before
+
+
+@pytest.mark.parametrize("key", [key for key in KEYS if not key.here], ids=lambda key: f"{key.owner} {key.key}")
+def test_what_has_no_counterpart_is_kept_as_a_comment_with_the_reason(key):
+    text = migrated_text({key.owner: {key.key: key.before}})
+    assert yaml.safe_load(text) == {key.node: {}}
+    assert f"# {key.key}: " in text
+    assert key.remark in text
+
+
+@pytest.mark.parametrize("node", [node for node in NODES if node != "sonar_control"])
+def test_the_dataclasses_name_the_same_keys(node):
+    told = {field.name: describe(field).thesis_name for field in dataclasses.fields(LIVE_NODES[node])}
+    table = {key.here: key.key for key in KEYS if key.node == node and key.here and key.key != "horizontalOpening"}
+    assert table == {name: thesis for name, thesis in told.items() if thesis}
+
+
+@pytest.mark.parametrize(
+    ("owner", "before", "after"),
+    [
+        ("SonarToCloud", "CONTLASER", "LASERCONT"), ("Thresholder", "OTSUPROPORTIONAL", "OTSU+PROPORTIONAL"),
+        ("Thresholder", "FIXED", "FIXED"), ("OutlierRemover", "NONE", "RADIUS"),
+    ],
+)  # fmt: skip
+def test_modes_were_found_by_their_parts(owner, before, after):
+    assert list(yaml.safe_load(migrated_text({owner: {"mode": before}})).values()) == [{"mode": after}]
+
+
+def written(folder, files):
+    for name, values in files.items():
+        (folder / f"{name}.yaml").write_text(yaml.safe_dump(values))
+    return argparse.Namespace(files=[folder / f"{name}.yaml" for name in files], out=folder / "out")
+
+
+def test_the_files_of_2015_become_one_that_the_nodes_take(tmp_path):
+    told = migrated(written(tmp_path, FILES))
+    assert told[0].endswith("12 of 18 values taken over, 6 kept as comments")
+    assert told[1].endswith("beams:=/charle/sonar")
+    found = launched("mapping.launch", "thesis:=true", f"parameters:={tmp_path / 'out/parameters.yaml'}")
+    assert (found["/mlsm_core/resolution"], found["/mlsm_core/match_resolution"]) == (0.6, 0.6)
+    assert found["/mlsm_core/expert/max_iterations"] == 10
+    assert (found["/outlier_remover/mean_k"], found["/line_detector/max_iterations"]) == (100, 1000000)
+    assert found["/mlsm_core/expert/error_threshold"] == 100.0
+
+
+def test_a_dump_names_its_nodes_and_a_file_of_another_name_tells_by_its_keys(tmp_path):
+    dump = {"ThresholderNodelet": {"minThreshold": 40}, "MLSM_core": {"nSamples": 3}}
+    migrated(written(tmp_path, {"dump": dump, "mine": {"meanK": 30}}))
+    found = yaml.safe_load((tmp_path / "out/parameters.yaml").read_text())
+    assert found == {
+        "thresholder": {"min_threshold": 40}, "mlsm_core": {"expert": {"n_samples": 3}},
+        "outlier_remover": {"mean_k": 30},
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("files", "said"),
+    [
+        ({"mine": {"mode": "OTSU"}}, "must be named as one of SonarToCloud"),
+        ({"Thresholder_default": {"minTreshold": 3}}, "minTreshold: no parameter of Thresholder"),
+        ({"OutlierRemover_default": {"meanK": 0}}, "mean_k = 0"),
+    ],
+)
+def test_what_it_cannot_understand_is_named_and_nothing_is_written(tmp_path, files, said):
+    with pytest.raises(ParameterError, match=said):
+        migrated(written(tmp_path, files))
+    assert not (tmp_path / "out").exists()
