@@ -43,6 +43,9 @@ goes over it. Without `thesis:=true` the defaults hold; the tables below say why
 - **Matching**: a scan that is matched goes into the map, as the thesis says; the code of 2015 left it out. `map ->
   odom` has a yaw, since still scans are turned too (6.5.6). What is corrected of the code stands in
   `src/mlsm_manager/thesis_matching/thesis_matcher.py`.
+- **CONT** publishes from the `scan_size`-th beam on, then with every beam.
+- **Old names** of topics, and the service `sonar_control`, are there with `thesis:=true`: the node
+  [thesis_topics](nodes.md#thesis_topics) offers them, among them `debug_cloud` and walls in PCL's convention.
 """
 _PARAMETERS = """\
 ## Parameters

@@ -58,6 +58,9 @@ _AS_POINTS = "also as PointCloud2 on `.../cloud`"
 DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second")
 """What every node publishes."""
 
+SERVO_2015 = "charle/sonar_to_base_link_position_controller"
+"""Namespace of the servo's controller in 2015."""
+
 NODES: Dict[str, NodeDescription] = {
     "imagenex_852_driver": NodeDescription(
         "Driver of the Imagenex 852 sonar (thesis 4.1.3, 4.5.1). See [the driver](imagenex_852_driver.md), also for "
@@ -203,6 +206,9 @@ NODES: Dict[str, NodeDescription] = {
             ),
             _publishes(topics.MATCHED_PATH, "nav_msgs/Path", "all fixes; latched"),
             _publishes(
+                topics.MATCHED_SCAN, "sensor_msgs/PointCloud2", "the newest scan as matching undistorts and places it"
+            ),
+            _publishes(
                 "tf", "", "`map -> odom` at `transform_rate`; it changes smoothly to a new fix within `blend_time`"
             ),
             _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scan"),
@@ -210,6 +216,24 @@ NODES: Dict[str, NodeDescription] = {
             _serves("~load_map", "LoadMap", "takes a map of `map_directory` in the place of the present one"),
             _serves("~reset_map", "std_srvs/Trigger", "discards the map, the position in it and the path"),
             _serves("~get_region", "GetRegion", "returns the blocks in a box"),
+        ),
+    ),
+    "thesis_topics": NodeDescription(
+        "Offers topics and a service under their names of 2015; `thesis:=true` starts it. See "
+        "[from 2015](from_2015.md#topics).",
+        (
+            _subscribes(topics.MATCHED_SCAN, "sensor_msgs/PointCloud2", "becomes `debug_cloud`"),
+            _publishes("debug_cloud", "sensor_msgs/PointCloud2", "the newest scan as matched, in map"),
+            _subscribes(topics.LINES, "sensor_msgs/PointCloud2", "becomes `sonar/walls/cloud`"),
+            _publishes("sonar/walls/cloud", "sensor_msgs/PointCloud2", "the inliers of all walls"),
+            _subscribes(f"{topics.LINES}/coefficients", "Walls", "becomes the next two"),
+            _publishes("sonar/walls/coeff", "Wall", "one wall a message"),
+            _publishes("sonar/walls/model", "ModelCoefficients", "one wall a message: point and direction, as PCL's"),
+            _subscribes(f"{SERVO_2015}/state", "control_msgs/JointControllerState", "becomes `joint_states`"),
+            _publishes(topics.JOINT_STATES, "sensor_msgs/JointState", "position of the joint that sonar_control tilts"),
+            _subscribes(topics.SERVO_COMMANDS, "std_msgs/Float64", "goal of the servo, rad"),
+            _publishes(f"{SERVO_2015}/command", "std_msgs/Float64", "the same goal"),
+            _serves("sonar_control", "SetScanMode", "calls `sonar_control/set_mode`"),
         ),
     ),
     "dead_reckoning": NodeDescription(

@@ -7,16 +7,17 @@ import rospy
 import tf2_ros
 from geometry_msgs.msg import PoseStamped, PoseWithCovarianceStamped, TransformStamped
 from nav_msgs.msg import Odometry, Path
+from sensor_msgs.msg import PointCloud2
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.scan_matching.scan import MatchResult
+from mlsm_manager.scan_matching.scan import MatchResult, Scan, corrected_points
 from mlsm_manager.scan_matching.scan_path import POSE
 from node_support import topics
 from node_support.headers import check_stamp
 from node_support.health import Health
 from node_support.ros.callbacks import every_clock_period
 from node_support.ros.transforms import pose_from_matrix
-from sonar_processing.ros.conversions import header
+from sonar_processing.ros.conversions import header, point_cloud
 
 _UNKNOWN_VARIANCE = 1e6  # m^2 and rad^2: what a filter such as robot_localization takes for "not measured"
 _ROS_AXES = np.array([0, 1, 5])  # x, y and yaw among the six axes of a covariance message
@@ -24,7 +25,10 @@ _LONGEST_PATH = 20000  # poses: four days of scans of 16 s, 1.5 MB
 
 
 class FixPublisher:
-    """Publishes /MLSM/pose, /MLSM/odometry and /MLSM/path; z, roll and pitch are those of tf and have no certainty."""
+    """Publishes /MLSM/pose, /MLSM/odometry, /MLSM/path and /MLSM/scan.
+
+    z, roll and pitch of poses are those of tf and have no certainty.
+    """
 
     def __init__(self, map_frame: str, base_frame: str) -> None:
         self._map_frame = map_frame
@@ -32,11 +36,17 @@ class FixPublisher:
         self._pose = rospy.Publisher(topics.MATCHED_POSE, PoseWithCovarianceStamped, queue_size=10)
         self._odometry = rospy.Publisher(topics.MATCHED_ODOMETRY, Odometry, queue_size=10)
         self._path = rospy.Publisher(topics.MATCHED_PATH, Path, queue_size=2, latch=True)
+        self._scan = rospy.Publisher(topics.MATCHED_SCAN, PointCloud2, queue_size=2)
         self._matched_path = Path()
 
     def clear(self) -> None:
         """Begin a new path."""
         self._matched_path = Path()
+
+    def show(self, scan: Scan, result: MatchResult, stamp_ns: int) -> None:
+        """Send a scan as a match undistorts and places it, accepted or not, to those who listen."""
+        if self._scan.get_num_connections():
+            self._scan.publish(point_cloud(corrected_points(scan, result), stamp_ns, self._map_frame))
 
     def publish(self, result: MatchResult, T_map_base: np.ndarray, stamp_ns: int) -> None:
         """Send the fix of a match; `T_map_base` is the matched pose with z, roll and pitch, (4, 4)."""

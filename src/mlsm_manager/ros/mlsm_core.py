@@ -189,7 +189,10 @@ class MlsmCore:
         report_cloud(self.health, update, self._localiser.block_count, self._live.current.map_limit)
 
     def _publish_fix(self, update: ScanUpdate, stamp_ns: int) -> None:
-        if update.result is not None and update.accepted:
+        if update.result is None:
+            return
+        self._fix.show(update.scan, update.result, stamp_ns)
+        if update.accepted:
             T_odom_base = self._odometry.matrix(update.scan.reference_time)
             T_map_base = matrices(update.result.correction(update.scan)) @ T_odom_base
             self._fix.publish(update.result, T_map_base, stamp_ns)

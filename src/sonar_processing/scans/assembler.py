@@ -52,8 +52,8 @@ class ScanAssembler:
 
         A scan ends after `scan_size` beams or when the next beam is expected where the scan began. It also ends when
         the servo moved or when the last beams of a turn were lost: then the new beam belongs to the next scan. In the
-        continuous modes every beam returns the newest `scan_size` beams. An unfinished scan before a long silence of
-        the head is forgotten: it would come long after its time.
+        continuous modes every beam returns the newest `scan_size` beams, once there are as many. An unfinished scan
+        before a long silence of the head is forgotten: it would come long after its time.
         """
         if self._last is not None and long_after(placed.beam, self._last):
             self.clear()
@@ -62,7 +62,8 @@ class ScanAssembler:
         self._turn.add(placed.beam.angle)
         if self.parameters.mode.is_continuous:
             self._newest.append(self._projected([placed]))
-            return self._cloud(list(self._newest), placed.beam)
+            full = len(self._newest) == self.parameters.scan_size
+            return self._cloud(list(self._newest), placed.beam) if full else None
         self._beams.append(placed)
         if finished is None and self._is_complete():
             finished = self._finish()

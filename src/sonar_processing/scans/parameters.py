@@ -50,7 +50,7 @@ class ScanParameters(ParameterSet):
 
     mode: ScanMode = parameter(
         ScanMode.SONAR,
-        "SONAR: all bins of a beam, LASER: one bin; with CONT: a cloud after every beam",
+        "SONAR: all bins of a beam, LASER: one bin; with CONT: from scan_size on a cloud after every beam",
         thesis_name="mode",
     )
     scan_size: int = parameter(120, "beams that make a scan", low=1, high=3600, thesis_name="scanSize")
