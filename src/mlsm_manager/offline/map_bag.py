@@ -10,6 +10,7 @@ from typing import Any, Dict, List
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text, replay_values
 from mlsm_manager.offline.run_files import REPORT, errors_of, write_run, write_summary, write_trajectory
@@ -33,6 +34,9 @@ def run_map_bag() -> None:
         if options.inspect:
             print("\n\n".join(report(survey(bag, options.request), options.request) for bag in options.bags))
             return
+        if options.each:
+            _map_each(options, sys.argv[1:])
+            return
         summary = map_bag(options)
     except (ParameterError, RecordingError) as error:
         sys.exit(f"map_bag: {error}")
@@ -41,6 +45,15 @@ def run_map_bag() -> None:
     except KeyboardInterrupt:
         sys.exit("map_bag: interrupted")
     print("\n".join(summary_lines(summary, options)))
+
+
+def _map_each(options: Namespace, arguments: List[str]) -> None:
+    """Map each recording by itself; ends with status 1 when one of them has no map. Raises RecordingError, OSError."""
+    outcomes = map_each(recordings_in(options.bags), options.out, options_of_one(arguments, options.bags))
+    without = [outcome for outcome in outcomes if not outcome.summary]
+    print(f"{len(outcomes) - len(without)} of {len(outcomes)} mapped; {options.out / INDEX} shows them")
+    if without:
+        sys.exit("\n".join(f"map_bag: {outcome.job.recording}: no map: {outcome.problem}" for outcome in without))
 
 
 def map_bag(options: Namespace) -> Dict[str, Any]:
@@ -81,7 +94,9 @@ def _write_report(folder: Path, mission: Mission) -> None:
 
 
 _EPILOG = "docs/map_bag.md describes the options, what is written, and how a vehicle is calibrated by it."
-_USAGE = "map_bag BAG [BAG ...] --out DIR [options]\n       map_bag BAG --inspect [options]"
+_USAGE = """map_bag BAG [BAG ...] --out DIR [options]
+       map_bag --each BAG|FOLDER ... --out DIR [options]
+       map_bag BAG --inspect [options]"""
 
 
 def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
@@ -114,6 +129,11 @@ def _parser() -> CommandLine:
         "those before",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to; created if missing")
+    parser.add_argument(
+        "--each", action="store_true",
+        help="map every recording by itself, those in folders too, on all cores; goes on after a bad one, keeps maps "
+        "that are there, and writes index.html",
+    )  # fmt: skip
     parser.add_argument("--inspect", action="store_true", help="say what a bag holds, and write nothing")
     _add_solving_arguments(parser)
     parser.add_argument(
@@ -158,11 +178,14 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
 
     Of a vehicle of whose motion nothing is known the odometry is none.
     """
-    if options.refine and len(options.bags) > 1:
+    if options.each:
+        if options.inspect or options.vehicle or options.scheduler:
+            parser.error("--each goes with neither --inspect, --vehicle nor --scheduler")
+    elif options.refine and len(options.bags) > 1:
         parser.error("--refine fits one recording, not several")
     if options.check and not options.refine:
         parser.error("--check repeats the fit of --refine; give both")
-    if options.thesis and len(options.bags) > 1:
+    if options.thesis and len(options.bags) > 1 and not options.each:
         parser.error("--thesis maps one recording, not several")
     if options.out is None and not options.inspect:
         parser.error("--out is required, unless --inspect is given")

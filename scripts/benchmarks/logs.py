@@ -1,0 +1,65 @@
+"""Maps each recording of a folder as it is, and prints a row: is its map as sharp as its best single sweep?"""
+
+from pathlib import Path
+from typing import List
+
+import numpy as np
+
+from benchmarks.harness import benchmark_parser
+from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.each import recordings_in
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.recording import read_recording
+from recordings.bags.bag import RecordingError
+
+_METRE = 1.0  # m: a surface has about one such cell for each metre of its length
+
+
+def _cells(places: np.ndarray, side: float) -> int:
+    """Return how many cells of a side [m] hold some of the places (n, 2)."""
+    return len(np.unique(np.floor(places / side), axis=0))
+
+
+def blocks_per_metre(places: np.ndarray, side: float) -> float:
+    """Return how many blocks of a side [m] surfaces have for each metre, NaN where there are none.
+
+    places: (n, 2) m, of echoes or blocks. Thin surfaces have about one metre over the side, blurred ones more.
+    """
+    return _cells(places, side) / _cells(places, _METRE) if len(places) else np.nan
+
+
+def row(name: str, mapped: MappedBag) -> str:
+    """Return the row of a recording that was mapped."""
+    blocks, run = mapped.run.stored.shown, mapped.run
+    single = [blocks_per_metre(scan.points[:, :2], blocks.resolution) for scan in mapped.replayed.scans]
+    most = int(np.argmax([len(scan.points) for scan in mapped.replayed.scans]))
+    wander = np.linalg.norm(run.best[:, :2] - run.best[0, :2], axis=1).max()
+    sharp = blocks_per_metre(blocks.mean[:, :2], blocks.resolution)
+    return (
+        f"{name:32} {len(single):5} {mapped.replayed.matched:7} {len(blocks):6} {sharp:9.2f} {single[most]:7.2f} "
+        f"{wander:7.2f} {mapped.odometry.name:9} {'' if mapped.findings is None else mapped.findings.trust.line}"
+    )
+
+
+def print_rows(folders: List[Path], options: List[str]) -> None:
+    """Print a row for each recording in folders, or why it has no map."""
+    print(f"{'recording':32} scans matched blocks blocks/m  sweep  wander odometry  trust")
+    for path in recordings_in(folders):
+        try:
+            parsed = map_bag_arguments([str(path), "--out", "nowhere", *options])
+            print(row(path.name, mapped_bag(read_recording(path, parsed.request), parsed)), flush=True)
+        except (RecordingError, OSError) as error:
+            print(f"{path.name:32} no map: {error}", flush=True)
+
+
+def main() -> None:
+    """Print the table, line by line."""
+    parser = benchmark_parser("logs", __doc__)
+    parser.add_argument("folders", type=Path, nargs="+", help="folders, or recordings")
+    parser.add_argument("--live", action="store_true", help="without --refine")
+    arguments = parser.parse_args()
+    print_rows(arguments.folders, [] if arguments.live else ["--refine"])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,149 @@
+"""Maps many recordings, each by itself in a process of its own, into one folder with an index."""
+
+import html
+import json
+import os
+import signal
+import subprocess
+import sys
+from concurrent.futures import ThreadPoolExecutor, as_completed
+from pathlib import Path
+from typing import Any, Dict, Iterable, List, NamedTuple, Sequence
+
+from node_support.files import make_folder, write_whole
+from recordings.bags.bag import RecordingError
+from recordings.makers_logs import is_makers_log
+
+INDEX = "index.html"
+_SUFFIXES = (".bag", ".mcap", ".db3")
+_METADATA = "metadata.yaml"  # of a ROS 2 folder
+_MESSAGES = "messages.txt"
+_SUMMARY = "summary.json"
+_COLUMNS = ("recording", "result", "scans", "blocks", "odometry", "trust", "s")
+
+
+class Job(NamedTuple):
+    """One recording and the folder of its map."""
+
+    recording: Path
+    folder: Path
+
+
+class Outcome(NamedTuple):
+    """What became of a job: its summary, empty where there is no map, and one line that says why."""
+
+    job: Job
+    summary: Dict[str, Any]
+    problem: str
+
+    @property
+    def cells(self) -> List[str]:
+        """The row of the index, without the picture, in the order of its columns."""
+        own = self.summary
+        if not own:
+            return [str(self.job.recording), self.problem, "", "", "", "", ""]
+        odometry = f"{own['odometry']['profile']}, because {own['odometry']['reason']}"
+        figures = [str(own[key]) for key in ("scans", "blocks")]
+        return [str(self.job.recording), "mapped", *figures, odometry, own.get("trust", ""), f"{own['seconds']:.0f}"]
+
+
+def recordings_in(paths: Iterable[Path]) -> List[Path]:
+    """Return the recordings among files, and in folders at any depth. Raises RecordingError where there is none."""
+    found: List[Path] = []
+    for path in paths:
+        if path.is_dir() and not (path / _METADATA).is_file():
+            found += sorted(one for one in path.rglob("*") if _is_recording(one))
+        else:
+            found.append(path)
+    unique = list(dict.fromkeys(found))
+    if not unique:
+        raise RecordingError(f"no recording in {', '.join(map(str, paths))}")
+    return unique
+
+
+def _is_recording(path: Path) -> bool:
+    if path.is_dir():
+        return (path / _METADATA).is_file()
+    in_folder = (path.parent / _METADATA).is_file()
+    return path.is_file() and not in_folder and (path.suffix.lower() in _SUFFIXES or is_makers_log(path))
+
+
+def options_of_one(arguments: Sequence[str], recordings: Sequence[Path]) -> List[str]:
+    """Return the command line without the recordings, --each and --out: what is said of each of them."""
+    words, kept = iter(arguments), []
+    for word in words:
+        if word == "--out":
+            next(words, None)
+        elif word != "--each" and not word.startswith("--out=") and Path(word) not in recordings:
+            kept.append(word)
+    return kept
+
+
+def map_each(recordings: Sequence[Path], out: Path, options: Sequence[str]) -> List[Outcome]:
+    """Map each recording as `map_bag RECORDING --out FOLDER` with `options` does, on all cores; what is there stays.
+
+    The index is written anew after each of them. Raises OSError where `out` cannot be written.
+    """
+    make_folder(out)
+    jobs = _jobs(recordings, out)
+    outcomes: Dict[Job, Outcome] = {}
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        running = [threads.submit(_mapped, job, options) for job in jobs]
+        try:
+            for one in as_completed(running):
+                outcome = one.result()
+                outcomes[outcome.job] = outcome
+                print(f"{len(outcomes)}/{len(jobs)} {outcome.job.recording}: {outcome.problem or 'mapped'}", flush=True)
+                write_whole(out / INDEX, _index([outcomes[job] for job in jobs if job in outcomes]).encode())
+        except BaseException:
+            for one in running:
+                one.cancel()
+            raise
+    return [outcomes[job] for job in jobs]
+
+
+def _jobs(recordings: Sequence[Path], out: Path) -> List[Job]:
+    """Return a job for each recording; of equal names the second and further ones get a number."""
+    taken: Dict[str, int] = {}
+    jobs = []
+    for recording in recordings:
+        name = recording.stem
+        taken[name] = taken.get(name, 0) + 1
+        jobs.append(Job(recording, out / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
+    return jobs
+
+
+def _mapped(job: Job, options: Sequence[str]) -> Outcome:
+    """Run map_bag for one recording, unless its map is there; its messages stand in its folder."""
+    if not all((job.folder / name).is_file() for name in (_SUMMARY, _MESSAGES)):
+        make_folder(job.folder)
+        words = [sys.executable, sys.argv[0], str(job.recording), "--out", str(job.folder), *options]
+        done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+        if done.returncode:
+            return Outcome(job, {}, _problem(done))
+        # Last, for a folder without it is mapped anew.
+        write_whole(job.folder / _MESSAGES, done.stdout)
+    return Outcome(job, json.loads((job.folder / _SUMMARY).read_text()), "")
+
+
+def _problem(done: "subprocess.CompletedProcess[bytes]") -> str:
+    if done.returncode < 0:
+        return f"ended by {signal.Signals(-done.returncode).name}"
+    lines = done.stdout.decode(errors="replace").strip().splitlines()
+    return lines[-1] if lines else f"ended with status {done.returncode}"
+
+
+def _index(outcomes: Iterable[Outcome]) -> str:
+    """Return the page: a row with the picture of each map, or with the reason why there is none."""
+    head = "".join(f"<th>{name}</th>" for name in ("map", *_COLUMNS))
+    return (
+        '<!DOCTYPE html><meta charset="utf-8"><title>Maps</title><style>body{font-family:sans-serif}'
+        "td,th{border-bottom:1px solid #ccc;padding:.4em;text-align:left;vertical-align:top}</style>"
+        f"<table><tr>{head}</tr>{''.join(map(_row, outcomes))}</table>\n"
+    )
+
+
+def _row(outcome: Outcome) -> str:
+    folder = html.escape(outcome.job.folder.name)
+    picture = f'<a href="{folder}/"><img src="{folder}/map.png" width="240"></a>' if outcome.summary else ""
+    return f"<tr><td>{picture}</td>{''.join(f'<td>{html.escape(cell)}</td>' for cell in outcome.cells)}</tr>\n"

@@ -1,0 +1,55 @@
+"""Many recordings are mapped by themselves; a bad one costs no other, and what is there stays."""
+
+import shutil
+import sys
+from pathlib import Path
+
+import pytest
+
+from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
+from recordings.bags.bag import RecordingError
+
+ROOT = Path(__file__).resolve().parents[3]
+
+
+def test_recordings_are_found_in_folders_and_nothing_else_is(tmp_path):
+    for name in ("one/b.bag", "one/a.MCAP", "one/notes.txt", "one/deep/x.852", "one/deep/firmware.bin"):
+        path = tmp_path / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_bytes(b"-")
+    (tmp_path / "ros2").mkdir()
+    for name in ("metadata.yaml", "ros2_0.db3"):
+        (tmp_path / "ros2" / name).write_bytes(b"-")
+    found = recordings_in([tmp_path, tmp_path / "named.xyz", tmp_path / "one" / "b.bag"])
+    names = [one.relative_to(tmp_path).as_posix() for one in found]
+    assert names == ["one/a.MCAP", "one/b.bag", "one/deep/x.852", "ros2", "named.xyz"]
+
+
+def test_folders_without_a_recording_are_refused(tmp_path):
+    with pytest.raises(RecordingError, match="no recording in"):
+        recordings_in([tmp_path])
+
+
+def test_every_recording_is_mapped_with_the_other_options():
+    words = ["--each", "a.bag", "./b.bag", "--out", "maps", "--refine", "--set", "min_range=1", "--out=maps"]
+    assert options_of_one(words, [Path("a.bag"), Path("b.bag")]) == ["--refine", "--set", "min_range=1"]
+
+
+def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr(sys, "argv", [str(ROOT / "nodes/map_bag")])
+    good, same, bad = ROOT / "test/data/basin.bag", tmp_path / "basin.bag", tmp_path / "bad.bag"
+    shutil.copy(good, same)
+    bad.write_bytes(b"no bag")
+    out = tmp_path / "maps"
+    first = map_each([good, bad, same], out, [])
+    assert [bool(outcome.summary) for outcome in first] == [True, False, True]
+    assert "not a bag, or damaged" in first[1].problem
+    assert (out / "basin/map.ply").read_bytes() == (out / "basin_2/map.ply").read_bytes()
+    page = (out / INDEX).read_text()
+    assert page.count("<img") == 2
+    assert "not a bag, or damaged" in page
+    written = (out / "basin/summary.json").stat().st_mtime_ns
+    again = map_each([good, bad, same], out, [])
+    assert [outcome.cells for outcome in again] == [outcome.cells for outcome in first]
+    assert (out / "basin/summary.json").stat().st_mtime_ns == written
+    assert "3/3" in capsys.readouterr().out
