@@ -1,0 +1,67 @@
+#!/usr/bin/env python3
+"""play_bag.launch maps a recording by itself, whatever else it holds, and though the mapping stands still."""
+
+import os
+import signal
+import threading
+import unittest
+import xmlrpc.client
+from contextlib import ExitStack
+
+import rosbag
+import rosgraph
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph import TEST_DATA, Diagnostics, Inbox, launched, run
+from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import PointCloud2
+
+BAG = TEST_DATA / "basin.bag"
+STOP = 2.0  # s: as a busy machine stops a process
+
+
+class PlayBag(unittest.TestCase):
+    """Plays a recording of three minutes in fifteen seconds, and waits for what the launch file alone brings about."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.maps, cls.clocks = Inbox("/MLSM/cloud", PointCloud2), Inbox("/clock", Clock)
+        cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
+        playback = ExitStack()
+        cls.addClassCleanup(playback.close)
+        arguments = (f"bag:={BAG}", "rate:=12", "matching:=true", "rviz:=false")
+        playback.enter_context(launched("play_bag.launch", *arguments))
+        with rosbag.Bag(str(BAG)) as bag:
+            cls.beams = bag.get_message_count("/sonar/raw")
+        for placed in (1, cls.beams // 2, cls.beams - 150):
+            cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", placed)
+            stop("/mapping")
+
+    def test_a_map_grows_and_scans_are_matched(self) -> None:
+        self.fixes.wait_for_number(2)
+        self.maps.wait_for(lambda cloud: cloud.width > 300)
+
+    def test_every_beam_is_placed_though_the_mapping_stands_still_for_two_seconds(self) -> None:
+        self.diagnostics.wait_for("sonar_to_cloud", "beams placed", self.beams)
+
+    def test_the_clock_never_stands_still(self) -> None:
+        """It goes on in steps of 10 ms of wall time while messages are played."""
+        times = [message.clock.to_sec() for message in self.clocks.wait_for_number(500)]
+        steps = [later - earlier for earlier, later in zip(times, times[1:])]
+        self.assertGreater(min(steps), 0.0)
+        self.assertLess(max(steps), 0.3)
+
+
+def stop(node: str) -> None:
+    """Stop a node's process for two seconds."""
+    uri = rosgraph.Master("/play_bag_test").lookupNode(node)
+    _, _, process = xmlrpc.client.ServerProxy(uri).getPid("/play_bag_test")
+    os.kill(process, signal.SIGSTOP)
+    try:
+        threading.Event().wait(STOP)
+    finally:
+        os.kill(process, signal.SIGCONT)
+
+
+if __name__ == "__main__":
+    # rospy itself takes one tick of the clock at a time, and drops the others that come meanwhile.
+    run(PlayBag, disable_rostime=True)
