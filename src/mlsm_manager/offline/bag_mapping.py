@@ -23,10 +23,12 @@ from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import ranked
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
+from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from recordings.motion.vehicle_motion import MotionSource
@@ -99,7 +101,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
             refitted = refitted_verdicts(replayed.solver, refined.batch)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    causes = ranked([*causes, *echoes.causes])
+    causes = ranked([*causes, *echoes.causes, *beam_causes(recording.beams), *standing_causes(scans, recording.track)])
     findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted], causes)
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)

@@ -9,17 +9,22 @@ from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
 from mlsm_manager.offline.causes import with_odometry_mended
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
+from mlsm_manager.self_check.standing import standing_causes
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START = WHOLE.track.times[0]
 
 
+def scans_in(recording):
+    return [scan for scan, _ in scans_of(recording, EchoExtractor(EchoExtractorParameters()))]
+
+
 def found_in(recording):
-    extractor = EchoExtractor(EchoExtractorParameters())
-    return echo_findings([scan for scan, _ in scans_of(recording, extractor)], recording.sonar_in_base)
+    return echo_findings(scans_in(recording), recording.sonar_in_base)
 
 
 @pytest.mark.parametrize(
@@ -80,6 +85,32 @@ def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said)
 
 def test_nothing_is_named_where_nothing_is_wrong():
     assert found_in(WHOLE).causes == []
+    assert beam_causes(WHOLE.beams) == []
+    assert standing_causes(scans_in(WHOLE), WHOLE.track) == []
+
+
+@pytest.mark.parametrize(
+    ("recording", "said", "after"),
+    [
+        (broken.head_stops(WHOLE, MIDDLE, 60.0), "the head stood for 60 s", MIDDLE),
+        (broken.head_stops(WHOLE, MIDDLE, 60.0, tells=False), "the head stood for ", MIDDLE),
+        (broken.gain_changed(WHOLE, MIDDLE, 0.3), "the gain changed: echoes are 0.3 times as strong", MIDDLE),
+        (broken.half_blind(WHOLE), "the sonar hears nothing in 170 deg of its circle", np.nan),
+    ],
+)
+def test_beams_show_what_is_wrong_with_the_sonar(recording, said, after):
+    (cause,) = beam_causes(recording.beams)
+    assert cause.text.startswith(said)
+    np.testing.assert_allclose(cause.begin - START, after, atol=12.0)
+
+
+def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehicle_stands():
+    frozen = broken.odometry_freezes(WHOLE, MIDDLE, 60.0)
+    (cause,) = standing_causes(scans_in(frozen), frozen.track)
+    assert cause.text.startswith("odometry frozen for 60 s while the echoes move")
+    still = [scan for scan in scans_in(WHOLE)[:1] for _ in range(5)]
+    stands = Track(WHOLE.track.times, np.zeros_like(WHOLE.track.poses))
+    assert standing_causes(still, stands) == []
 
 
 @pytest.mark.parametrize("fault", [lambda one: broken.mount_turned(one, 120.0), broken.mount_upside_down])

@@ -1,0 +1,140 @@
+"""Causes that beams show by themselves: a head that stands, a blind side, and settings that changed in mid-run."""
+
+from typing import Callable, List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.self_check.causes import Cause
+from sonar_processing.beams.beam import PlacedBeam
+
+_CERTAIN = 500.0  # nats: of what needs no comparison of scans to be seen
+_STANDS = 20.0  # s: longer than any head waits between two beams, about a turn
+_STILL = 1e-3  # rad: heads step by ten times as much
+_ALIKE = 0.25  # of the difference of strengths to their sum: beams of one direction have less, of others three times it
+_MOSTLY = 0.5  # share of the beams of some seconds that are alike; where the vehicle turns they shift by bins
+_SECTORS, _BLIND = 36, 15  # of the circle; so many beside each other, 150 degrees, hear nothing while the others do
+_HEARS, _DEAF = 0.3, 0.02  # shares of the beams of a sector that hear something
+_SIDE = 60.0  # s before and after a change that are compared: some turns of the head
+_PARTS = np.array([-1.0, -0.6, -0.2, 0.0, 0.2, 0.6, 1.0])  # of these: all parts of a side must say the same
+_FEWEST = 10  # beams in a part
+_CHANGED, _STEADY = 1.5, 1.15  # times: by more a setting changed, by less the parts of a side differ
+_SPEED = 0.3  # m/s: the usual speed of a small vehicle, which nothing corrects while the head stands
+
+
+def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
+    """Return what the beams of a recording, in the order of their stamps, show."""
+    if len(beams) < 2:
+        return []
+    times = np.array([one.beam.stamp_ns for one in beams]) * 1e-9
+    angles = np.array([one.beam.angle for one in beams])
+    stands = _standing(times, angles)
+    if stands:
+        return stands
+    hears = np.array([bool(one.beam.intensities.any()) for one in beams])
+    found = [_stuck(times, beams), _blind(angles, hears)]
+    for text, measure in _MEASURES:
+        values = np.array([measure(one) for one, heard in zip(beams, hears) if heard])
+        found.append(_changed(times[hears], values, text))
+    return [cause for cause in found if cause is not None]
+
+
+def _standing(times: np.ndarray, angles: np.ndarray) -> List[Cause]:
+    """Return stretches in which the head reports one angle, unless it never turns."""
+    still = np.concatenate([[False], np.abs(np.angle(np.exp(1j * np.diff(angles)))) < _STILL, [False]])
+    if still[1:-1].mean() > 0.9:
+        return []
+    stretches = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2)
+    found = [(float(times[first]), float(times[last] - times[first])) for first, last in stretches]
+    return [
+        Cause(f"the head stood for {seconds:.0f} s, from", _CERTAIN, begin, metres=_gone(seconds))
+        for begin, seconds in found
+        if seconds > _STANDS
+    ]
+
+
+def _gone(seconds: float) -> float:
+    return _SPEED * float(np.sqrt(seconds * _STANDS)) / 2.0
+
+
+def _stuck(times: np.ndarray, beams: Sequence[PlacedBeam]) -> Optional[Cause]:
+    """Return when all directions began to hear the same, though the head reports that it turns."""
+    apart = max(len(beams) // 400, 10)
+    strengths = [one.beam.intensities.astype(np.float32) for one in beams]
+    values = np.array([_difference(one, other) for one, other in zip(strengths[:-apart], strengths[apart:])])
+    told = np.isfinite(values)
+    if np.count_nonzero(told) < 2 * apart or np.median(values[told]) < 2.0 * _ALIKE:
+        return None
+    near = np.ones(6 * apart + 1) / (6 * apart + 1)
+    share = np.convolve(np.where(told, values, np.inf) < _ALIKE, near, "same")
+    alike = np.concatenate([[False], share > _MOSTLY, [False]])
+    stretches = np.flatnonzero(np.diff(alike.astype(int))).reshape(-1, 2)
+    if not len(stretches):
+        return None
+    first, last = max(stretches.tolist(), key=lambda one: times[one[1]] - times[one[0]])
+    seconds = float(times[last] - times[first])
+    if seconds < _STANDS / 2.0:
+        return None
+    text = f"the head stood for {seconds:.0f} s though it reported that it turns, from"
+    return Cause(text, _CERTAIN, float(times[first]), metres=_gone(seconds))
+
+
+def _difference(one: np.ndarray, other: np.ndarray) -> float:
+    """Return how different the strengths of two beams are: 0 equal, 1 nothing in common; NaN where both are silent."""
+    if len(one) != len(other):
+        return 1.0
+    total = float(one.sum() + other.sum())
+    return float(np.abs(one - other).sum()) / total if total else np.nan
+
+
+def _blind(angles: np.ndarray, hears: np.ndarray) -> Optional[Cause]:
+    """Return whether about half of the circle hears nothing, though the head looks there."""
+    sector = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
+    looked = np.bincount(sector, minlength=_SECTORS)
+    if looked.min() < 10:
+        return None
+    share = np.bincount(sector, hears, minlength=_SECTORS) / looked
+    deaf = np.append(share < _DEAF, share < _DEAF)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], deaf, [False]]).astype(int))).reshape(-1, 2)
+    longest = max((last - first for first, last in edges), default=0)
+    if not _BLIND <= longest < _SECTORS or np.median(share[share >= _DEAF]) < _HEARS:
+        return None
+    degrees = 360.0 * longest / _SECTORS
+    return Cause(f"the sonar hears nothing in {degrees:.0f} deg of its circle", _CERTAIN, metres=0.5)
+
+
+def _loudest(placed: PlacedBeam) -> float:
+    return float(placed.beam.intensities.max())
+
+
+def _length(placed: PlacedBeam) -> float:
+    """Return how many bins are strong, m."""
+    strengths = placed.beam.intensities
+    return float(np.count_nonzero(strengths > strengths.max() / 2)) * placed.beam.range_resolution
+
+
+_MEASURES: Tuple[Tuple[str, Callable[[PlacedBeam], float]], ...] = (
+    ("the gain changed: echoes are {ratio:.1f} times as strong from then on,", _loudest),
+    ("gain, pulse length or range setting changed: echoes are {ratio:.1f} times as long from then on,", _length),
+)
+"""What a change of it means, and what is measured of a beam."""
+
+
+def _changed(times: np.ndarray, values: np.ndarray, text: str) -> Optional[Cause]:
+    """Return when the median of `values` (n,) stepped, where both sides of it are steady."""
+    if len(times) < _FEWEST:
+        return None
+    best = (1.0, np.nan, np.nan)
+    for moment in np.arange(times[0] + _SIDE, times[-1] - _SIDE, _SIDE / 12.0):
+        edges = np.searchsorted(times, moment + _SIDE * _PARTS)
+        parts = [values[first:last] for first, last in zip(edges[:-1], edges[1:])]
+        if min(len(part) for part in parts) < _FEWEST:
+            continue
+        medians = np.maximum([float(np.median(part)) for part in parts], 1e-6).reshape(2, -1)
+        before, after = np.exp(np.log(medians).mean(axis=1))
+        steady = (medians.max(axis=1) / medians.min(axis=1)).max() < _STEADY
+        factor = max(before / after, after / before)
+        if steady and factor > max(best[0], _CHANGED):
+            best = (factor, moment, after / before)
+    if np.isnan(best[1]):
+        return None
+    return Cause(text.format(ratio=best[2]), _CERTAIN / 10.0, float(best[1]), metres=1.0)

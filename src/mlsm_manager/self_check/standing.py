@@ -1,0 +1,58 @@
+"""A vehicle that moves while its odometry, or the person who maps it, says that it stands."""
+
+from typing import List, Sequence, Tuple
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mlsm_manager.odometry.mending import standing_stretches
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.causes import Cause
+
+_MOST, _FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
+_FAR = 4.0  # m: echoes that are farther from all others say no more than that something else is heard
+_APART = (1, 2, 3)  # scans between two that are compared
+_FEWEST_PAIRS = 3
+_CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose itself says that nobody measured it
+_FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
+_SPEED = 0.3  # m/s: the usual speed of a small vehicle
+
+
+def standing_causes(scans: Sequence[Scan], track: Track) -> List[Cause]:
+    """Return the stretches in which T_odom_base stands while scans do not lie on each other as they do elsewhere."""
+    stretches = [(float(track.times[first]), float(track.times[last])) for first, last in standing_stretches(track)]
+    if not stretches:
+        return []
+    times, apart = _pairs(scans)
+    if not len(times):
+        return []
+    inside = [(times[:, 0] >= begin) & (times[:, 1] <= end) for begin, end in stretches]
+    elsewhere = apart[~np.any(inside, axis=0)]
+    return [
+        _cause(begin, end, apart[within], elsewhere)
+        for (begin, end), within in zip(stretches, inside)
+        if _moves(apart[within], elsewhere)
+    ]
+
+
+def _moves(within: np.ndarray, elsewhere: np.ndarray) -> bool:
+    if min(len(within), len(elsewhere)) < _FEWEST_PAIRS:
+        return False
+    return float(np.median(within)) > _FARTHER * float(np.median(elsewhere))
+
+
+def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) -> Cause:
+    noise = max(float(elsewhere.std()) / np.sqrt(len(within)), 1e-2)
+    nats = 0.5 * (float(within.mean() - elsewhere.mean()) / noise) ** 2
+    text = f"odometry frozen for {end - begin:.0f} s while the echoes move, from"
+    return Cause(text, _CERTAIN + nats, begin, metres=_SPEED * (end - begin))
+
+
+def _pairs(scans: Sequence[Scan]) -> Tuple[np.ndarray, np.ndarray]:
+    """Return times (p, 2) [s], when the scans of each pair began and ended, and how far (p,) [m] they lie apart."""
+    heard = [scan for scan in scans if len(scan) >= _FEWEST]
+    places = [scan.points[:: -(-len(scan) // _MOST), :2] for scan in heard]
+    trees = [cKDTree(one) for one in places]
+    numbers = [(one, one + apart) for apart in _APART for one in range(len(heard) - apart)]
+    times = np.array([[heard[one].start, heard[other].reference_time] for one, other in numbers]).reshape(-1, 2)
+    return times, np.array([np.minimum(trees[a].query(places[b])[0], _FAR).mean() for a, b in numbers])
