@@ -34,6 +34,7 @@ class _Problem:
         self.last_report = float("-inf")
         self.last_seen = float("-inf")
         self.detail = ""
+        self.level = Level.WARN
 
 
 class Health:
@@ -67,10 +68,14 @@ class Health:
         with self._lock:
             self._values[what] = value
 
-    def problem(self, kind: str, detail: str, number: int = 1) -> None:
-        """Count `number` problems of a kind and warn with the newest detail, at most once per `WARNING_PERIOD`."""
+    def problem(self, kind: str, detail: str, number: int = 1, level: Level = Level.WARN) -> None:
+        """Count `number` problems of a kind and warn with the newest detail, at most once per `WARNING_PERIOD`.
+
+        level: that the stage has while the problem is recent.
+        """
         with self._lock:
             problem = self._counted(kind, detail, number)
+            problem.level = level
             if problem.last_seen - problem.last_report < WARNING_PERIOD:
                 return
             line = f"{self.name}: {problem.unreported} {kind} ({problem.total} in all): {detail}"
@@ -115,12 +120,12 @@ class Health:
             values.update(self._values)
             values.update(self._processing_values())
             values.update({kind: str(problem.total) for kind, problem in self._problems.items()})
-            recent = [
-                f"{problem.total} {kind}: {problem.detail}"
+            recent = {
+                f"{problem.total} {kind}: {problem.detail}": problem.level
                 for kind, problem in self._problems.items()
                 if now - problem.last_seen < WARNING_PERIOD
-            ]
-        return HealthReport(Level.WARN if recent else Level.OK, "; ".join(recent) or "running", values)
+            }
+        return HealthReport(max(recent.values(), default=Level.OK), "; ".join(recent) or "running", values)
 
     def _counter_values(self, seconds: float) -> Dict[str, str]:
         values = {}

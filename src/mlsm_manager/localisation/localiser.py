@@ -12,6 +12,7 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.continuous_input import continuous_cloud, continuous_scan
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.live_correction import LiveCorrection
+from mlsm_manager.localisation.place_now import FixAge, PlaceNow
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
@@ -71,6 +72,7 @@ class Localiser:
         self._changes = 0
         self._live = LiveCorrection(settings.blend_time)
         self._odometry = ContinuousOdometry(limits)
+        self._age = FixAge()
         self._clock = clock
         self._came: Optional[Tuple[float, float]] = None
         self._newest: Optional[Scan] = None
@@ -136,6 +138,9 @@ class Localiser:
             self._search.learn(update.accepted)
             if update.belief is not None:
                 self._live.believe(update.belief)
+                self._age.learn_odometry(scan.reference_time, scan.reference_pose)
+            if update.accepted and update.result is not None:
+                self._age.learn_fix(scan.reference_time)
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
                 clouds.append(self.estimator.add_cloud(MapCloud.of_scan(scan)))
@@ -178,6 +183,15 @@ class Localiser:
         """T_map_odom (3,) as the newest scan told it."""
         return composed(self.estimator.correction, self._odometry.fixes(np.array(np.inf)))
 
+    def place_now(self, time: float, odometry: np.ndarray) -> Optional[PlaceNow]:
+        """Return how old and how good the position is at `time` [s], when the odometry says T_odom_base (3,).
+
+        None before the first fix.
+        """
+        with self._lock:
+            pose, belief = composed(self._odometry.fixes(np.array(time)), odometry), self.estimator.belief
+            return None if belief is None else self._age.place_at(time, pose, belief, self.estimator.errors)
+
     @property
     def steps(self) -> Sequence[Step]:
         """What the odometry did that no vehicle does, oldest first; it was left out."""
@@ -214,7 +228,9 @@ class Localiser:
         """Bring the belief to `time` [s] by the odometry, which `track` knows from `silent_since` on."""
         with self._lock:
             self._odometry.take(track)
-            self.estimator.follow(self._odometry.followed(track), time)
+            followed = self._odometry.followed(track)
+            self.estimator.follow(followed, time)
+            self._age.learn_odometry(time, followed.at(np.array(time)))
 
     def relocalise(self) -> Optional[ScanUpdate]:
         """Search the whole map for the newest scan, and take the place that is found as the vehicle's.
@@ -335,4 +351,5 @@ class Localiser:
     def _forget_scans(self) -> None:
         self._live.clear()
         self._odometry.clear()
+        self._age.clear()
         self._newest = self._came = self._resumed_at = None

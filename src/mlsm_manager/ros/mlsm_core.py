@@ -9,6 +9,7 @@ from std_msgs.msg import Bool
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
+from mlsm_manager.localisation.place_now import report_place
 from mlsm_manager.localisation.updates import (
     CloudUpdate,
     ScanUpdate,
@@ -27,14 +28,16 @@ from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry import matrices
+from node_support.headers import DAY
 from node_support.health import Health
-from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.callbacks import every_clock_period, guarded, make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import report_broken, subscribe_to_clouds
 from sonar_processing.ros.pipeline import Pipeline
 
+_TELLING = 1.0  # s
 _Z_DOWN_ADVICE = (
     "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true); "
     "if the head turns the other way, set head_turns"
@@ -62,6 +65,7 @@ class MlsmCore:
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
+        every_clock_period(_TELLING, self._tell_place, self.health)
         # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
         found = guarded(self.health, self._publish_found)
         self._services = MapServices(namespace, self._localiser, parameters, self._after_replacing, found)
@@ -212,6 +216,17 @@ class MlsmCore:
         if since is not None:
             self._localiser.follow(self._odometry.track(since, np.empty(0), time), time)
         return self._localiser.correction(time, pose)
+
+    def _tell_place(self) -> None:
+        """Tell how old and how good the position is, also while no scan and no odometry come."""
+        newest, now = self._odometry.newest(), rospy.Time.now().to_sec()
+        if newest is None or newest[0] is None:
+            return
+        # Stamps of another clock are as far off as no silence lasts: then the odometry tells the time.
+        time = now if 0.0 < now - newest[0] < DAY else newest[0]
+        place = self._localiser.place_now(time, newest[1])
+        if place is not None:
+            report_place(self.health, place)
 
     def _notice_time_of_scan(self, time: float) -> None:
         """Notice that time jumped back; while the odometry goes on, an old scan is merely late."""

@@ -12,6 +12,7 @@ _SPREAD_LIMIT, _APART_LIMIT = 2.0, 3.0  # standard deviations of the path, and o
 _SHORTEST = 15.0  # m that the vehicle must have gone in a window, so that a ratio means something
 _HEADING_SPREAD = 0.05  # rad by which the direction of motion may differ along a run: compass and mounting
 _NOWHERE = np.empty((0, 2))
+LARGEST_DEVIATION = 5.0  # m, above which a position is not known, see position_uncertainty
 
 
 def against_odometry(
@@ -120,7 +121,7 @@ def starts_agree(
 
 
 def position_uncertainty(
-    times: np.ndarray, deviations: np.ndarray, expected: np.ndarray, limit: float = 5.0
+    times: np.ndarray, deviations: np.ndarray, expected: np.ndarray, limit: float = LARGEST_DEVIATION
 ) -> Verdict:
     """Return by how much the path's own 2-D standard deviations have grown beyond those expected in any water.
 

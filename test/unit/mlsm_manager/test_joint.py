@@ -10,8 +10,10 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
+from mlsm_manager.localisation.place_now import report_place
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, transformed
+from node_support.health import Health, Level
 
 SCANS = tour(12).scans
 PARAMETERS = MlsmCoreParameters(
@@ -213,3 +215,20 @@ def test_a_jump_of_the_odometry_leaves_position_and_map_where_they_are(size):
         (jumped, pose + size * np.array([1.0, 0.5, 0.0])), (whole, pose)
     )]  # fmt: skip
     assert np.hypot(*(places[0] - places[1])[:2]) < 0.5
+
+
+def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
+    localiser, _ = localiser_after(6)
+    end, pose = SCANS[5].reference_time, SCANS[5].reference_pose
+    places = [localiser.place_now(end + seconds, pose) for seconds in (0.0, 20.0, 67.0)]
+    assert [place.age for place in places] == pytest.approx([0.0, 20.0, 67.0])
+    assert [place.overdue > 0.0 for place in places] == [False, False, True]
+    assert places[0].deviation < places[1].deviation < places[2].deviation
+    health = Health("mlsm_core", lambda line: None)
+    report_place(health, places[2]._replace(deviation=6.0))
+    assert health.report().level is Level.ERROR
+
+
+def test_nothing_is_told_of_a_position_before_the_first_fix():
+    localiser, _ = localiser_after(1)
+    assert localiser.place_now(SCANS[0].reference_time, SCANS[0].reference_pose) is None
