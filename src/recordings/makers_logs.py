@@ -1,4 +1,4 @@
-"""Beams of the logs of sonars' makers: `.852` files of Imagenex, and what Ping Viewer writes of a Ping360."""
+"""Beams of the logs of sonars' makers: `.852` files of Imagenex, and what both Ping Viewers write of a Ping360."""
 
 from os.path import getmtime
 from pathlib import Path
@@ -17,6 +17,8 @@ from ping360_driver.protocol.scan_command import bin_length
 from ping360_driver.protocol.scan_command import head_angle as ping360_angle
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
+from recordings.motion.pose_track import PoseTrack
+from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_headings
 from sonar_processing.beams.beam import Beam
 from sonar_processing.messages.beam_types import USUAL_SPEED_OF_SOUND
 
@@ -38,9 +40,16 @@ def makers_beams(path: Path) -> RecordedBeams:
     return reader(path)
 
 
+def makers_headings(path: Path) -> Optional[PoseTrack]:
+    """Return the vehicle's orientations, at the origin, of a log that holds some. Raises RecordingError."""
+    return vehicle_headings(path) if is_ping_viewer_next(path) else None
+
+
 def _reader(path: Path) -> Optional[_Reader]:
     if path.suffix.lower() == ".852":
         return _imagenex_beams
+    if is_ping_viewer_next(path):
+        return _ping_viewer_next_beams
     return _ping_viewer_beams if path.is_file() and _is_ping_viewer_log(path) else None
 
 
@@ -113,6 +122,19 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
     if len(heads) > 1:
         counts = ", ".join(f"{len(kept)} of device {number}" for number, kept in sorted(heads.items()))
         notes.append(f"{path.name} holds the beams of several heads, {counts}: only those of device {device} are used")
+    return RecordedBeams(beams, [False] * len(beams), refused, notes)
+
+
+def _ping_viewer_next_beams(path: Path) -> RecordedBeams:
+    """Return the beams of a recording of Ping Viewer Next. Raises RecordingError."""
+    found, refused, notes = head_beams(path)
+    beams = []
+    for time, beam in found:
+        try:
+            beams.append(_beam_of(beam, time - beam.pulse.listening_time))
+        except RefusedInput:
+            refused += 1
+    notes.append(f"ranges of {path.name} are those of {USUAL_SPEED_OF_SOUND:g} m/s")
     return RecordedBeams(beams, [False] * len(beams), refused, notes)
 
 

@@ -2,14 +2,14 @@
 
 import argparse
 from contextlib import ExitStack
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Callable, List, Optional, Tuple, TypeVar
 
 from node_support.geometry import quaternion_of
 from recordings.bags.bag import Bag, RecordingError, missing_topic
 from recordings.beams import RecordedBeams, beam_topic, beams_of_bag
-from recordings.makers_logs import is_makers_log, makers_beams
+from recordings.makers_logs import is_makers_log, makers_beams, makers_headings
 from recordings.motion.frame_tree import FrameTree, pose_track
 from recordings.motion.motion_table import is_table, motion_of_csv
 from recordings.motion.pose_track import PoseTrack
@@ -18,6 +18,7 @@ from recordings.motion.vehicle_motion import (
     MotionNames,
     MotionSource,
     declared_motion,
+    linked,
     motion_of_bag,
     unsaid_motion,
 )
@@ -72,7 +73,7 @@ def read(path: Path, request: Request) -> Content:
         problems: List[str] = []
         topic = tried(problems, lambda: None if main is None else beam_topic(main, request.beams))
         truth = tried(problems, lambda: _truth([bag for bag in bags if bag is not None], request))
-        motion = tried(problems, lambda: motion_for(bags[1] or main, request))
+        motion = tried(problems, lambda: motion_for(path, bags[1] or main, request))
         if problems:
             raise RecordingError(f"{path}: {'; '.join(problems)}")
         recorded = makers_beams(path) if main is None else beams_of_bag(main, topic, request.parameters)
@@ -115,14 +116,19 @@ def tried(problems: List[str], step: Callable[[], Optional[_Result]]) -> Optiona
         return None
 
 
-def motion_for(bag: Optional[Bag], request: Request) -> Motion:
-    """Return the motion that a request asks for; `bag` may hold it. Raises RecordingError."""
+def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
+    """Return the motion that a request for a recording at `path` asks for; `bag` may hold it. Raises RecordingError."""
     if request.vehicle is not None and is_table(request.vehicle):
         return motion_of_csv(request.vehicle, request.motion)
     if bag is not None:
         return motion_of_bag(bag, request.motion, request.truth)
     if request.motion.declared is not None:
         return declared_motion(FrameTree(), request.motion)
+    headings = makers_headings(path)
+    if headings is not None:
+        note = f"no odometry: {len(headings)} headings from {path.name}, the position is unknown"
+        tree = linked(FrameTree(), replace(request.motion, z_is_down=False), headings)
+        return Motion(tree, MotionSource.HEADING, [note])
     return unsaid_motion(FrameTree(), request.motion, "beams only")
 
 

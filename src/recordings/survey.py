@@ -54,7 +54,7 @@ def survey(path: Path, request: Request) -> Survey:
     if is_makers_log(path):
         missing: List[str] = []
         recorded = makers_beams(path)
-        motion = tried(missing, lambda: motion_for(None, request))
+        motion = tried(missing, lambda: motion_for(path, None, request))
         assumed = _assumed(motion, recorded, request, missing)
         heard = beam_lines(recorded)
         return Survey(path, "the log of a sonar's maker", {}, FrameTree(), None, heard, [], assumed, missing)
@@ -66,7 +66,7 @@ def _survey_of_bag(path: Path, bag: Bag, request: Request) -> Survey:
     tree = frame_tree(bag)
     missing: List[str] = []
     topic = tried(missing, lambda: beam_topic(bag, request.beams))
-    motion = tried(missing, lambda: motion_for(bag, request))
+    motion = tried(missing, lambda: motion_for(path, bag, request))
     recorded = RecordedBeams([], []) if topic is None else beams_of_bag(bag, topic, request.parameters)
     assumed = _assumed(motion, recorded, request, missing)
     if topic is not None and not recorded.beams:

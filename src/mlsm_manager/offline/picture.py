@@ -21,6 +21,7 @@ _COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
 _DOUBT_COLOR = "#cc3377"
 _MOST_ELLIPSES = 40
 _CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
+_EDGE = 1.2  # points: two pixels around each cell
 _LINE_STYLES = ("-", "--", ":", "-.")
 
 
@@ -71,7 +72,8 @@ def _draw_blocks(axes: Axes, blocks: Blocks) -> None:
         centers = blocks.centers[blocks.type == kind]
         squares = _squares(centers, blocks.resolution)
         # add_patch would look at each corner by itself for the limits, which takes longer than all the rest.
-        axes.add_artist(PathPatch(squares, facecolor=color, edgecolor="none", zorder=2 + int(kind)))
+        # Edges of a width in points keep small cells of large water visible.
+        axes.add_artist(PathPatch(squares, facecolor=color, edgecolor=color, linewidth=_EDGE, zorder=2 + int(kind)))
         axes.update_datalim(squares.vertices)
         label = f"{len(centers)} {kind.name.lower()} blocks"
         axes.plot([], [], "s", color=color, label=label)

@@ -1,0 +1,125 @@
+"""Recordings of Ping Viewer Next: MCAP files with JSON messages of the devices and of the vehicle's attitude.
+
+Source: src/device/recording and src/vehicle in bluerobotics/ping-viewer-next; no recording of it was at hand.
+"""
+
+import json
+import re
+import struct
+from collections import Counter
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, Dict, Iterator, List, Optional, Tuple
+
+import numpy as np
+
+from node_support.geometry import pose_matrix, quaternion_of
+from ping360_driver.protocol.messages import MessageError, MessageId
+from ping360_driver.protocol.replies import Beam as HeadBeam
+from ping360_driver.protocol.replies import beam as head_beam
+from recordings.bags.bag import RecordingError
+from recordings.motion.pose_track import PoseTrack
+
+_MAGIC = b"\x89MCAP0\r\n"
+_ROS2 = b"ros2"
+_TOPIC = re.compile(r"/?(device_[^/]+)/(Ping360|VehicleData)")
+_Message = Tuple[str, int, Any]  # topic, ns, content
+
+
+def is_ping_viewer_next(path: Path) -> bool:
+    """Return whether a file is an MCAP file that ROS 2 has not written."""
+    if path.suffix.lower() != ".mcap":
+        return False
+    try:
+        with path.open("rb") as file:
+            start = file.read(64)
+    except OSError:
+        return False
+    # Magic, number and length of the header, length of its profile.
+    place = len(_MAGIC) + 1 + 8
+    if len(start) < place + 4 or not start.startswith(_MAGIC):
+        return False
+    (length,) = struct.unpack_from("<I", start, place)
+    return start[place + 4 : place + 4 + length] != _ROS2
+
+
+def head_beams(path: Path) -> Tuple[List[Tuple[float, HeadBeam]], int, List[str]]:
+    """Return the beams of the head with most of them and when they came [s], how many were refused, and notes.
+
+    Raises RecordingError.
+    """
+    heads: Dict[str, List[Tuple[float, HeadBeam]]] = {}
+    refused = 0
+    for device, time_ns, content in _messages(path, "Ping360"):
+        try:
+            fields = {**content, "message_id": MessageId.AUTO_DEVICE_DATA, "data": bytes(content["data"])}
+            found = head_beam(SimpleNamespace(**fields))
+        except (MessageError, AttributeError, KeyError, TypeError, ValueError):
+            refused += 1
+            continue
+        heads.setdefault(device, []).append((time_ns * 1e-9, found))
+    if not heads:
+        raise RecordingError(f"{path}: no beam of a Ping360 on a topic device_.../Ping360; {refused} were not readable")
+    device, beams = max(heads.items(), key=lambda one: len(one[1]))
+    notes = [f"{path.name} holds the beams of several heads: only those of {device} are used"] if len(heads) > 1 else []
+    return beams, refused, notes
+
+
+def vehicle_headings(path: Path) -> Optional[PoseTrack]:
+    """Return the vehicle's orientations, x north, y west, z up, at the origin; None where the file has none.
+
+    Raises RecordingError.
+    """
+    stamps, rotations = [], []
+    for _, time_ns, content in _messages(path, "VehicleData"):
+        angles = [content.get(name) for name in ("roll", "pitch", "yaw")]
+        if all(isinstance(angle, (int, float)) for angle in angles):
+            stamps.append(time_ns)
+            rotations.append(quaternion_of(pose_matrix((0.0, 0.0, 0.0), angles)))
+    if not stamps:
+        return None
+    track = PoseTrack.sorted_from(np.array(stamps), np.zeros((len(stamps), 3)), np.array(rotations))
+    return track.turned_up()
+
+
+def _messages(path: Path, name: str) -> Iterator[Tuple[str, int, Dict[str, Any]]]:
+    """Yield device, time [ns] and content of each message of a name; of a file that was cut off as far as it goes."""
+    topics: Counter[str] = Counter()
+    found = False
+    for topic, time_ns, data in _records(path):
+        topics[topic] += 1
+        match = _TOPIC.fullmatch(topic)
+        if match is None:
+            continue
+        found = True
+        if match[2] == name:
+            try:
+                content = json.loads(data)
+            except ValueError:
+                content = {}
+            yield match[1], time_ns, content
+    if not found:
+        raise RecordingError(
+            f"{path}: not written by ROS 2 or Ping Viewer Next; its topics are {', '.join(topics) or 'none'}"
+        )
+
+
+def _records(path: Path) -> Iterator[Tuple[str, int, bytes]]:
+    try:
+        from mcap.exceptions import McapError
+        from mcap.records import Channel, Message
+        from mcap.stream_reader import StreamReader
+    except ImportError:
+        raise RecordingError(f"{path}: needs the library mcap; install it with: pip install mcap") from None
+    channels: Dict[int, str] = {}
+    try:
+        with path.open("rb") as file:
+            for record in StreamReader(file).records:
+                if isinstance(record, Channel):
+                    channels[record.id] = record.topic
+                elif isinstance(record, Message):
+                    yield channels[record.channel_id], record.log_time, record.data
+    except (McapError, KeyError, struct.error):
+        return
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from None
