@@ -65,15 +65,15 @@ def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> Rec
     moving_state, still = MovingState(), SonarToCloudParameters()
     velocities = bag.messages(_VELOCITY_TOPIC)
     velocity = next(velocities, None)
-    beams, moving, notes, refused = [], [], [], 0
+    beams, moving, notes, refused, reason = [], [], [], 0, ""
     for time, message in list(bag.messages(topic)):
         while velocity is not None and velocity[0] <= time:
             _take_velocity(moving_state, velocity[1])
             velocity = next(velocities, None)
         try:
             reading = reader.read(kind, message)
-        except RefusedInput:
-            refused += 1
+        except RefusedInput as error:
+            refused, reason = refused + 1, reason or str(error)
             continue
         if reading.unit_changed:
             refused += len(beams)
@@ -83,6 +83,8 @@ def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> Rec
         moving.extend([moving_state.is_moving(still)] * len(reading.beams))
         notes.extend(reading.notes)
         refused += reading.refused
+    if reason:
+        notes.append(f"{refused} messages of {topic} without a usable beam, the first because of {reason}")
     return RecordedBeams(beams, moving, refused, notes)
 
 

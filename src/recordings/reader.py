@@ -78,7 +78,7 @@ def read(path: Path, request: Request) -> Content:
             raise RecordingError(f"{path}: {'; '.join(problems)}")
         recorded = makers_beams(path) if main is None else beams_of_bag(main, topic, request.parameters)
     if not recorded.beams:
-        raise RecordingError(f"{path}: none of {recorded.refused} messages holds a beam that can be used")
+        raise RecordingError(f"{path}: {recorded.notes[-1] if recorded.notes else 'no message of beams'}")
     recorded = recorded.later(request.offset)
     tree, notes = mounted(motion.tree, request.motion.base_frame, recorded, request.parameters)
     _check_common_time(path, recorded, tree, request)

@@ -70,7 +70,7 @@ def _survey_of_bag(path: Path, bag: Bag, request: Request) -> Survey:
     recorded = RecordedBeams([], []) if topic is None else beams_of_bag(bag, topic, request.parameters)
     assumed = _assumed(motion, recorded, request, missing)
     if topic is not None and not recorded.beams:
-        missing.append(f"none of {recorded.refused} messages of {topic} holds a beam that can be used")
+        missing.append(f"a beam: none of {recorded.refused} messages of {topic} holds one")
     signs = _signs_of_z_down(bag, tree.frames)
     if signs and not request.motion.z_is_down:
         assumed.append("the odometry counts x, y left, z up; if it counts north, east, down, give --ned")

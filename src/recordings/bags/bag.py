@@ -9,6 +9,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Tuple, Union
 
+import yaml
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Reader as Ros1Reader
 from rosbags.rosbag2 import Reader as Ros2Reader
@@ -18,6 +19,8 @@ from rosbags.typesys.store import Typestore
 from recordings.bags.message_types import defined_in, ros2_types
 
 _LONE_FILES = (".mcap", ".db3")
+_METADATA, _INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
+_NEWEST_VERSION = 8  # of metadata that rosbags 0.9.23 reads; ROS 2 Jazzy writes 9
 _TopicCount = Tuple[str, str, int]
 
 
@@ -112,11 +115,35 @@ def missing_topic(topic: str, bags: Iterable[Bag]) -> RecordingError:
 
 def _reader(path: Path, stack: ExitStack) -> Union[Ros1Reader, Ros2Reader]:
     if path.is_dir():
-        return Ros2Reader(path)
+        return Ros2Reader(stack.enter_context(_readable_folder(path)))
     if path.suffix in _LONE_FILES:
         return Ros2Reader(stack.enter_context(_folder_of(path)))
     path.open("rb").close()
     return Ros1Reader(path)
+
+
+@contextmanager
+def _readable_folder(path: Path) -> Iterator[Path]:
+    """Give a folder that rosbags reads: `path`, or one with its files and metadata of the newest version it knows.
+
+    What newer versions tell otherwise, as of the quality of service, is not read here.
+    """
+    try:
+        metadata = yaml.safe_load((path / _METADATA).read_text())
+        is_newer = metadata[_INFORMATION]["version"] > _NEWEST_VERSION
+    except (OSError, yaml.YAMLError, KeyError, TypeError):
+        is_newer = False  # The reader says what is wrong
+    if not is_newer:
+        yield path
+        return
+    metadata[_INFORMATION]["version"] = _NEWEST_VERSION
+    with TemporaryDirectory() as name:
+        folder = Path(name)
+        for file in path.iterdir():
+            if file.name != _METADATA:
+                (folder / file.name).symlink_to(file.absolute())
+        (folder / _METADATA).write_text(yaml.safe_dump(metadata))
+        yield folder
 
 
 @contextmanager
@@ -131,7 +158,7 @@ def _folder_of(path: Path) -> Iterator[Path]:
         folder = Path(name)
         (folder / path.name).symlink_to(path.absolute())
         # JSON is YAML too.
-        (folder / "metadata.yaml").write_text(json.dumps(_metadata(path.name, storage, topics)))
+        (folder / _METADATA).write_text(json.dumps(_metadata(path.name, storage, topics)))
         yield folder
 
 
@@ -164,7 +191,7 @@ def _metadata(file: str, storage: str, topics: List[_TopicCount]) -> Dict[str, A
         for name, kind, count in topics
     ]
     return {
-        "rosbag2_bagfile_information": {
+        _INFORMATION: {
             "version": 5,
             "storage_identifier": storage,
             "relative_file_paths": [file],
@@ -192,4 +219,10 @@ def _in_one_line(path: Path) -> Iterator[None]:
             advice = f"not indexed, the recording was cut off; run: rosbag reindex {path}"
             raise RecordingError(f"{path}: {advice}") from None
         detail = " ".join(str(error).split()) or type(error).__name__
-        raise RecordingError(f"{path}: not a bag, or damaged: {detail}") from None
+        raise RecordingError(f"{path}: not a bag, or damaged: {detail}{_files_instead(path)}") from None
+
+
+def _files_instead(path: Path) -> str:
+    """Return in words which single file of a folder may be readable, empty where there is none."""
+    files = sorted(str(file) for file in path.glob("*") if file.suffix in _LONE_FILES) if path.is_dir() else []
+    return f"; a file of it may open by itself: {' or '.join(files)}" if files else ""

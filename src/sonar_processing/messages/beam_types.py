@@ -25,6 +25,7 @@ _MOST_RAYS = 7200  # Rays of 0.05 deg, finer than any head steps; more is a brok
 OWN = "underwater_map_construction/SonarScanLine"
 LASER_SCAN = "sensor_msgs/LaserScan"
 POINT_CLOUD = "sensor_msgs/PointCloud"
+_UNEVEN = 0.1  # Share by which the lengths of bins may differ, as float32 rounds their ranges
 _STRAIGHT = 0.01  # Of a bin: so far points of one beam lie beside their line, by rounding
 
 
@@ -157,8 +158,11 @@ def point_cloud(message: Any) -> List[BeamFields]:
 def laser_scan(message: Any) -> List[BeamFields]:
     """Read a LaserScan: one beam with one echo for each ray; raises RefusedInput for one without range or direction.
 
-    Rays are timed as `time_increment` says. A ray without a range becomes a beam without echoes.
+    Rays are timed as `time_increment` says. A ray without a range becomes a beam without echoes. Rays that all point
+    one way are the bins of one beam, whose strengths are their intensities, as in the Girona caves data set.
     """
+    if len(message.ranges) > 1 and message.angle_increment == 0.0:
+        return _bins_of_rays(message)
     if not (message.range_max > 0.0 and np.isfinite([message.range_max, message.time_increment]).all()):
         given = f"range_max {message.range_max} m, time_increment {message.time_increment} s"
         raise RefusedInput("beams refused", f"{given}; must be finite, range_max above 0")
@@ -172,6 +176,18 @@ def laser_scan(message: Any) -> List[BeamFields]:
         BeamFields(stamp, message.header.frame_id, float(angle), _echo_at(distance / resolution), resolution)
         for stamp, angle, distance in zip(stamps, angles, ranges)
     ]
+
+
+def _bins_of_rays(message: Any) -> List[BeamFields]:
+    """Return the beam whose bins the rays of a LaserScan are; raises RefusedInput for rays that are none."""
+    ranges = np.asarray(message.ranges, dtype=np.float64)
+    steps = np.diff(ranges)
+    if len(message.intensities) != len(ranges) or not (steps > 0.0).all() or np.ptp(steps) > _UNEVEN * steps.mean():
+        rays = f"{len(ranges)} rays that all point one way, {len(message.intensities)} intensities"
+        raise RefusedInput("beams refused", f"{rays}: bins of one beam need an intensity each and growing ranges")
+    strengths = _strengths(np.clip(message.intensities, 0, 255))
+    beam = BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle_min, strengths, steps.mean())
+    return [beam]
 
 
 def _speed_of_sound(value: float) -> float:

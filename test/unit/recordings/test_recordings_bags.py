@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
@@ -141,3 +142,24 @@ def test_a_damaged_file_is_read_or_refused_in_one_line(small, suffix, cut, chang
     damaged = home / f"damaged{suffix}"
     damaged.write_bytes(data[: int(cut * len(data))] if cut < 0.5 else data)
     assert "\n" not in refusal(damaged)
+
+
+def test_a_folder_of_ros_2_jazzy_is_read(tmp_path):
+    folder = write_sqlite_bag(BASIN, tmp_path / "jazzy")
+    metadata = yaml.safe_load((folder / "metadata.yaml").read_text())
+    information = metadata["rosbag2_bagfile_information"]
+    information["version"] = 9
+    for topic in information["topics_with_message_count"]:
+        topic["topic_metadata"]["offered_qos_profiles"] = [{"history": "keep_last", "depth": 10}]
+    (folder / "metadata.yaml").write_text(yaml.safe_dump(metadata))
+    with Bag(folder) as bag:
+        assert sum(1 for _ in bag.messages("/sonar/raw")) == bag.topics["/sonar/raw"].count > 0
+
+
+def test_a_folder_that_is_damaged_is_refused_with_the_file_that_may_open(tmp_path):
+    folder = write_sqlite_bag(BASIN, tmp_path / "cut")
+    (database,) = folder.glob("*.db3")
+    (folder / "metadata.yaml").write_text("rosbag2_bagfile_information: {version: 9}")
+    with pytest.raises(RecordingError, match=f"a file of it may open by itself: {database}"):
+        Bag(folder)
+    assert Bag(database).topics

@@ -253,3 +253,18 @@ def test_no_damaged_message_crashes_and_each_is_counted():
     assert fuzzer.crashes == []
     assert sum(fuzzer.outcomes.values()) == MESSAGES
     assert set(fuzzer.outcomes) >= {"taken", "beams refused", "stamps refused", "messages not readable"}
+
+
+def test_a_laser_scan_whose_rays_all_point_one_way_is_one_beam():
+    scan = laser_scan_of(np.arange(1, 5) * 0.5, angle_increment=0.0, angle_min=0.7, intensities=[0.0, 300.0, 20.0, 3.0])
+    (found,) = reading(LASER_SCAN, scan).beams
+    assert (found.angle, found.range_resolution) == (0.7, 0.5)
+    assert found.intensities.tolist() == [0, 255, 20, 3]
+
+
+@pytest.mark.parametrize(
+    ("ranges", "intensities"), [((0.5, 1.0), []), ((1.0, 0.5), [1, 2]), ((0.1, 1.0, 1.1), [1, 2, 3])]
+)
+def test_rays_that_all_point_one_way_and_are_no_bins_are_refused_at_once(ranges, intensities):
+    with pytest.raises(RefusedInput, match="all point one way"):
+        reading(LASER_SCAN, laser_scan_of(ranges, angle_increment=0.0, intensities=intensities))
