@@ -13,7 +13,6 @@ from node_support.geometry import composed, inverse, matrices, transformed
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
-from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import Request, read
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
@@ -39,8 +38,7 @@ class Truth:
 class Recording:
     """beams: in the order of their stamps, placed in odom. unplaced: number of beams that tf could not place.
 
-    track: T_odom_base over the whole recording. seconds: its length. notes: what was assumed, as sentences. source: of
-    the track.
+    track: T_odom_base over the whole recording. seconds: its length. notes: what was assumed, as sentences.
     """
 
     beams: List[PlacedBeam]
@@ -48,7 +46,6 @@ class Recording:
     track: Track
     truth: Optional[Truth]
     notes: List[str] = field(default_factory=list)
-    source: MotionSource = MotionSource.POSES
 
     def corrected(self, correction: BeamCorrection) -> "Recording":
         """Return the recording with all beams corrected, each placed by the odometry at its new stamp.
@@ -181,7 +178,7 @@ def read_recording(path: Path, request: Request) -> Recording:
     placed, unplaced = _placed(recorded, tree, path, request)
     known = content.truth
     truth = None if known is None else Truth(known.stamps_ns * 1e-9, known.translations[:, :2])
-    return Recording(placed, recorded.refused + unplaced, track, truth, content.notes, content.motion.source)
+    return Recording(placed, recorded.refused + unplaced, track, truth, content.notes)
 
 
 def _track(tree: FrameTree, stamps: np.ndarray, path: Path, request: Request) -> Track:

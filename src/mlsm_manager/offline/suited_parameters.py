@@ -12,7 +12,6 @@ from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.self_check.map_checks import scans_go_on
 from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts
-from recordings.motion.vehicle_motion import MotionSource
 
 _WORTH_TRYING = 0.75
 """Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
@@ -56,8 +55,6 @@ def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:
     """
     motion = ReportedMotion()
     motion.learn(recording.track)
-    if recording.source is MotionSource.VELOCITY:
-        return OdometryFound(OdometryKind.DVL, "velocities were measured")
     if motion.has_positions:
         return OdometryFound(motion.kind, f"positions change by up to {motion.extent:.1f} m")
     if motion.has_headings:

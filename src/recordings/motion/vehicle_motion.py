@@ -150,9 +150,7 @@ def _of_velocity(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> M
         f"{heading}; they are at most {found.longest_gap:.1f} s apart, and {found.refused} messages hold none"
     )
     track = reckoned(found, headings.turned_up() if names.z_is_down else headings)
-    # An Odometry without positions may be what thrusters are thought to do; the others come from an instrument.
-    source = MotionSource.POSES if bag.topics[topic].type == ODOMETRY else MotionSource.VELOCITY
-    return Motion(linked(tree, upward, track), source, [note])
+    return Motion(linked(tree, upward, track), MotionSource.VELOCITY, [note])
 
 
 def _is_of_velocities(bag: Bag, topic: str) -> bool:

@@ -40,11 +40,6 @@ def test_what_changes_tells_the_odometry(reported, kind):
     assert odometry_of(Recording([], 0, reported, None)).kind is kind
 
 
-def test_velocities_that_were_measured_are_those_of_a_dvl():
-    reckoned = Recording([], 0, track(x=TIMES), None, source=MotionSource.VELOCITY)
-    assert odometry_of(reckoned).kind is OdometryKind.DVL
-
-
 def test_a_pose_that_never_changes_is_held_unless_sweeps_show_a_motion():
     standing = odometry_of(Recording([], 0, track(x=3.0, y=1.0, yaw=0.4), None))
     assert (standing.name, standing.motion) == ("standing", SweepMotion.UNTOLD)
