@@ -290,8 +290,8 @@ class Joint(Estimator):
             return None
         result = self.matcher.match(scan, self.matched, prior_of(expected, scan.reference_pose))
         covariance = result.covariance[POSITION, POSITION]
-        sure = np.linalg.eigvalsh(covariance)[-1] < (_SURE * self.parameters.echo_deviation) ** 2
-        if not (result.accepted and sure):
+        of_place = np.sqrt(np.linalg.eigvalsh(covariance + session.unsure_of_map)[-1])
+        if not result.accepted or of_place > _SURE * self.parameters.echo_deviation:
             return None
         return Fix.without_prior(
             result.pose[POSITION], covariance, expected.theta[POSITION], expected.covariance[POSITION, POSITION]

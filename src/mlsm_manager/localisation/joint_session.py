@@ -107,6 +107,15 @@ class JointSession:
         return other
 
     @property
+    def unsure_of_map(self) -> np.ndarray:
+        """(2, 2) m^2, covariance of the newest scans' places in the map: one drawn wrongly confirms itself.
+
+        A single scan lies right in its own map.
+        """
+        newest = self.solver.estimates[-1]
+        return newest.covariance[:2, :2] if self.solver.log.scan_count > 1 else np.zeros((2, 2))
+
+    @property
     def may_be_stored(self) -> bool:
         """Whether `scans` are all that were taken: not after a long run."""
         return len(self.scans) == self._taken

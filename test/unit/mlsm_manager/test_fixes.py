@@ -1,6 +1,9 @@
 """Single scans that are found in the map while the odometry's scale is hardly known, and what their fixes tell."""
 
+from dataclasses import replace
+
 import numpy as np
+import pytest
 from made_scans import at_velocity, harbour, scan_of
 
 from mlsm_manager.joint_solver.fixes import Fix, Fixes
@@ -35,6 +38,19 @@ def test_while_the_scale_is_hardly_known_scans_are_found_from_the_second_on():
 def test_where_the_scale_is_known_no_scan_is_searched():
     _, solver = localised(odometry=OdometryKind.DVL)
     assert not solver.fixes.by_node
+
+
+@pytest.mark.parametrize(("metres", "is_found"), [(0.0, True), (1.0, False)])
+def test_in_a_map_whose_newest_scans_are_uncertain_no_scan_is_searched(metres, is_found):
+    localiser = LocaliserParameters(odometry=OdometryKind.AUTO).build_localiser()
+    *known, newest = scans(4)
+    for scan in known:
+        localiser.take_scan(scan)
+    estimates = localiser.estimator.solver.estimates
+    covariance = estimates[-1].covariance + metres**2 * np.eye(len(estimates[-1].covariance))
+    estimates[-1] = replace(estimates[-1], covariance=covariance)
+    localiser.take_scan(newest)
+    assert (4 in localiser.estimator.solver.fixes.by_node) == is_found
 
 
 def test_a_fix_is_what_the_scan_says_and_not_what_was_expected():
