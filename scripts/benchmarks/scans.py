@@ -33,6 +33,7 @@ WORLDS: dict = {
     "empty sea": lambda: World.from_shapes("empty sea", [_FLOOR]),
     "straight wall": lambda: World.from_shapes("straight wall", [_FLOOR, _WALL]),
 }
+_ORGANIZED = SonarToCloudParameters(keep_organized=True)
 Poses = Callable[[np.ndarray], np.ndarray]
 """From times (n,) to planar poses (n, 3)."""
 
@@ -90,9 +91,13 @@ class ScanMaker:
             track = Track(times, poses)
         return Scan(points, times[beams], np.full(len(points), moving), track, float(times[-1]))
 
+    def sonar(self, seed: int) -> Sonar:
+        """Return the sonar with the noise of a seed."""
+        return Sonar(self._caster, self._pattern, self._model, np.random.default_rng(seed))
+
     def _echoes(self, poses: np.ndarray, angles: np.ndarray, seed: int) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return beam number, range [m] and height of the echoes heard from `poses` (b, 3) at head `angles` (b,)."""
-        sonar = Sonar(self._caster, self._pattern, self._model, np.random.default_rng(seed))
+        sonar = self.sonar(seed)
         matrices = np.array([pose_matrix((x, y, DEPTH), (0.0, 0.0, yaw)) for x, y, yaw in poses])
         echoes, _ = extract_echoes(sonar.pings(matrices, angles), sonar.range_resolution, self._extraction)
         return echoes.beams, (echoes.bins + 0.5) * sonar.range_resolution, echoes.heights
@@ -116,16 +121,17 @@ class BasinScans:
         self._parameters = SonarParameters()
         self._model = make_echo_model("laser_cone", {"spread": spread})
 
-    def scan(self, T_world_sonar: np.ndarray, seed: int) -> Cloud:
-        """Return the full turn heard from a (4, 4) pose, organised, in the world frame."""
+    def scan(self, T_world_sonar: np.ndarray, seed: int, parameters: SonarToCloudParameters = _ORGANIZED) -> Cloud:
+        """Return the full turn heard from a (4, 4) pose, in the world frame; organised unless told otherwise."""
         head = SonarHead(self._parameters.beams_per_turn, self._parameters.seconds_per_turn)
         angles = np.array([head.angle(beam) for beam in range(head.beams_per_turn)])
         sonar = Sonar(self._caster, self._parameters.pattern(), self._model, np.random.default_rng(seed))
         strengths = sonar.pings(np.repeat(T_world_sonar[np.newaxis], len(angles), axis=0), angles)
-        assembler = ScanAssembler(SonarToCloudParameters(keep_organized=True))
+        assembler = ScanAssembler(parameters)
         for number, angle in enumerate(angles):
             stamp_ns = 10**12 + round(1e9 * head.time(number))
             beam = Beam(stamp_ns, "sonar", float(angle), strengths[number], sonar.range_resolution)
+            beam = parameters.corrected(beam)
             scan = assembler.add(PlacedBeam(beam, T_world_sonar, is_moving=False))
         return scan
 

@@ -11,7 +11,7 @@ from benchmarks.tours import simulated
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
-from thesis_results.moves import SEEDS, session_errors, session_scans, session_track
+from thesis_results.moves import ODOMETRY, SEEDS, matching_estimator, session_errors, session_scans, session_track
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure
 
@@ -54,7 +54,9 @@ def _last_squares(kind: SonarKind) -> np.ndarray:
     maker, track = ScanMaker("basin", kind), session_track()
     found = []
     for seed in range(SEEDS):
-        errors = session_errors(session_scans(maker, seed, track), MatcherName.DISTRIBUTIONS)
+        errors = session_errors(
+            session_scans(maker, seed, track), matching_estimator(MatcherName.DISTRIBUTIONS, ODOMETRY)
+        )
         accepted = errors[errors[:, 0] > 0]
         if len(accepted):
             found.append(accepted[-1, 3])

@@ -9,11 +9,12 @@ from benchmarks.harness import ROOT, recorded_beams
 from benchmarks.scans import BasinScans
 from matplotlib.axes import Axes
 
+from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from node_support.geometry import pose_matrix
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
-from sonar_processing.filters.threshold import Thresholder, ThresholderParameters, ThresholdMode
+from sonar_processing.filters.outliers import OutlierRemover
+from sonar_processing.filters.threshold import Thresholder, ThresholdMode
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.shapes.lines import Line, LineDetector, LineDetectorParameters
@@ -23,6 +24,7 @@ from thesis_results.page import joined, prose, table
 from thesis_results.pictures import COLOURS, STRONGEST, Pictures, new_figure, to_scale
 from thesis_results.sonar import HEAD_PLACE, TANK, TURN_BEAMS
 from thesis_results.survey import distances
+from thesis_results.thesis_scans import CHAIN, DEFAULTS
 
 _REACH = 50.0
 _PLACE = pose_matrix((-20.0, -3.0, -1.8))
@@ -30,6 +32,7 @@ _THESIS_OTSU = 66
 """What the thesis reports for its simulated scan of 50 m (7.2)."""
 _ON = 1.0  # m: the standard deviation of an echo in the thesis's model
 _SPREADS = {"pulse of the thesis's model, 1 m": 1.0, "pulse of a real head, 0.15 m": 0.15}
+_THESIS_COLUMN = "`thesis:=true`, pulse of the thesis's model, 1 m"
 _TANK_REACH = 10.0
 # A tank is a tenth of the basin, so are its walls and what counts as near one.
 _TANK_LINES = LineDetectorParameters(distance=0.1, min_length=1.5, max_gap=2.0)
@@ -50,10 +53,17 @@ def make_simulated(pictures: Pictures) -> str:
     ]  # fmt: skip
     return joined(
         prose(f"""The thesis reports Otsu's threshold for such a scan as about {_THESIS_OTSU} and advises to raise it
-        a bit; the default mode multiplies it by `otsu_multiplier`. All parameters are the defaults."""),
+        a bit; the default mode multiplies it by `otsu_multiplier`. All parameters are the defaults, but for those of
+        the last column, which are the thesis's (`yaml/thesis.yaml`)."""),
         *shown,
-        table(["", *found], _rows(list(found.values()), world)),
+        table(["", *found, _THESIS_COLUMN], _rows([*found.values(), _by_thesis()], world)),
     )
+
+
+def _by_thesis() -> "Processed":
+    raw = BasinScans(1.0).scan(_PLACE, 1, CHAIN.clouds)
+    lines = LineDetectorParameters.from_mapping(thesis_values({})["line_detector"])
+    return processed(raw, _PLACE[:2, 3], lines, CHAIN)
 
 
 def make_recorded(pictures: Pictures) -> str:
@@ -107,13 +117,14 @@ class Processed:
         return {"raw": self.raw, "thresholded": self.thresholded, "cleaned": self.cleaned}
 
 
-def processed(raw: Cloud, place: np.ndarray, lines: LineDetectorParameters) -> Processed:
-    """Return what the stages with their default parameters, and the line detector, make of an organised scan."""
-    parameters = ThresholderParameters()
-    otsu, thresholder = Thresholder(replace(parameters, mode=ThresholdMode.OTSU)), Thresholder(parameters)
+def processed(raw: Cloud, place: np.ndarray, lines: LineDetectorParameters, chain: ThesisChain = DEFAULTS) -> Processed:
+    """Return what the stages of a chain, by default with their defaults, and the line detector make of a scan."""
+    parameters = chain.threshold
+    plain = replace(parameters, mode=ThresholdMode.OTSU, min_threshold=0.0)
+    otsu, thresholder = Thresholder(plain), Thresholder(parameters)
     otsu(raw)
     thresholded = thresholder(raw)
-    cleaned = OutlierRemover(OutlierRemoverParameters())(thresholded)
+    cleaned = OutlierRemover(chain.outliers)(thresholded)
     return Processed(
         place, raw, thresholded, cleaned, LineDetector(lines)(cleaned), otsu.newest_threshold,
         thresholder.newest_threshold,
@@ -157,6 +168,7 @@ def _rows(found: List[Processed], world: World) -> List[List[str]]:
     for stage in found[0].stages:
         shares = [_share_on_surfaces(scan.stages[stage], world) for scan in found]
         rows.append([f"echoes within {_ON:g} m of a surface, {stage}", *(f"{100.0 * share:.0f} %" for share in shares)])
+    rows.append(["walls", *(str(len(scan.lines)) for scan in found)])
     return rows
 
 
