@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from enum import IntEnum
 from typing import Callable, Dict, Iterator
 
+from node_support.timing import UsualInterval
+
+SILENCE = 5.0  # s without a message, from which on a stage says that its input ceased
 WARNING_PERIOD = 10.0  # s: often enough to be seen in a log, seldom enough to leave the rest of it readable
 
 
@@ -25,6 +28,28 @@ class HealthReport:
     level: Level
     text: str
     values: Dict[str, str]
+
+
+class _Input:
+    """A topic that is needed. It is silent after some seconds and two of its usual intervals without a message."""
+
+    def __init__(self, now: float, is_expected: bool = False) -> None:
+        self._usual = UsualInterval()
+        self._newest = now
+        self._is_expected = is_expected
+
+    def take(self, now: float) -> None:
+        """Learn that a message came."""
+        self._usual.take(now)
+        self._newest, self._is_expected = now, False
+
+    def silence(self, now: float) -> float:
+        """Return for how long [s] it has been silent; 0 while it comes as usual, and before it came twice.
+
+        One that is expected from the beginning is silent before, too.
+        """
+        seconds = now - self._newest
+        return seconds if seconds > SILENCE and (self._is_expected or self._usual.overdue(now) > 0.0) else 0.0
 
 
 class _Problem:
@@ -51,6 +76,7 @@ class Health:
         self._last_report = clock()
         self._problems: Dict[str, _Problem] = {}
         self._values: Dict[str, str] = {}
+        self._inputs: Dict[str, _Input] = {}
         self._processing = [0, 0.0, 0.0]
 
     def count(self, what: str, number: int = 1) -> None:
@@ -62,6 +88,17 @@ class Health:
         """Set a counter that is kept elsewhere; its total and its rate are reported."""
         with self._lock:
             self._counts[what] = total
+
+    def heard(self, topic: str) -> None:
+        """Learn that a message came on a topic that the stage needs; the report says when it ceases."""
+        with self._lock:
+            now = self._clock()
+            self._inputs.setdefault(topic, _Input(now)).take(now)
+
+    def expect(self, topic: str) -> None:
+        """Say it, too, when nothing ever comes on a topic."""
+        with self._lock:
+            self._inputs[topic] = _Input(self._clock(), True)
 
     def show(self, what: str, value: str) -> None:
         """Report a value as it is."""
@@ -125,6 +162,9 @@ class Health:
                 for kind, problem in self._problems.items()
                 if now - problem.last_seen < WARNING_PERIOD
             }
+            silent = {topic: one.silence(now) for topic, one in self._inputs.items()}
+        ceased = {f"nothing on {topic} for {seconds:.0f} s": Level.WARN for topic, seconds in silent.items() if seconds}
+        recent = {**ceased, **recent}
         return HealthReport(max(recent.values(), default=Level.OK), "; ".join(recent) or "running", values)
 
     def _counter_values(self, seconds: float) -> Dict[str, str]:

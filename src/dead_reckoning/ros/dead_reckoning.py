@@ -67,8 +67,11 @@ class DeadReckoning:
         if parameters.depth_type in depths:
             kind, depth_of = depths[parameters.depth_type]
             inputs.append((topics.DEPTH, kind, lambda message: self._take_depth(depth_of(message))))
-        for topic, kind, take in inputs:
-            rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=QUEUE_SIZE, tcp_nodelay=True)
+        self.health.expect(rospy.resolve_name(topics.HEADING))
+        for number, (topic, kind, take) in enumerate(inputs):
+            # Commands of thrusters come only while somebody drives; heading and depth must not cease.
+            call = guarded(self.health, take, topic if number else "")
+            rospy.Subscriber(topic, kind, call, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
     def _depth_of_pressure(self, message: FluidPressure) -> float:
         parameters = self._live.current

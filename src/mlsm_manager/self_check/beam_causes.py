@@ -46,7 +46,7 @@ def _standing(times: np.ndarray, angles: np.ndarray) -> List[Cause]:
     stretches = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2)
     found = [(float(times[first]), float(times[last] - times[first])) for first, last in stretches]
     return [
-        Cause(f"the head stood for {seconds:.0f} s, from", _CERTAIN, begin, metres=_gone(seconds))
+        Cause(f"the head stood for {seconds:.0f} s,", _CERTAIN, begin, metres=_gone(seconds))
         for begin, seconds in found
         if seconds > _STANDS
     ]
@@ -74,7 +74,7 @@ def _stuck(times: np.ndarray, beams: Sequence[PlacedBeam]) -> Optional[Cause]:
     seconds = float(times[last] - times[first])
     if seconds < _STANDS / 2.0:
         return None
-    text = f"the head stood for {seconds:.0f} s though it reported that it turns, from"
+    text = f"the head stood for {seconds:.0f} s though it reported that it turns,"
     return Cause(text, _CERTAIN, float(times[first]), metres=_gone(seconds))
 
 
@@ -113,8 +113,8 @@ def _length(placed: PlacedBeam) -> float:
 
 
 _MEASURES: Tuple[Tuple[str, Callable[[PlacedBeam], float]], ...] = (
-    ("the gain changed: echoes are {ratio:.1f} times as strong from then on,", _loudest),
-    ("gain, pulse length or range setting changed: echoes are {ratio:.1f} times as long from then on,", _length),
+    ("the gain changed: echoes are {ratio:.1f} times as strong from then on", _loudest),
+    ("gain, pulse length or range setting changed: echoes are {ratio:.1f} times as long from then on", _length),
 )
 """What a change of it means, and what is measured of a beam."""
 

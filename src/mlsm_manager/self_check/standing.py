@@ -44,7 +44,7 @@ def _moves(within: np.ndarray, elsewhere: np.ndarray) -> bool:
 def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) -> Cause:
     noise = max(float(elsewhere.std()) / np.sqrt(len(within)), 1e-2)
     nats = 0.5 * (float(within.mean() - elsewhere.mean()) / noise) ** 2
-    text = f"odometry frozen for {end - begin:.0f} s while the echoes move, from"
+    text = f"odometry frozen for {end - begin:.0f} s while the echoes move,"
     return Cause(text, _CERTAIN + nats, begin, metres=_SPEED * (end - begin))
 
 

@@ -18,10 +18,15 @@ def make_health(name: str) -> Health:
     return Health(name, lambda line: rospy.logwarn("%s", line))
 
 
-def guarded(health: Health, callback: Callable[..., None]) -> Callable[..., None]:
-    """Wrap a callback so that no message can end or silence the node: refusals and failures are counted and logged."""
+def guarded(health: Health, callback: Callable[..., None], topic: str = "") -> Callable[..., None]:
+    """Wrap a callback so that no message can end or silence the node: refusals and failures are counted and logged.
+
+    topic: from which messages are needed all the time; `health` says when they cease.
+    """
 
     def call(*arguments: Any) -> None:
+        if topic:
+            health.heard(rospy.resolve_name(topic))
         try:
             callback(*arguments)
         except RefusedInput as refused:

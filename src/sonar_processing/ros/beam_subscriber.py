@@ -39,7 +39,7 @@ class BeamSubscriber:
         self._subscriber = rospy.Subscriber(
             topics.BEAMS,
             rospy.AnyMsg,
-            guarded(health, self._take_message),
+            guarded(health, self._take_message, topics.BEAMS),
             # Of a buffer with more messages than a queue has places, rospy would drop the oldest without a word.
             queue_size=None,
             buff_size=_BUFFER_BYTES,

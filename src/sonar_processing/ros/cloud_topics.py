@@ -85,7 +85,7 @@ def subscribe_to_clouds(topic: str, take: Callable[[Cloud], None], health: Healt
     return rospy.Subscriber(
         topic,
         StampedIntensityCloudArrays,
-        guarded(health, lambda message: take(cloud_from_message(message))),
+        guarded(health, lambda message: take(cloud_from_message(message)), topic),
         queue_size=QUEUE_SIZE,
         buff_size=_CLOUD_BUFFER_BYTES,
         tcp_nodelay=True,

@@ -129,3 +129,32 @@ def test_a_problem_that_somebody_waits_to_hear_of_is_warned_of_each_time(stage):
         stage.health.answered_problem("changes of parameters refused", f"mean_k = -{value}")
     assert stage.warnings == [f"thresholder: changes of parameters refused: mean_k = -{value}" for value in (1, 2)]
     assert stage.health.report().values["changes of parameters refused"] == "2"
+
+
+def silent(stage, *, came, now, expected=False):
+    """Return level and text at `now` [s] of a stage whose input came at times `came`."""
+    stage.now = 0.0
+    if expected:
+        stage.health.expect("/heading")
+    for stage.now in came:
+        stage.health.heard("/heading")
+    stage.now = now
+    report = stage.health.report()
+    return report.level, report.text
+
+
+@pytest.mark.parametrize(
+    ("came", "now", "expected", "seconds"),
+    [
+        ((0.0, 0.1, 0.2), 4.0, False, None),
+        ((0.0, 0.1, 0.2), 6.2, False, 6),
+        ((0.0, 14.0, 28.0), 50.0, False, None),
+        ((0.0, 14.0, 28.0), 57.0, False, 29),
+        ((), 60.0, False, None),
+        ((), 6.0, True, 6),
+        ((0.0, 0.1), 2.0, True, None),
+    ],
+)
+def test_an_input_that_ceased_is_named_with_its_topic(stage, came, now, expected, seconds):
+    told = (Level.OK, "running") if seconds is None else (Level.WARN, f"nothing on /heading for {seconds} s")
+    assert silent(stage, came=came, now=now, expected=expected) == told
