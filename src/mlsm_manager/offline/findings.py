@@ -16,6 +16,7 @@ from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
+from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Cause, widened
 from mlsm_manager.self_check.headline import headline
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
@@ -193,7 +194,10 @@ def _trust(
         *_halves(solver),
         *odometry_decided(replayed.hypotheses.doubt),
     ]
-    covariances = widened(covariances, times, places, causes)
+    reported = Track(replayed.times, replayed.odometry).at(times)[:, :2]
+    # A path that went astray may be far too short, and an odometry without positions has none.
+    ways = max((places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
+    covariances = widened(covariances, times, ways, causes)
     return Trust([*verdicts, *further], times, covariances, replayed.matched, causes)
 
 
