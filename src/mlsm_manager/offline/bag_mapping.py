@@ -25,7 +25,7 @@ from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, od
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import ranked
-from mlsm_manager.self_check.echo_causes import echo_findings
+from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, echo_findings
 from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
@@ -78,7 +78,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     if options.fix_mount and echoes.mount != AS_TOLD:
         recording = recording.mounted(echoes.mount.turn, echoes.mount.is_over)
         scans = _scans(recording, extractor, options)
-        causes += [replace(cause, is_mended=True, turn=0.0) for cause in echoes.causes[:1]]
+        causes += [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in echoes.causes[:1]]
         echoes = echo_findings(scans, recording.sonar_in_base)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)

@@ -17,7 +17,7 @@ _SLIP_TOLD = np.radians(15.0)  # what half a run's scans tell to three deviation
 _NATS, _SLIP_NATS = 12.0, 6.0  # evidence from which on a cause is named; of a slip both sides must agree besides
 _ARM_NATS = 5.0  # an arm shows only in turns; no unbroken run had 5 nats for one above a metre
 _ONE_SIDE = 8  # pairs of scans before and after a slip
-_DEVIATION = np.radians(5.0)  # of a turn that is found so
+TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 
 
 class EchoFindings(NamedTuple):
@@ -39,7 +39,7 @@ def echo_findings(scans: Sequence[Scan], sonar_in_base: np.ndarray) -> EchoFindi
     # Thrusters' distances may be off by a third, and the solver finds how far: that is no cause.
     base = pairs.best(around(base, "scale", np.arange(0.6, 1.65, 0.05)))
     if told:
-        causes.append(Cause(_turn_text(best), turn.nats, turn=_DEVIATION if best.is_over else abs(best.turn)))
+        causes.append(Cause(_turn_text(best), turn.nats, turn=TURN_DEVIATION if best.is_over else abs(best.turn)))
     causes += _delayed(pairs, base)
     causes += [] if told else [*_shifted(pairs, base), *_slipped(pairs, base)]
     return EchoFindings(causes, best if told else AS_TOLD)
@@ -53,7 +53,7 @@ def _turned(pairs: ScanPairs) -> Hypothesis:
 
 def _turn_text(found: Hypothesis) -> str:
     turn = (np.degrees(found.turn) + 180.0) % 360.0 - 180.0
-    angle = f"turned by {turn:.0f} +- {np.degrees(_DEVIATION):.0f} deg against tf"
+    angle = f"turned by {turn:.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg against tf"
     if not found.is_over:
         return f"the sonar is {angle}, or the odometry's direction of motion against the vehicle"
     side = (
