@@ -37,13 +37,13 @@ def row(name: str, mapped: MappedBag) -> str:
     sharp = blocks_per_metre(blocks.mean[:, :2], blocks.resolution)
     return (
         f"{name:32} {len(single):5} {mapped.replayed.matched:7} {len(blocks):6} {sharp:9.2f} {single[most]:7.2f} "
-        f"{wander:7.2f} {mapped.odometry.name:9} {'' if mapped.findings is None else mapped.findings.trust.line}"
+        f"{wander:7.2f} {mapped.odometry.name:20} {'' if mapped.findings is None else mapped.findings.trust.line}"
     )
 
 
 def print_rows(folders: List[Path], options: List[str]) -> None:
     """Print a row for each recording in folders, or why it has no map."""
-    print(f"{'recording':32} scans matched blocks blocks/m  sweep  wander odometry  trust")
+    print(f"{'recording':32} scans matched blocks blocks/m  sweep  wander odometry             trust")
     for path in recordings_in(folders):
         try:
             parsed = map_bag_arguments([str(path), "--out", "nowhere", *options])

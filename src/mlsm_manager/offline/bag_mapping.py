@@ -102,7 +102,9 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     causes = ranked([*causes, *echoes.causes, *beam_causes(recording.beams), *standing_causes(scans, recording.track)])
-    findings = None if replayed.solver is None else Findings.of(replayed, refined, [signs.turns(), *refitted], causes)
+    findings, further = None, [signs.turns(), *refitted]
+    if replayed.solver is not None:
+        findings = Findings.of(replayed, refined, further, causes, odometry.assumed)
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)

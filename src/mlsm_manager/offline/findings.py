@@ -113,7 +113,8 @@ class Calibration:
 class Trust:
     """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
 
-    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked.
+    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
+    nobody measured and the path rests on, if anything.
     """
 
     verdicts: List[Verdict]
@@ -121,11 +122,13 @@ class Trust:
     covariances: np.ndarray
     matched: int
     causes: Sequence[Cause] = ()
+    assumed: str = ""
 
     @property
     def line(self) -> str:
         """One line for people."""
-        return headline(self.verdicts, self.matched, float(self.deviations.max()), self.causes, float(self.times[0]))
+        deviation, begin = float(self.deviations.max()), float(self.times[0])
+        return headline(self.verdicts, self.matched, deviation, self.causes, begin, self.assumed)
 
     @property
     def deviations(self) -> np.ndarray:
@@ -166,6 +169,7 @@ def _trust(
     calibration: Calibration,
     further: Sequence[Verdict],
     causes: Sequence[Cause],
+    assumed: str,
 ) -> Trust:
     """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
     solver = replayed.solver
@@ -198,7 +202,8 @@ def _trust(
     # A path that went astray may be far too short, and an odometry without positions has none.
     ways = max((places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
     covariances = widened(covariances, times, ways, causes)
-    return Trust([*verdicts, *further], times, covariances, replayed.matched, causes)
+    verdicts = [verdict.assuming(assumed) for verdict in (*verdicts, *further)]
+    return Trust(verdicts, times, covariances, replayed.matched, causes, assumed)
 
 
 def _radii(covariances: np.ndarray) -> np.ndarray:
@@ -246,18 +251,20 @@ class Findings:
 
     @classmethod
     def of(
-        cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict], causes: Sequence[Cause]
-    ) -> "Findings":
+        cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict], causes: Sequence[Cause],
+        assumed: str = "",
+    ) -> "Findings":  # fmt: skip
         """Return what was found in a run that the joint solver has followed.
 
-        further: what other checks say. causes: of what is wrong, ranked.
+        further: what other checks say. causes: of what is wrong, ranked. assumed: what nobody measured and the path
+        rests on, if anything.
         """
         solver = replayed.solver
         if refined is None:
             calibration, closing = Calibration.found(solver, solver.estimates[-1]), None
         else:
             calibration, closing = Calibration.of_batch(solver, refined.batch), refined.closing
-        return cls(calibration, _trust(replayed, refined, calibration, further, causes), closing)
+        return cls(calibration, _trust(replayed, refined, calibration, further, causes, assumed), closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""

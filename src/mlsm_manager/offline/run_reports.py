@@ -7,9 +7,8 @@ import numpy as np
 
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
-from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
-from mlsm_manager.offline.run_files import REFINED, REPORT, Run, trajectories_of
+from mlsm_manager.offline.run_files import REFINED, REPORT, trajectories_of
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import composed, inverse, transformed
@@ -73,7 +72,7 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
         blocks=run.blocks,
         verdicts=[] if findings is None else findings.trust.verdicts,
         calibration={} if findings is None else findings.calibration.by_name,
-        facts=_facts(mapped.recording, run),
+        facts=_facts(mapped),
         parameters=mapped.parameters.to_mapping(),
         uncertainty=None if findings is None else findings.trust.uncertainty,
         errors=errors,
@@ -81,10 +80,12 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
     )
 
 
-def _facts(recording: Recording, run: Run) -> Dict[str, str]:
+def _facts(mapped: MappedBag) -> Dict[str, str]:
+    recording, run, odometry = mapped.recording, mapped.run, mapped.odometry
     length, counts = float(np.hypot(*np.diff(run.best[:, :2], axis=0).T).sum()), run.counts
     return {
         "duration": f"{recording.seconds / 60.0:.1f} minutes",
+        "odometry": f"{odometry.name}, because {odometry.reason}",
         "way": f"{length:.0f} m",
         "beams": f"{len(recording.beams)}, and {recording.unplaced} that could not be placed",
         "scans": f"{counts['scans']}: {counts['matched']} matched, {counts['rejected']} rejected",

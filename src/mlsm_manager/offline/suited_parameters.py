@@ -45,7 +45,14 @@ class OdometryFound(NamedTuple):
         """What people call it."""
         if self.motion in (None, SweepMotion.MOVING):
             return self.kind.value.lower()
-        return "drifting" if self.motion is SweepMotion.DRIFTING else "standing"
+        names = {SweepMotion.STILL: "standing", SweepMotion.DRIFTING: "drifting"}
+        return names.get(self.motion, "not told, held still")
+
+    @property
+    def assumed(self) -> str:
+        """What the path rests on though nothing was measured of it; empty where something was."""
+        untold = "the vehicle is held still, and nothing tells whether it was"
+        return untold if self.motion is SweepMotion.UNTOLD else ""
 
 
 def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:

@@ -12,12 +12,14 @@ _FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one w
 
 
 def headline(
-    verdicts: Sequence[Verdict], matched: int, deviation: float, causes: Sequence[Cause] = (), begin: float = 0.0
-) -> str:
+    verdicts: Sequence[Verdict], matched: int, deviation: float, causes: Sequence[Cause] = (), begin: float = 0.0,
+    assumed: str = "",
+) -> str:  # fmt: skip
     """Return what the checks of a run say.
 
     causes: of what is wrong, ranked, in a run that began at `begin` [s]. matched: scans that were compared with the
-    surfaces of others. deviation: m, the largest stated one, root of the sum of both variances.
+    surfaces of others. deviation: m, the largest stated one, root of the sum of both variances. assumed: what nobody
+    measured and the path rests on, if anything.
     """
     by_answer = {answer: [one for one in verdicts if one.answer is answer] for answer in Answer}
     doubtful, missing = by_answer[Answer.DOUBTFUL], by_answer[Answer.NOT_MEASURED]
@@ -28,8 +30,8 @@ def headline(
         said = "; ".join([*wrong, *(one.text for one in doubtful)])
         return f"trust: DOUBTFUL: {said}{mended}; at best {within}"
     reason = f"{matched} scans matched, {_FEWEST_MATCHED} needed" if matched < _FEWEST_MATCHED else ""
-    if not by_answer[Answer.FINE]:
-        reason = f"none of {len(verdicts)} checks had enough data"
+    if not reason and not by_answer[Answer.FINE]:
+        reason = assumed or f"none of {len(verdicts)} checks had enough data"
     if reason:
         return f"trust: NOT MEASURED: {reason}; nothing can be said of the position{mended}"
     if missing:

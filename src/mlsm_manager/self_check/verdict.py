@@ -1,6 +1,6 @@
 """What a check found."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from datetime import datetime, timezone
 from enum import Enum
 
@@ -47,6 +47,12 @@ class Verdict:
     def fires(self) -> bool:
         """Whether the run is not to be trusted in this respect."""
         return self.answer is Answer.DOUBTFUL
+
+    def assuming(self, assumed: str) -> "Verdict":
+        """Return the verdict of a run whose path rests on what nobody measured, if any: fine is then not measured."""
+        if not assumed or self.answer is not Answer.FINE:
+            return self
+        return replace(self, value=np.nan, text=assumed)
 
     def line(self) -> str:
         """Return the verdict as one line."""

@@ -1,6 +1,7 @@
 """How map_bag takes recordings: corrected, scan by scan, and what it leaves of a run in its folder and says of it."""
 
 import json
+from dataclasses import replace
 
 import matplotlib.colors
 import matplotlib.image
@@ -15,7 +16,7 @@ from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.verdict import Answer, Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.geometry import composed, matrices
 from recordings.bags.bag import RecordingError
@@ -85,6 +86,14 @@ def trust_of(*verdicts, times=(0.0, 10.0, 200.0), matched=3):
 )
 def test_the_headline_says_fine_only_of_what_was_measured(verdicts, matched, line):
     assert trust_of(*verdicts, matched=matched).line == f"trust: {line}"
+
+
+def test_no_check_is_fine_of_a_path_that_was_only_assumed():
+    verdicts = [one.assuming("it was held still") for one in (FINE, SHORT)]
+    trust = replace(trust_of(*verdicts), assumed="it was held still")
+    assert [one.answer for one in verdicts] == [Answer.NOT_MEASURED] * 2
+    assert trust.line == "trust: NOT MEASURED: it was held still; nothing can be said of the position"
+    assert FIRING.assuming("it was held still") is FIRING
 
 
 def test_stretches_are_doubtful_where_a_check_fires():
