@@ -48,7 +48,7 @@ class Echoes:
         motion = log.node_motion(np.array([scan, scan + 1]))
         nodes = np.zeros((log.scan_count + 1, parameters.odometry.width))
         nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
-        solution = Solution(log, parameters, State(nodes, parameters.run_mean))
+        solution = Solution(log, parameters, State(nodes, parameters.run_mean(log)))
         surfaces = solution.placed(log.rows(scan, scan + 1))
         posts = solution.placed_posts(log.posts.rows(scan, scan + 1))
         weights = parameters.post_confidence * _POST_WEIGHT * posts.qualities**_POST_POWER

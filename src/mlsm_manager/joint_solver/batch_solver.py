@@ -203,7 +203,7 @@ class _Batch:
         equations = NormalEquations(self._layout.size)
         odometry, parameters = self._odometry, self._parameters
         value = np.append(self.state.nodes[0], self.state.run)
-        mean = np.append(odometry.first_node(), parameters.run_mean)
+        mean = np.append(odometry.first_node(), parameters.run_mean(self._run.log))
         deviations = np.append(odometry.first_deviations(), parameters.run_deviations(self._run.log))
         equations.add_prior(self._layout.with_run(np.array([0]))[0], value, mean, deviations)
         odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)

@@ -130,7 +130,7 @@ class LiveSolver:
         self.log = RunLog(sonar_in_base)
         self.odometry = parameters.odometry
         self.estimates: List[Optional[LiveEstimate]] = []
-        self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean)
+        self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean(self.log))
         self._start, self._known = start, known
         self.submaps = Submaps(np.empty(0))
         self.fixes = Fixes()

@@ -212,7 +212,7 @@ class LiveWindow:
         deviations = self._odometry.first_deviations()
         if start is not None:
             deviations[POSE] = start
-        mean = np.append(self._odometry.first_node(), self._parameters.run_mean)
+        mean = np.append(self._odometry.first_node(), self._parameters.run_mean(self._log))
         return mean, np.append(deviations, self._parameters.run_deviations(self._log))
 
     def _beliefs_of(self, frozen: LiveEstimate) -> Tuple[np.ndarray, np.ndarray]:

@@ -32,6 +32,10 @@ class JointSolverParameters(ParameterSet):
     )  # fmt: skip
     plateau_scale_deviation: float = parameter(
         0.03, "least range_scale_deviation where echoes are plateaus", low=0.0, high=0.5, tunable=False,
+        expert="plateau_scale_error may be as wrong as it is large, and the speed of sound by 2 %; 0 once calibrated",
+    )  # fmt: skip
+    plateau_scale_error: float = parameter(
+        -0.008, "added to range_scale_error where echoes are plateaus", low=-0.5, high=0.5, tunable=False,
         expert="in a marina plateaus lengthen by 1.6 % of range, so their middle moves outwards; 0 once calibrated",
     )  # fmt: skip
     echo_deviation: float = parameter(
@@ -150,10 +154,10 @@ class SolverParameters(JointSolverParameters):
         """
         return 0.0 if self.odometry.distance_deviation < _POOR_DISTANCES else _STOP_SIGMA
 
-    @property
-    def run_mean(self) -> np.ndarray:
-        """(2,) the run's unknowns, error of the range scale and delay [s], as expected before the run."""
-        return np.array([self.range_scale_error, self.sonar_delay])
+    def run_mean(self, log: RunLog) -> np.ndarray:
+        """Return (2,) a run's unknowns, error of the range scale and delay [s], as expected for echoes like its."""
+        of_plateaus = self.plateau_scale_error if log.has_plateaus else 0.0
+        return np.array([self.range_scale_error + of_plateaus, self.sonar_delay])
 
     def run_deviations(self, log: RunLog) -> np.ndarray:
         """Return (2,) their standard deviations for the echoes of a run.

@@ -54,7 +54,7 @@ class Calibration:
         odometry, parameters = solver.odometry, solver.parameters
         columns = list(odometry.calibrated.values())
         deviations = np.append(parameters.run_deviations(solver.log), odometry.first_deviations()[columns])
-        values = np.append(parameters.run_mean, odometry.first_node()[columns])
+        values = np.append(parameters.run_mean(solver.log), odometry.first_node()[columns])
         return cls((*_OF_RUN, *odometry.calibrated), values, np.maximum(deviations, HELD_DEVIATION))
 
     @classmethod
@@ -101,7 +101,7 @@ class Calibration:
         value["range_scale"] = before.range_scale * (1.0 + value.pop("range_scale_error"))
         value["sonar_delay"] = before.sonar_delay + value["sonar_delay"]
         value["range_scale_deviation"], value["sonar_delay_deviation"] = self.deviations[:2].tolist()
-        value["plateau_scale_deviation"] = 0.0
+        value["plateau_scale_deviation"] = value["plateau_scale_error"] = 0.0
         # Within their ranges, so that a run that went astray has a live.yaml too.
         ranges = {field.name: describe(field) for field in fields(ReplayParameters) if field.name in value}
         return parameters.changed(

@@ -212,5 +212,7 @@ def _values(options: argparse.Namespace) -> Dict[str, Any]:
     if remarks + told:
         print(f"map_bag: {OLD_KEYS}: {'; '.join(dict.fromkeys(remarks + told))}", file=sys.stderr)
     if not options.calibrate:
-        values.update(range_scale_deviation=0.0, plateau_scale_deviation=0.0, sonar_delay_deviation=0.0)
+        values.update(
+            range_scale_deviation=0.0, plateau_scale_deviation=0.0, plateau_scale_error=0.0, sonar_delay_deviation=0.0
+        )
     return values
