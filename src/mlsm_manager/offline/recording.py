@@ -14,10 +14,10 @@ from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
 from recordings.reader import Request, read
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam, has_other_bins
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.echo_extractor import EchoExtractor
+from sonar_processing.filters.echo_extractor import FEWEST_BEAMS, EchoExtractor
 from sonar_processing.scans.assembler import RevolutionCollector
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
@@ -115,11 +115,17 @@ def _echoes(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Cl
 
 
 def _turns(beams: List[PlacedBeam]) -> Iterator[List[PlacedBeam]]:
-    """Yield the beams of each turn or sweep; of a head that finished none, the longest part of one."""
+    """Yield the beams of each turn or sweep, and of each part of one that a change of the bins ended.
+
+    Of a head that finished none, the longest part comes last.
+    """
     collector = RevolutionCollector()
     start, length, has_finished = 0, 0, False
     for index, placed in enumerate(beams):
-        turn = collector.add(placed)
+        held, turn = len(collector), collector.add(placed)
+        if held >= FEWEST_BEAMS and has_other_bins(placed.beam, beams[index - 1].beam):
+            length = 0
+            yield beams[index - held : index]
         if turn is not None:
             has_finished = True
             yield turn

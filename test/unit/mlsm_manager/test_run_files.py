@@ -11,7 +11,7 @@ from made_harbour import SONAR_IN_BASE, tour, with_wild_odometry
 from made_maps import blocks_of
 
 from mlsm_manager.offline.findings import Trust
-from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.offline.recording import Recording, Truth, scans_of
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
@@ -22,6 +22,7 @@ from node_support.geometry import composed, matrices
 from recordings.bags.bag import RecordingError
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 TIMES = np.arange(4.0)
 ODOMETRY_POSES = np.column_stack([TIMES, np.zeros(4), np.full(4, 4.0)])
@@ -175,6 +176,16 @@ def test_ranges_are_scaled_from_the_sonar(recording):
 def test_beams_beyond_the_odometry_count_as_unplaced(recording):
     found = recording.corrected(BeamCorrection(sonar_delay=1.0))
     assert (len(found.beams), found.unplaced) == (2, 3)
+
+
+@pytest.mark.parametrize(("lengths", "scans"), [((30, 63), [30, 63]), ((9, 63), [63]), ((30, 40), [30, 40])])
+def test_the_part_of_a_turn_before_a_change_of_the_range_is_kept_if_it_shows_a_ring(lengths, scans):
+    echo = 200 * (np.arange(100) == 50).astype(np.uint8)
+    settings = np.repeat([0.1, 0.2], lengths)
+    beams = [Beam(10**8 * n, "sonar", 0.1 * n, echo, resolution) for n, resolution in enumerate(settings, 1)]
+    placed = [PlacedBeam(beam, np.eye(4), is_moving=False) for beam in beams]
+    still = Recording(placed, 0, Track(SECONDS, np.zeros((11, 3))), truth=None)
+    assert [count for _, count in scans_of(still, EchoExtractor(EchoExtractorParameters()))] == scans
 
 
 def test_a_planar_pose_as_a_matrix_keeps_height_and_level():
