@@ -11,6 +11,7 @@ from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
 from mlsm_manager.offline.run_files import REFINED, REPORT, trajectories_of
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.verdict import counted
 from node_support.geometry import composed, inverse, transformed
 
 _MOST_LOOPS = 5  # loops that are printed; summary.json has all
@@ -37,8 +38,8 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     """Return what map_bag prints at its end."""
     alone = summary["scans"] - summary["matched"] - summary["rejected"]
     lines = [
-        f"{summary['scans']} scans, {summary['matched']} matched, {summary['rejected']} rejected, "
-        f"{alone} with nothing to match; {summary['blocks']} blocks; {summary['seconds']} s, "
+        f"{counted(summary['scans'], 'scan')}, {summary['matched']} matched, {summary['rejected']} rejected, "
+        f"{alone} with nothing to match; {counted(summary['blocks'], 'block')}; {summary['seconds']} s, "
         f"{summary['times_real_time']} times real time",
         f"odometry: {summary['odometry']['profile']}, because {summary['odometry']['reason']}",
     ]
@@ -49,7 +50,7 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     for session in summary.get("sessions", []):
         found = session["found_after_scans"]
         place = "not found in the map, nothing added" if found is None else f"found in the map with scan {found + 1}"
-        lines.append(f"{session['bag']}: {session['scans']} scans, {session['matched']} matched, {place}")
+        lines.append(f"{session['bag']}: {counted(session['scans'], 'scan')}, {session['matched']} matched, {place}")
     lines += [f"found again after a silence of the sonar at {line}" for line in summary.get("found_again", [])]
     if "loops" in summary:
         lines += [f"loop: {line}" for line in summary["loops"]["found"][:_MOST_LOOPS]]
@@ -89,7 +90,7 @@ def _facts(mapped: MappedBag) -> Dict[str, str]:
         "way": f"{length:.0f} m",
         "beams": f"{len(recording.beams)}, and {recording.unplaced} that could not be placed",
         "scans": f"{counts['scans']}: {counts['matched']} matched, {counts['rejected']} rejected",
-        "map": f"{counts['blocks']} blocks, cells of {run.blocks.resolution:g} m",
+        "map": f"{counted(counts['blocks'], 'block')}, cells of {run.blocks.resolution:g} m",
     }
 
 

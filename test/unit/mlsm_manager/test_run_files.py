@@ -80,6 +80,7 @@ def trust_of(*verdicts, times=(0.0, 10.0, 200.0), matched=3):
         ((FINE, FINE), 3, "all 2 checks are fine, nothing contradicts: position within 8.7 m"),
         ((FINE, SHORT), 3, "1 of 2 checks are fine, NOT MEASURED: length; position within 8.7 m if these are fine too"),
         ((SHORT,), 3, "NOT MEASURED: none of 1 checks had enough data; nothing can be said of the position"),
+        ((FINE,), 1, "NOT MEASURED: 1 scan matched, 3 needed; nothing can be said of the position"),
         ((FINE,), 2, "NOT MEASURED: 2 scans matched, 3 needed; nothing can be said of the position"),
         ((FINE, SHORT, FIRING), 3, "DOUBTFUL: too wide (2 m); at best position within 8.7 m"),
         ((FIRING,), 0, "DOUBTFUL: too wide (2 m); at best position within 8.7 m"),
