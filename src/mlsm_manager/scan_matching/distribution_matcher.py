@@ -38,6 +38,7 @@ class MatcherLimits:
     min_gain_over_second: lead in log-likelihood [nat] of the best pose over any other.
     min_significance: lead of the matched share of points over that of random poses, in standard deviations.
     min_agreement: share of echoes that the map explains times share of the map that no echo denies.
+    same_place: poses nearer than this that fit nearly as well widen the covariance; farther ones refuse the fix.
     """
 
     # 3.5 m and 22 deg find 99 % of moves of 3 m and 20 deg, in 8 to 35 ms.
@@ -53,13 +54,15 @@ class MatcherLimits:
     min_gain_over_second: float = 3.0  # the best place is e^3, 20 times, as likely as the second-best
     min_significance: float = 5.0  # chance alone leads by so much once in millions of scans
     min_agreement: float = 0.8  # a wrong place seldom explains so much; boats and tide explain less at the right one
+    same_place: float = 0.0  # near the expected place the next scan decides
 
 
 NEARBY = MatcherLimits()
 # Up to 500 m away with any heading; a cell of 1 m keeps the search within seconds, and 80 candidates make up for it.
-# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next.
+# A wrong place costs a lost vehicle more than none: it must be e^6 times as likely as the next. In a marina of which
+# the sonar sends plateaus, poses up to 2.4 m beside the best one fit nearly as well; the next scans tell which it is.
 EVERYWHERE = MatcherLimits(
-    search_distance=500.0, search_angle=np.pi, search_cell=1.0, candidates=80, min_gain_over_second=6.0
+    search_distance=500.0, search_angle=np.pi, search_cell=1.0, candidates=80, min_gain_over_second=6.0, same_place=3.0
 )
 
 
@@ -89,6 +92,7 @@ class DistributionMatcher:
         if status is MatchStatus.CONVERGED:
             best = replace(best, covariance=refiner.residual_covariance(best))
             status, reason = self._judge_second_places(best, fits[1:], refiner)
+            best = self._covering(best, fits[1:])
         return _result(status, reason, motion, best, start)
 
     def _fits(
@@ -145,22 +149,38 @@ class DistributionMatcher:
         return MatchStatus.CONVERGED, ""
 
     def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
-        """Reject a fix whose covariance excludes a pose that fits nearly as well."""
+        """Reject a fix whose covariance excludes a pose of another place that fits nearly as well."""
         least = self.limits.min_gain_over_second
         if least == 0.0:
             return MatchStatus.CONVERGED, ""
         for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
-            if lead < least and separation(best.theta, other.theta) >= _APART and _excluded(best, other.theta):
+            is_apart = separation(best.theta, other.theta) >= _APART and not self._is_same_place(best, other)
+            if lead < least and is_apart and _excluded(best, other.theta):
                 reason = f"another pose fits nearly as well: its log-likelihood is only {lead:.1f} less"
                 return MatchStatus.AMBIGUOUS, reason
         values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
-        excluded = _EXCLUDED * float(np.sqrt(values[-1]))
+        excluded = max(_EXCLUDED * float(np.sqrt(values[-1])), self.limits.same_place)
         lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
         if lead < least:
             reason = f"a pose beside it fits nearly as well: its log-likelihood is only {lead:.1f} less"
             return MatchStatus.AMBIGUOUS, reason
         return MatchStatus.CONVERGED, ""
+
+    def _is_same_place(self, best: Fit, other: Fit) -> bool:
+        x, y, yaw = (other.theta - best.theta)[POSE]
+        return bool(np.hypot(x, y) < self.limits.same_place and abs(wrapped(yaw)) < self.limits.max_yaw_deviation)
+
+    def _covering(self, best: Fit, others: List[Fit]) -> Fit:
+        """Return a fit as unsure as the farthest pose of the same place that fits nearly as well is away."""
+        most = best.gain(best.inflation) - self.limits.min_gain_over_second
+        near = [one for one in others if self._is_same_place(best, one) and one.gain(best.inflation) > most]
+        if not near:
+            return best
+        differences = np.array([one.theta - best.theta for one in near])
+        differences[:, YAW] = wrapped(differences[:, YAW])
+        farthest = differences[np.argmax(np.hypot(differences[:, X], differences[:, Y]))]
+        return replace(best, covariance=best.covariance + np.outer(farthest, farthest))
 
 
 def relocalised(scan: Scan, target: BlockSource, matcher: Matcher, errors: OdometryErrors) -> MatchResult:

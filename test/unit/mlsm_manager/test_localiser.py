@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from benchmarks.matchers import BEAM_WIDTH
 from benchmarks.open_water import bubbles, outcome
-from made_scans import SECONDS, drifting, elsewhere, harbour, scan_of, still, wall
+from made_scans import SECONDS, drifting, elsewhere, harbour, map_of, scan_of, still, wall
 
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
@@ -241,6 +241,17 @@ def found(scan, estimator):
 def test_relocalisation_along_a_wall_is_refused():
     estimator, _ = mapped([scan_of(wall((-20, 10), (20, 10)), still())])
     assert not found(scan_of(wall((-10, 10), (10, 10)), still()), estimator).accepted
+
+
+@pytest.mark.parametrize(("aside", "is_found"), [(1.2, True), (5.0, False)])
+def test_relocalisation_in_a_map_with_everything_twice_covers_both_poses_of_one_place(aside, is_found):
+    blocks = map_of(np.vstack([harbour(), harbour() + np.array([aside, 0.0])]))
+    result = relocalised(
+        scan_of(harbour(), still()), blocks, DistributionMatcher(EVERYWHERE, BEAM_WIDTH, 0.0), OdometryErrors()
+    )
+    assert result.accepted == is_found, result.reason
+    if is_found:
+        assert np.abs(result.pose[0] - np.array([0.0, aside])).max() < 2.0 * np.sqrt(result.covariance[0, 0])
 
 
 def test_relocalisation_in_an_empty_map_is_refused():
