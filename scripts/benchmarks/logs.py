@@ -36,13 +36,15 @@ def blur(echoes: np.ndarray, sweep: np.ndarray, side: float) -> float:
     echoes: (n, 2) m, of all sweeps as placed in the map, `sweep` (k, 2) among them. side: of a block, m. In each cell
     of a metre as many echoes are drawn as the sweep has there, so that only what lies elsewhere makes more blocks.
     """
+    if not len(sweep):
+        return np.nan
     generator, cells = np.random.default_rng(0), np.floor(echoes / _METRE)
     drawn = []
     for cell, count in zip(*np.unique(np.floor(sweep / _METRE), axis=0, return_counts=True)):
         here = echoes[(cells == cell).all(axis=1)]
         drawn += [generator.choice(here, count, replace=False) for _ in range(_DRAWS)]
     filled = sum(_cells(places, side) for places in drawn) / _DRAWS
-    return filled / _cells(sweep, side) if drawn else np.nan
+    return filled / _cells(sweep, side)
 
 
 def row(name: str, mapped: MappedBag) -> str:

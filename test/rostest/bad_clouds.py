@@ -12,6 +12,8 @@ from underwater_map_construction.msg import StampedIntensityCloud
 
 STAGES = {"thresholder": "/sonar/scan/sonarCloud", "outlier_remover": "/sonar/scan/thresholded",
           "mlsm_core": "/sonar/scan/cleaned"}  # fmt: skip
+LISTENERS = {"outlier_remover": 2, "mlsm_core": 2}
+"""Nodes that take a stage's input, where a detector takes it too."""
 
 
 def wall(points: int = 400) -> np.ndarray:
@@ -35,7 +37,9 @@ class BadClouds(unittest.TestCase):
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         inputs = {**STAGES, "matching": "/sonar/scan/echoes"}
-        cls.inputs = {stage: publisher(topic, StampedIntensityCloud) for stage, topic in inputs.items()}
+        cls.inputs = {
+            stage: publisher(topic, StampedIntensityCloud, LISTENERS.get(stage, 1)) for stage, topic in inputs.items()
+        }
         wait_for_links("/sonar/scan/thresholded", 1)
         wait_for_links("/sonar/scan/cleaned", 1)
 
