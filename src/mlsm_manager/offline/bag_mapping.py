@@ -5,7 +5,7 @@ from argparse import Namespace
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
-from typing import List, Optional
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 from tqdm import tqdm
@@ -24,7 +24,7 @@ from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
-from mlsm_manager.self_check.causes import ranked
+from mlsm_manager.self_check.causes import Cause, ranked
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, echo_findings
 from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -73,13 +73,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
         odometry = odometry_of(recording, options.declared is MotionSource.STANDING)
     recording = recording.corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
-    scans = _scans(recording, extractor, options)
-    echoes = echo_findings(scans, recording.sonar_in_base)
-    if options.fix_mount and echoes.mount != AS_TOLD:
-        recording = recording.mounted(echoes.mount.turn, echoes.mount.is_over)
-        scans = _scans(recording, extractor, options)
-        causes += [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in echoes.causes[:1]]
-        echoes = echo_findings(scans, recording.sonar_in_base)
+    recording, scans, of_echoes = _heard(recording, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
@@ -101,15 +95,35 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
             refitted = refitted_verdicts(replayed.solver, refined.batch)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    causes = ranked([*causes, *echoes.causes, *beam_causes(recording.beams), *standing_causes(scans, recording.track)])
+    causes = ranked([*causes, *of_echoes, *beam_causes(recording.beams), *standing_causes(scans, recording.track)])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
-        findings = Findings.of(replayed, refined, further, causes, odometry.assumed)
+        findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(of_echoes))
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
     return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
+
+
+def _heard(
+    recording: Recording, extractor: EchoExtractor, options: Namespace
+) -> Tuple[Recording, List[Scan], List[Cause]]:
+    """Return the recording with its mount put right where that is asked for, its scans, and what they tell is wrong."""
+    scans = _scans(recording, extractor, options)
+    found = echo_findings(scans, recording.sonar_in_base)
+    if not options.fix_mount or found.mount == AS_TOLD:
+        return recording, scans, found.causes
+    mounted = recording.mounted(found.mount.turn, found.mount.is_over)
+    scans = _scans(mounted, extractor, options)
+    mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes[:1]]
+    return mounted, scans, [*mended, *echo_findings(scans, mounted.sonar_in_base).causes]
+
+
+def _assumed_mount(of_echoes: Sequence[Cause]) -> str:
+    """Return that the mount was put right by the echoes, if it was: to some degrees only, of which no check tells."""
+    is_mended = any(cause.is_mended for cause in of_echoes)
+    return "the mount is as the echoes tell it, to some degrees; correct tf and map again" if is_mended else ""
 
 
 def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:

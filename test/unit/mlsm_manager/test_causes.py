@@ -6,13 +6,16 @@ from benchmarks import fault_makers as broken
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
+from mlsm_manager.offline.bag_mapping import mapped_bag
 from mlsm_manager.offline.causes import with_odometry_mended
+from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.standing import standing_causes
+from mlsm_manager.self_check.verdict import Answer
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
@@ -118,6 +121,13 @@ def test_a_mount_that_is_put_right_has_no_cause_left(fault):
     recording = fault(WHOLE)
     mount = found_in(recording).mount
     assert found_in(recording.mounted(mount.turn, mount.is_over)).causes == []
+
+
+def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
+    options = map_bag_arguments(["recording", "--out", "nowhere", "--fix-mount"])
+    trust = mapped_bag(broken.mount_turned(WHOLE, 120.0), options).findings.trust
+    assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
+    assert "mended: the sonar is turned by" in trust.line
 
 
 def test_causes_are_ranked_by_evidence_and_what_was_mended_comes_last():
