@@ -37,11 +37,11 @@ def insert_points(store: BlockStore, points: np.ndarray, resolution: float) -> n
 
 def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
     """Insert blocks of the store's resolution, which may overlap; return the keys (c,) of their cells, sorted."""
-    cells, order, starts = sorted_by_cell(cell_keys(blocks.cells), blocks.bottom)
+    # Single precision would be compiled anew, for seconds, when the first loop closes.
+    rows = blocks.rows.astype(np.float64, copy=False)
+    cells, order, starts = sorted_by_cell(cell_keys(blocks.cells), rows[:, BOTTOM])
     owner = np.repeat(np.arange(len(cells)), np.diff(starts))
-    _insert_groups(
-        store, cells, Groups(blocks.rows[order].astype(np.float64), owner, blocks.crossed[order]), blocks.resolution
-    )
+    _insert_groups(store, cells, Groups(rows[order], owner, blocks.crossed[order]), blocks.resolution)
     return cells
 
 

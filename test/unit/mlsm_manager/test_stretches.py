@@ -9,6 +9,7 @@ from mlsm_manager.localisation import stretches
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.stretches import Stretches
+from mlsm_manager.surface_map.point_groups import sorted_by_cell
 
 EVERYTHING = 1e9
 
@@ -101,3 +102,9 @@ def test_free_space_moves_too():
     before = made.free.blocks.mean[:, :2]
     made.redraw(Bent(8.0))
     np.testing.assert_allclose(np.sort(made.free.blocks.mean[:, 1]), np.sort(before[:, 1]) + 8.0)
+
+
+def test_a_map_is_drawn_anew_by_the_loops_that_are_compiled_for_every_map():
+    """Loops for single precision, in which stretches are kept, would be compiled for seconds when a loop closes."""
+    settled(patch(1)).redraw(Bent(8.0))
+    assert {bottoms.dtype.name for _, bottoms in sorted_by_cell.signatures} == {"float64"}
