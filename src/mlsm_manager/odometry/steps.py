@@ -121,7 +121,9 @@ class ContinuousOdometry:
 
     def fixes(self, times: np.ndarray) -> np.ndarray:
         """Return T_continuous_odom (..., 3) at `times` (...) s."""
-        return np.array(self._fixes)[np.searchsorted(self._starts, times, side="right") - 1]
+        # The starts first: another thread may take a step meanwhile, and adds its fix before its start.
+        numbers = np.searchsorted(self._starts, times, side="right") - 1
+        return np.array(self._fixes)[numbers]
 
     def followed(self, track: Track) -> Track:
         """Return T_continuous_base of a track that was taken, without what was interpolated within a step."""
