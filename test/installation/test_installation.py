@@ -31,7 +31,19 @@ def prefix(tmp_path_factory):
     assert done.returncode == 0, done.stdout
     # The workspace of scripts/bootstrap consists of links, which make installs as links: copy what they point to.
     shutil.copytree(str(staged / str(WORKSPACE / "install").lstrip("/")), str(prefix))
+    _copy_compiled_loops(next(prefix.rglob("node_support")).parent)
     return prefix
+
+
+def _copy_compiled_loops(modules):
+    """Spare the installed programs half a minute: numba takes what it compiled for a file of the same time and size."""
+    for cache in (ROOT / "src").rglob("__pycache__"):
+        installed = modules / cache.parent.relative_to(ROOT / "src")
+        for loop in cache.glob("*.nb[ci]"):
+            (installed / "__pycache__").mkdir(exist_ok=True)
+            shutil.copy(str(loop), str(installed / "__pycache__"))
+            source = f"{loop.name.split('.')[0]}.py"
+            shutil.copystat(str(cache.parent / source), str(installed / source))
 
 
 def _environment():
