@@ -10,6 +10,7 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
+from old_bag import with_old_types
 
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import Bag, RecordingError
@@ -65,6 +66,11 @@ def test_what_is_written_is_read_again(tmp_path, compression):
             assert [(time, repr(one)) for time, one in written.messages(topic)] == [
                 (time, repr(one)) for time, one in expected
             ]
+
+
+def test_a_bag_of_2015_gives_what_the_same_bag_of_today_gives(tmp_path, expected):
+    with_old_types(BASIN, tmp_path / "old.bag")
+    assert_same(read_recording(tmp_path / "old.bag", NAMES), expected)
 
 
 def test_a_ros2_bag_gives_what_the_ros1_bag_gives(ros2_bag, expected):
