@@ -204,6 +204,7 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(
                 topics.MATCHED_ODOMETRY, "nav_msgs/Odometry", "the fix with the velocity, for robot_localization"
             ),
+            _publishes(topics.POSITION_STATUS, "PositionStatus", "how well the position is known now; latched"),
             _publishes(topics.MATCHED_PATH, "nav_msgs/Path", "all fixes; latched"),
             _publishes(
                 topics.MATCHED_SCAN, "sensor_msgs/PointCloud2", "the newest scan as matching undistorts and places it"

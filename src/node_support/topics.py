@@ -33,6 +33,7 @@ MAP_CLOUD = "MLSM/cloud"  # PointCloud2: the blocks of the map
 MAP_GRID = "MLSM/grid"  # OccupancyGrid: free, unknown and occupied from above
 MAP_OCTOMAP = "MLSM/octomap"  # octomap_msgs/Octomap: the map as voxels, where these messages are installed
 MATCHED_POSE = "MLSM/pose"  # PoseWithCovarianceStamped: the vehicle in the map at the newest match
+POSITION_STATUS = "MLSM/status"  # PositionStatus: how well the position is known now
 MATCHED_ODOMETRY = "MLSM/odometry"  # Odometry: the vehicle in the map at the newest match
 MATCHED_SCAN = "MLSM/scan"  # PointCloud2: the newest scan where matching puts it, accepted or not
 MATCHED_PATH = "MLSM/path"  # Path: the vehicle in the map at all matches

@@ -12,7 +12,7 @@ from tf2_msgs.msg import TFMessage
 
 from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
-from underwater_map_construction.msg import StampedIntensityCloud
+from underwater_map_construction.msg import PositionStatus, StampedIntensityCloud
 
 SCANS = 4
 SECONDS = 16.0
@@ -25,6 +25,7 @@ class Standing(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.fixes, cls.transforms = Inbox("/MLSM/odometry", Odometry), Inbox("/tf", TFMessage)
+        cls.statuses = Inbox("/MLSM/status", PositionStatus)
         cls.diagnostics = Diagnostics()
         publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
         wait_for_publisher_links(publisher, 1)
@@ -45,6 +46,11 @@ class Standing(unittest.TestCase):
     def test_map_to_odom_comes_to_the_fix_and_stays(self) -> None:
         found = self.transforms.wait_for(lambda message: message.transforms[0].transform.translation.x > 0.4)
         self.assertAlmostEqual(found.transforms[0].transform.translation.x, 0.5, delta=0.1)
+
+    def test_it_is_told_how_well_the_position_is_known(self) -> None:
+        good = self.statuses.wait_for(lambda status: status.state == PositionStatus.GOOD)
+        self.assertEqual(good.header.frame_id, "map")
+        self.assertTrue(0.0 < good.covariance[0] + good.covariance[4] < 25.0, good)
 
     def test_the_place_can_be_searched_for(self) -> None:
         answer = rospy.ServiceProxy("/mlsm_core/relocalise", Trigger)()

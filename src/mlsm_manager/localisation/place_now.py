@@ -1,26 +1,41 @@
 """How old the newest fix is, and how well the position is known now that the odometry alone has carried it on."""
 
-from typing import NamedTuple, Optional, Tuple
+from enum import IntEnum
+from typing import NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.scan_matching.scan_path import POSITION
+from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
 from node_support.health import Health, Level
 from node_support.timing import UsualInterval
 
 
+class PositionState(IntEnum):
+    """How well a position is known; the numbers and meanings are those of msg/PositionStatus.msg."""
+
+    GOOD = 0
+    PROVISIONAL = 1
+    DOUBTFUL = 2
+    UNKNOWN = 3
+
+
 class PlaceNow(NamedTuple):
     """age: s since the end of the scan of the newest fix. overdue: s since two more should have come.
 
-    deviation: m, root of both variances' sum, propagated to now by the odometry's errors.
+    covariance: (3, 3) of x, y and yaw in the map [m, rad], propagated to now by the odometry's errors.
     """
 
     age: float
     overdue: float
-    deviation: float
+    covariance: np.ndarray
+
+    @property
+    def deviation(self) -> float:
+        """Root of the sum of both variances of the position, m."""
+        return float(np.sqrt(max(np.trace(self.covariance[POSITION, POSITION]), 0.0)))
 
 
 class FixAge:
@@ -52,8 +67,28 @@ class FixAge:
         if time > belief.time and self._believed[0] == belief.time:
             track = Track(np.array([belief.time, time]), np.array([self._believed[1], pose]))
             covariance = predicted(belief, track, time, errors).covariance
-        deviation = float(np.sqrt(max(np.trace(covariance[POSITION, POSITION]), 0.0)))
-        return PlaceNow(time - self._fixed_at, self._fixes.overdue(time), deviation)
+        return PlaceNow(time - self._fixed_at, self._fixes.overdue(time), covariance[POSE, POSE])
+
+
+def position_state(
+    place: Optional[PlaceNow], is_lost: bool, is_provisional: bool, doubts: Sequence[str]
+) -> Tuple[PositionState, str]:
+    """Return how well the position is known, and that in words.
+
+    place: None before the first fix. doubts: texts of the checks that fire.
+    """
+    if is_lost:
+        return PositionState.UNKNOWN, "position lost: it is searched for in the whole map"
+    if place is None:
+        return PositionState.UNKNOWN, "no position yet"
+    if place.deviation > LARGEST_DEVIATION:
+        return PositionState.UNKNOWN, f"position not known, {place.deviation:.1f} m"
+    if doubts:
+        return PositionState.DOUBTFUL, f"position doubtful: {'; '.join(doubts)}"
+    if is_provisional:
+        return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
+    late = f", no fix for {place.age:.0f} s" if place.overdue > 0.0 else ""
+    return PositionState.GOOD, f"position good, {place.deviation:.1f} m{late}"
 
 
 def report_place(health: Health, place: PlaceNow) -> None:

@@ -1,6 +1,6 @@
 """Publishes where matching found the vehicle: fix, path, and the transform map -> odom."""
 
-from typing import Callable
+from typing import Callable, Optional, Tuple
 
 import numpy as np
 import rospy
@@ -10,6 +10,7 @@ from nav_msgs.msg import Odometry, Path
 from sensor_msgs.msg import PointCloud2
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.localisation.place_now import PlaceNow, PositionState
 from mlsm_manager.scan_matching.scan import MatchResult, Scan, corrected_points
 from mlsm_manager.scan_matching.scan_path import POSE
 from node_support import topics
@@ -18,6 +19,7 @@ from node_support.health import Health
 from node_support.ros.callbacks import every_clock_period
 from node_support.ros.transforms import pose_from_matrix
 from sonar_processing.ros.conversions import header, point_cloud
+from underwater_map_construction.msg import PositionStatus
 
 _UNKNOWN_VARIANCE = 1e6  # m^2 and rad^2: what a filter such as robot_localization takes for "not measured"
 _ROS_AXES = np.array([0, 1, 5])  # x, y and yaw among the six axes of a covariance message
@@ -25,7 +27,7 @@ _LONGEST_PATH = 20000  # poses: four days of scans of 16 s, 1.5 MB
 
 
 class FixPublisher:
-    """Publishes /MLSM/pose, /MLSM/odometry, /MLSM/path and /MLSM/scan.
+    """Publishes /MLSM/pose, /MLSM/odometry, /MLSM/path, /MLSM/scan and /MLSM/status.
 
     z, roll and pitch of poses are those of tf and have no certainty.
     """
@@ -37,6 +39,7 @@ class FixPublisher:
         self._odometry = rospy.Publisher(topics.MATCHED_ODOMETRY, Odometry, queue_size=10)
         self._path = rospy.Publisher(topics.MATCHED_PATH, Path, queue_size=2, latch=True)
         self._scan = rospy.Publisher(topics.MATCHED_SCAN, PointCloud2, queue_size=2)
+        self._status = rospy.Publisher(topics.POSITION_STATUS, PositionStatus, queue_size=10, latch=True)
         self._matched_path = Path()
 
     def clear(self) -> None:
@@ -47,6 +50,13 @@ class FixPublisher:
         """Send a scan as a match undistorts and places it, accepted or not, to those who listen."""
         if self._scan.get_num_connections():
             self._scan.publish(point_cloud(corrected_points(scan, result), stamp_ns, self._map_frame))
+
+    def tell(self, state: Tuple[PositionState, str], place: Optional[PlaceNow], stamp_ns: int) -> None:
+        """Send how well the position is known at a stamp [ns], and the same in words."""
+        status = PositionStatus(header=header(stamp_ns, self._map_frame), state=state[0], text=state[1])
+        status.age = np.nan if place is None else place.age
+        status.covariance = np.full(9, np.nan) if place is None else place.covariance.ravel()
+        self._status.publish(status)
 
     def publish(self, result: MatchResult, T_map_base: np.ndarray, stamp_ns: int) -> None:
         """Send the fix of a match; `T_map_base` is the matched pose with z, roll and pitch, (4, 4)."""

@@ -9,7 +9,7 @@ from std_msgs.msg import Bool
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
-from mlsm_manager.localisation.place_now import report_place
+from mlsm_manager.localisation.place_now import PlaceNow, position_state, report_place
 from mlsm_manager.localisation.updates import (
     CloudUpdate,
     ScanUpdate,
@@ -60,6 +60,8 @@ class MlsmCore:
         )
         self._mounted = False
         self._steps_told = 0
+        self._doubts: List[str] = []
+        self._provisional = False
         self._z_down = ZDownSigns()
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
@@ -134,8 +136,12 @@ class MlsmCore:
         report_turn(self.health, scan.reference_time - scan.start, self._longest_turn)
         report_steps(self.health, self._localiser.steps, self._steps_told)
         self._steps_told = len(self._localiser.steps)
-        report_verdicts(self.health, self._localiser.verdicts())
+        verdicts = self._localiser.verdicts()
+        report_verdicts(self.health, verdicts)
+        self._doubts = [verdict.text for verdict in verdicts if verdict.fires]
+        self._provisional = taken.scan.provisional
         self.health.show("odometry", self._localiser.odometry or self._live.current.odometry.value)
+        self._tell_state()
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
     def _look_for_z_down(self, scan: Scan) -> None:
@@ -219,14 +225,23 @@ class MlsmCore:
 
     def _tell_place(self) -> None:
         """Tell how old and how good the position is, also while no scan and no odometry come."""
-        newest, now = self._odometry.newest(), rospy.Time.now().to_sec()
-        if newest is None or newest[0] is None:
-            return
-        # Stamps of another clock are as far off as no silence lasts: then the odometry tells the time.
-        time = now if 0.0 < now - newest[0] < DAY else newest[0]
-        place = self._localiser.place_now(time, newest[1])
+        place = self._tell_state()
         if place is not None:
             report_place(self.health, place)
+
+    def _tell_state(self) -> Optional[PlaceNow]:
+        """Publish how well the position is known now, and return it; None before the first fix."""
+        newest, now = self._odometry.newest(), rospy.Time.now().to_sec()
+        if newest is None:
+            return None
+        # Stamps of another clock are as far off as no silence lasts: then the odometry, or the newest scan, tells the
+        # time.
+        told = newest[0] or self._localiser.believed_until or now
+        time = now if 0.0 < now - told < DAY else told
+        place = self._localiser.place_now(time, newest[1])
+        state = position_state(place, self._localiser.is_lost, self._provisional, self._doubts)
+        self._fix.tell(state, place, round(time * 1e9))
+        return place
 
     def _notice_time_of_scan(self, time: float) -> None:
         """Notice that time jumped back; while the odometry goes on, an old scan is merely late."""

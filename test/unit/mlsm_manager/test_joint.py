@@ -10,7 +10,7 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
-from mlsm_manager.localisation.place_now import report_place
+from mlsm_manager.localisation.place_now import PlaceNow, PositionState, position_state, report_place
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, transformed
 from node_support.health import Health, Level
@@ -225,8 +225,26 @@ def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
     assert [place.overdue > 0.0 for place in places] == [False, False, True]
     assert places[0].deviation < places[1].deviation < places[2].deviation
     health = Health("mlsm_core", lambda line: None)
-    report_place(health, places[2]._replace(deviation=6.0))
+    report_place(health, places[2]._replace(covariance=18.0 * np.eye(3)))
     assert health.report().level is Level.ERROR
+
+
+@pytest.mark.parametrize(
+    ("variance", "is_lost", "is_provisional", "doubts", "state"),
+    [
+        (0.08, False, False, [], PositionState.GOOD),
+        (0.08, False, True, [], PositionState.PROVISIONAL),
+        (0.08, False, True, ["two submaps"], PositionState.DOUBTFUL),
+        (13.0, False, False, ["two submaps"], PositionState.UNKNOWN),
+        (0.08, True, False, [], PositionState.UNKNOWN),
+    ],
+)
+def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lost, is_provisional, doubts, state):
+    place = PlaceNow(10.0, 0.0, variance * np.eye(3))
+    found, text = position_state(place, is_lost, is_provisional, doubts)
+    assert found is state
+    assert all(doubt in text for doubt in doubts) or state is PositionState.UNKNOWN
+    assert position_state(None, is_lost, is_provisional, doubts)[0] is PositionState.UNKNOWN
 
 
 def test_nothing_is_told_of_a_position_before_the_first_fix():
