@@ -60,7 +60,7 @@ def _parser() -> argparse.ArgumentParser:
     parser = CommandLine(
         "convert_bag", description="Write a recording of any kind as a bag of ROS 1 with /sonar/raw, /odom and tf."
     )
-    parser.add_argument("recording", type=Path, help="a bag of ROS 1 or ROS 2, or the log of a sonar's maker")
+    parser.add_argument("recording", type=Path, help="a bag of ROS 1 or ROS 2, or a log or table of beams")
     parser.add_argument("out", type=Path, help="bag to write (.bag)")
     parser.add_argument("--overwrite", action="store_true", help="replace a bag that exists")
     parser.add_argument(

@@ -1,4 +1,4 @@
-"""Beams of the logs of sonars' makers: `.852` files of Imagenex, and what both Ping Viewers write of a Ping360."""
+"""Beams of logs: `.852` files of Imagenex, what both Ping Viewers write of a Ping360, and tables."""
 
 from os.path import getmtime
 from pathlib import Path
@@ -16,11 +16,12 @@ from ping360_driver.protocol.replies import beam as head_beam
 from ping360_driver.protocol.scan_command import bin_length
 from ping360_driver.protocol.scan_command import head_angle as ping360_angle
 from recordings.bags.bag import RecordingError
+from recordings.beam_table import beams_of_table, is_beam_table
 from recordings.beams import RecordedBeams
 from recordings.motion.pose_track import PoseTrack
 from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_headings
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.beam_types import USUAL_SPEED_OF_SOUND
+from sonar_processing.messages.beam_fields import USUAL_SPEED_OF_SOUND
 
 _FRAME = "sonar"
 _BEAMS = (MessageId.DEVICE_DATA, MessageId.AUTO_DEVICE_DATA)
@@ -28,7 +29,9 @@ _Reader = Callable[[Path], RecordedBeams]
 
 
 def is_makers_log(path: Path) -> bool:
-    """Return whether a file is a log that is read here: .852 by its name, Ping Viewer's by its first bytes."""
+    """Return whether a file is a log that is read here: .852 by its name, Ping Viewer's by its first bytes,
+    a table by its columns.
+    """
     return _reader(path) is not None
 
 
@@ -50,6 +53,8 @@ def _reader(path: Path) -> Optional[_Reader]:
         return _imagenex_beams
     if is_ping_viewer_next(path):
         return _ping_viewer_next_beams
+    if is_beam_table(path):
+        return beams_of_table
     return _ping_viewer_beams if path.is_file() and _is_ping_viewer_log(path) else None
 
 

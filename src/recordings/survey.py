@@ -57,7 +57,7 @@ def survey(path: Path, request: Request) -> Survey:
         motion = tried(missing, lambda: motion_for(path, None, request))
         assumed = _assumed(motion, recorded, request, missing)
         heard = beam_lines(recorded)
-        return Survey(path, "the log of a sonar's maker", {}, FrameTree(), None, heard, [], assumed, missing)
+        return Survey(path, "a log or table of beams", {}, FrameTree(), None, heard, [], assumed, missing)
     with Bag(path) as bag:
         return _survey_of_bag(path, bag, request)
 

@@ -21,7 +21,7 @@ from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
-from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_odometry
+from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_cells, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked
@@ -75,6 +75,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     extractor = EchoExtractor(options.parameters.echoes())
     recording, scans, of_echoes = _heard(recording, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
+    extracting = with_cells(extracting, scans, options.fixed)
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)

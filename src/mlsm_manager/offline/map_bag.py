@@ -125,7 +125,7 @@ def _parser() -> CommandLine:
     parser = CommandLine("map_bag", usage=_USAGE, description=description, epilog=_EPILOG)
     parser.add_argument(
         "bags", type=Path, nargs="+", metavar="BAG",
-        help="recording: a bag of ROS 1 or ROS 2, or the log of a sonar's maker; each further one starts in the map of "
+        help="recording: a bag of ROS 1 or ROS 2, or a log or table of beams; each further one starts in the map of "
         "those before",
     )  # fmt: skip
     parser.add_argument("--out", type=Path, metavar="DIR", help="folder to write to; created if missing")

@@ -14,7 +14,7 @@ from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
 from recordings.reader import Request, read
-from sonar_processing.beams.beam import PlacedBeam, has_other_bins
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import FEWEST_BEAMS, EchoExtractor
@@ -115,24 +115,21 @@ def _echoes(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Cl
 
 
 def _turns(beams: List[PlacedBeam]) -> Iterator[List[PlacedBeam]]:
-    """Yield the beams of each turn or sweep, and of each part of one that a change of the bins ended.
+    """Yield the beams of each turn or sweep, and of each part of one that other bins or a silence of the head ended.
 
-    Of a head that finished none, the longest part comes last.
+    What is left at the end comes last, where it is at least half as long as the longest turn.
     """
     collector = RevolutionCollector()
-    start, length, has_finished = 0, 0, False
+    longest = 0
     for index, placed in enumerate(beams):
         held, turn = len(collector), collector.add(placed)
-        if held >= FEWEST_BEAMS and has_other_bins(placed.beam, beams[index - 1].beam):
-            length = 0
-            yield beams[index - held : index]
         if turn is not None:
-            has_finished = True
+            longest = max(longest, len(turn))
             yield turn
-        elif len(collector) > length:
-            start, length = index + 1 - len(collector), len(collector)
-    if not has_finished and length:
-        yield beams[start : start + length]
+        elif held >= FEWEST_BEAMS and len(collector) == 1:
+            yield beams[index - held : index]
+    if len(collector) >= max(longest / 2.0, FEWEST_BEAMS):
+        yield beams[len(beams) - len(collector) :]
 
 
 def clouds_with_odometry(recording: Recording, clouds: Iterable[Tuple[Cloud, int]]) -> Iterator[Tuple[Scan, int]]:

@@ -1,6 +1,6 @@
 """What a recording tells of its odometry, and the parameters that suit it."""
 
-from typing import Collection, Dict, NamedTuple, Optional
+from typing import Collection, Dict, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -10,9 +10,16 @@ from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_va
 from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.map_checks import scans_go_on
 from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts
 
+_CELLS = 40
+"""Cells of the map from the vehicle to its far echoes: so many can be told apart in map.png, fewer make a tank a few
+squares."""
+_NEARLY_ALL = 0.95  # of the echoes; a few far ones are noise
+_SMALLEST_CELL = 0.05
+"""m: what the echoes of a Ping360 at its shortest range are long."""
 _WORTH_TRYING = 0.75
 """Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
 strafing ones 0.57 and 0.66."""
@@ -87,6 +94,16 @@ def with_odometry(
     """
     values = {**profile_values(kind), **_WITHOUT_MOTION.get(motion, {})}
     return parameters.changed({key: value for key, value in values.items() if key not in fixed})
+
+
+def with_cells(parameters: ReplayParameters, scans: Sequence[Scan], fixed: Collection[str]) -> ReplayParameters:
+    """Return `parameters` with smaller cells where nearly all echoes lie within 20 m of the vehicle, if not `fixed`."""
+    if "resolution" in fixed:
+        return parameters
+    distances = [np.hypot(*(scan.points[:, :2] - scan.track.at(scan.times)[:, :2]).T) for scan in scans]
+    reach = float(np.quantile(np.concatenate(distances), _NEARLY_ALL)) if any(map(len, distances)) else np.inf
+    cell = max(round(reach, 1) / _CELLS, _SMALLEST_CELL)
+    return parameters.changed({"resolution": min(cell, parameters.resolution)})
 
 
 def may_strafe(ahead: Optional[LiveSolver]) -> bool:

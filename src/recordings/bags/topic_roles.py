@@ -5,7 +5,7 @@ from typing import Dict, List, Optional
 
 from dead_reckoning.velocity_messages import VELOCITY_TYPES
 from recordings.bags.bag import Topic
-from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN
+from sonar_processing.messages.beam_types import BEAM_TYPES, IMAGE, UNLIKELY
 
 ODOMETRY = "nav_msgs/Odometry"
 
@@ -24,7 +24,7 @@ class Role(Enum):
 
 # The best of a role first.
 _TYPES: Dict[Role, List[str]] = {
-    Role.BEAMS: [*(name for name in BEAM_TYPES if name != LASER_SCAN), LASER_SCAN],
+    Role.BEAMS: [*(name for name in BEAM_TYPES if name not in UNLIKELY), *UNLIKELY],
     Role.ODOMETRY: [
         ODOMETRY, "geometry_msgs/PoseWithCovarianceStamped", "geometry_msgs/PoseStamped",
     ],
@@ -52,6 +52,8 @@ def role_of(topic: Topic) -> Optional[Role]:
             return Role.DEPTH
         return Role.HEADING if any(part in name for part in ("heading", "compass", "hdg", "yaw")) else None
     role = _ROLES.get(topic.type)
+    if topic.type == IMAGE and ("msis" not in name or "display" in name):
+        return None
     if role is Role.ODOMETRY and any(part in name for part in _NO_ODOMETRY):
         return Role.POSITION if any(part in name for part in ("truth", "gps", "gnss", "/gt")) else None
     if role is Role.VELOCITY and any(part in name for part in _COMMANDS):

@@ -2,7 +2,7 @@
 
 import csv
 from pathlib import Path
-from typing import Dict, List
+from typing import Dict, Iterator, List
 
 import numpy as np
 
@@ -30,6 +30,24 @@ _HEADINGS = ("yaw", "yaw_deg", "heading_deg")
 def is_table(path: Path) -> bool:
     """Return whether a file is a table, by its name."""
     return path.suffix.lower() in _SUFFIXES
+
+
+def rows_of(path: Path) -> Iterator[List[str]]:
+    """Yield the names in the first line, in small letters, and then the cells of each line.
+
+    Cells are separated by whichever of comma, semicolon and tab the first line has most of. Raises RecordingError.
+    """
+    try:
+        with path.open(encoding="utf-8-sig", newline="") as file:
+            delimiter = max(",;\t", key=file.readline().count)
+            file.seek(0)
+            rows = csv.reader(file, delimiter=delimiter)
+            yield [name.strip().lower() for name in next(rows, [])]
+            yield from rows
+    except (UnicodeDecodeError, csv.Error) as error:
+        raise RecordingError(f"{path}: not a table: {error}") from None
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from None
 
 
 def motion_of_csv(path: Path, names: MotionNames) -> Motion:
@@ -62,25 +80,13 @@ def _yaws(column: str, values: np.ndarray) -> np.ndarray:
 
 
 def _read(path: Path) -> Dict[str, np.ndarray]:
-    try:
-        with path.open(encoding="utf-8-sig", newline="") as file:
-            rows = list(csv.reader(file, delimiter=_delimiter(file.readline(), file)))
-    except (UnicodeDecodeError, csv.Error) as error:
-        raise RecordingError(f"{path}: not a table: {error}") from None
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}") from None
-    names = [name.strip().lower() for name in rows[0]] if rows else []
+    names, *rows = rows_of(path)
     kept = [(index, name) for index, name in enumerate(names) if name in COLUMNS]
-    lines = [(number, row) for number, row in enumerate(rows[1:], start=2) if any(row)]
+    lines = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
     if len(lines) < 2:
         raise RecordingError(f"{path}: {len(lines)} rows; needs at least 2")
     values = np.array([[_number(path, line, row, index, name) for index, name in kept] for line, row in lines])
     return {name: values[:, column] for column, (_, name) in enumerate(kept)}
-
-
-def _delimiter(first_line: str, file: object) -> str:
-    file.seek(0)
-    return max(",;\t", key=first_line.count)
 
 
 def _number(path: Path, line: int, row: List[str], index: int, name: str) -> float:

@@ -8,24 +8,26 @@ import math
 from collections import deque
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Callable, Deque, Dict, List, Optional, Sequence, Tuple, Union
+from typing import Any, Callable, Deque, Dict, List, Optional, Tuple, Type, Union
 
 import numpy as np
 
 from node_support.errors import RefusedInput
 from node_support.headers import stamp_ns
+from sonar_processing.messages.beam_fields import BeamFields, length_of_bins, speed_of_sound_of, strengths_of
+from sonar_processing.messages.image_messages import TurningImage, projected_sonar_image, raw_sonar_image
 
 _VOTES = 25  # Beams that are looked back on: more than the seven that gradians spend below 2 pi in a turn
 _ROUNDING = 1e-3  # Of a float32 that holds an angle
-USUAL_SPEED_OF_SOUND = 1500.0  # m/s, what drivers assume where a message does not say
-_SLOWEST, _FASTEST = 1300.0, 1700.0  # m/s, of any water; a message with another value was not filled in
 _LASER_BINS = 500  # Bins in which the one echo of a laser ray is placed, as many as an Imagenex 852 sends
 _LASER_STRENGTH = 255
 _MOST_RAYS = 7200  # Rays of 0.05 deg, finer than any head steps; more is a broken message
 OWN = "underwater_map_construction/SonarScanLine"
 LASER_SCAN = "sensor_msgs/LaserScan"
 POINT_CLOUD = "sensor_msgs/PointCloud"
-_UNEVEN = 0.1  # Share by which the lengths of bins may differ, as float32 rounds their ranges
+IMAGE = "sensor_msgs/Image"
+UNLIKELY = (IMAGE, LASER_SCAN)
+"""Types that hold beams of a scanning sonar where somebody says so, and else what cameras and rangefinders send."""
 _STRAIGHT = 0.01  # Of a bin: so far points of one beam lie beside their line, by rounding
 
 
@@ -67,28 +69,6 @@ class RadiansOrGradians:
                 self.unit = AngleUnit.GRADIANS if is_gradians else AngleUnit.RADIANS
 
 
-@dataclass(frozen=True)
-class BeamFields:
-    """One beam as its message has it.
-
-    stamp_ns: of the header, ns. angle: of the head, in the unit and direction of the message. intensities: (bins,)
-    uint8. range_resolution: length of a bin, m. sensor_angle: tilt of the servo, rad. speed_of_sound: m/s.
-    """
-
-    stamp_ns: int
-    frame_id: str
-    angle: float
-    intensities: np.ndarray
-    range_resolution: float
-    sensor_angle: float = 0.0
-    speed_of_sound: float = USUAL_SPEED_OF_SOUND
-
-    @property
-    def travel_time_ns(self) -> int:
-        """How long the sound takes to the last bin and back, ns."""
-        return round(2e9 * self.intensities.size * self.range_resolution / self.speed_of_sound)
-
-
 def sonar_scan_line(message: Any) -> List[BeamFields]:
     """Read a SonarScanLine; raises RefusedInput when its range is not positive."""
     if not message.maxrange_meters > 0.0:
@@ -100,7 +80,7 @@ def sonar_scan_line(message: Any) -> List[BeamFields]:
             stamp_ns(message.header),
             message.header.frame_id,
             message.angle,
-            _strengths(message.intensities),
+            strengths_of(message.intensities),
             message.range_resolution,
             message.sensorAngle,
         )
@@ -109,7 +89,7 @@ def sonar_scan_line(message: Any) -> List[BeamFields]:
 
 def sonar_echo(message: Any) -> List[BeamFields]:
     """Read a SonarEcho of ping360_sonar: `range` metres in `number_of_samples` bins."""
-    strengths = _strengths(message.intensities)
+    strengths = strengths_of(message.intensities)
     bins = message.number_of_samples or strengths.size
     return [
         BeamFields(
@@ -118,21 +98,21 @@ def sonar_echo(message: Any) -> List[BeamFields]:
             message.angle,
             strengths,
             message.range / max(bins, 1),
-            speed_of_sound=_speed_of_sound(message.speed_of_sound),
+            speed_of_sound=speed_of_sound_of(message.speed_of_sound),
         )
     ]
 
 
 def sonar_ping_360(message: Any) -> List[BeamFields]:
     """Read a SonarPing360 of bluerobotics_sonar: `range` metres in the bins of `profile_data`."""
-    strengths = _strengths(message.profile_data)
+    strengths = strengths_of(message.profile_data)
     resolution = message.range / max(strengths.size, 1)
     return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle, strengths, resolution)]
 
 
 def scan_line(message: Any) -> List[BeamFields]:
     """Read a ScanLine of micron_driver_ros; a bin ends at its `distance`."""
-    strengths = _strengths([one.intensity for one in message.bins])
+    strengths = strengths_of([one.intensity for one in message.bins])
     step = message.bin_distance_step
     return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle, strengths, step)]
 
@@ -152,7 +132,7 @@ def point_cloud(message: Any) -> List[BeamFields]:
     if not off <= _STRAIGHT * resolution:
         raise RefusedInput("beams refused", f"points lie {off:.2g} m beside equal steps on a line; must be one beam")
     angle = math.atan2(step[1], step[0])
-    return [BeamFields(stamp_ns(message.header), message.header.frame_id, angle, _strengths(strengths), resolution)]
+    return [BeamFields(stamp_ns(message.header), message.header.frame_id, angle, strengths_of(strengths), resolution)]
 
 
 def laser_scan(message: Any) -> List[BeamFields]:
@@ -180,24 +160,9 @@ def laser_scan(message: Any) -> List[BeamFields]:
 
 def _bins_of_rays(message: Any) -> List[BeamFields]:
     """Return the beam whose bins the rays of a LaserScan are; raises RefusedInput for rays that are none."""
-    ranges = np.asarray(message.ranges, dtype=np.float64)
-    steps = np.diff(ranges)
-    if len(message.intensities) != len(ranges) or not (steps > 0.0).all() or np.ptp(steps) > _UNEVEN * steps.mean():
-        rays = f"{len(ranges)} rays that all point one way, {len(message.intensities)} intensities"
-        raise RefusedInput("beams refused", f"{rays}: bins of one beam need an intensity each and growing ranges")
-    strengths = _strengths(np.clip(message.intensities, 0, 255))
-    beam = BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle_min, strengths, steps.mean())
-    return [beam]
-
-
-def _speed_of_sound(value: float) -> float:
-    return value if _SLOWEST <= value <= _FASTEST else USUAL_SPEED_OF_SOUND
-
-
-def _strengths(values: Union[bytes, Sequence[int]]) -> np.ndarray:
-    if isinstance(values, (bytes, bytearray)):
-        return np.frombuffer(values, dtype=np.uint8)
-    return np.asarray(values).astype(np.uint8)
+    resolution = length_of_bins(message.ranges, len(message.intensities))
+    strengths = strengths_of(np.clip(message.intensities, 0, 255))
+    return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle_min, strengths, resolution)]
 
 
 def _echo_at(index: float) -> np.ndarray:
@@ -211,15 +176,15 @@ def _echo_at(index: float) -> np.ndarray:
 class BeamType:
     """One type of message.
 
-    names: package/Type, in ROS 1 and ROS 2. read: takes its fields. unit: of the angle as documented. may_be_gradians:
-    some drivers send gradians nevertheless. clockwise: whether angles grow clockwise seen from the tip of +z of the
-    message's frame, as the package's own scan or cloud has it. ahead: the angle that points along +x of the frame, in
-    `unit`. stamped_after_reply: the stamp was taken when the reply had come. zero, strengths, bins and source: words
-    for docs/sonars.md.
+    names: package/Type, in ROS 1 and ROS 2. read: takes its fields, or makes what does, message after message. unit:
+    of the angle as documented. may_be_gradians: some drivers send gradians nevertheless. clockwise: whether angles grow
+    clockwise seen from the tip of +z of the message's frame, as the package's own scan or cloud has it. ahead: the
+    angle that points along +x of the frame, in `unit`. stamped_after_reply: the stamp was taken when the reply had
+    come. zero, strengths, bins and source: words for docs/sonars.md.
     """
 
     names: Tuple[str, ...]
-    read: Callable[[Any], List[BeamFields]]
+    read: Union[Callable[[Any], List[BeamFields]], Type[TurningImage]]
     unit: AngleUnit
     zero: str
     strengths: str
@@ -235,6 +200,10 @@ class BeamType:
     def name(self) -> str:
         """The first of its names."""
         return self.names[0]
+
+    def reader(self, image_range: float) -> Callable[[Any], List[BeamFields]]:
+        """Return what takes the fields of the messages of one topic. image_range: m, of images."""
+        return self.read(image_range) if isinstance(self.read, type) else self.read
 
 
 _TYPES: Tuple[BeamType, ...] = (
@@ -266,6 +235,25 @@ _TYPES: Tuple[BeamType, ...] = (
         zero="+x of the frame, as the points lie", strengths="0 to 255",
         bins="from point to point; bin i ends at point i",
         source="the driver tritech_micron, which publishes a cloud for each beam",
+    ),
+    BeamType(
+        ("marine_acoustic_msgs/RawSonarImage", "acoustic_msgs/RawSonarImage"), raw_sonar_image, AngleUnit.RADIANS,
+        zero="+x of the frame; the message has it along +z, with +x up: its frame is taken as one of a sonar here",
+        strengths="0 to 255, the highest byte of longer numbers", bins="sound speed / (2 `sample_rate`)",
+        source="`RawSonarImage.msg` in apl-ocean-engineering/marine_msgs", stamped_after_reply=False,
+    ),
+    BeamType(
+        ("marine_acoustic_msgs/ProjectedSonarImage", "acoustic_msgs/ProjectedSonarImage"), projected_sonar_image,
+        AngleUnit.RADIANS, zero="as for `RawSonarImage`", strengths="as for `RawSonarImage`",
+        bins="from range to range; bin i has its middle at `ranges[i]`",
+        source="`ProjectedSonarImage.msg`, the same", stamped_after_reply=False,
+    ),
+    BeamType(
+        (IMAGE,), TurningImage, AngleUnit.RADIANS, clockwise=True, ahead=math.pi,
+        zero="astern: the middle column is ahead; its frame is taken as x ahead, z up",
+        strengths="0 to 255", bins="`image_range` / height",
+        source="`OpenGLMSIS.cpp` and `ROSInterface.cpp` of Stonefish, whose MSIS sends the picture of its newest turn",
+        stamped_after_reply=False,
     ),
     BeamType(
         (LASER_SCAN,), laser_scan, AngleUnit.RADIANS,

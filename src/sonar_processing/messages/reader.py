@@ -2,21 +2,14 @@
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import Any, Dict, List, Optional, Set
+from typing import Any, Callable, Dict, List, Optional, Set
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_stamp
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.beam_types import (
-    BEAM_TYPES,
-    OWN,
-    AngleUnit,
-    BeamFields,
-    BeamType,
-    RadiansOrGradians,
-    ros1_name,
-)
+from sonar_processing.messages.beam_fields import BeamFields
+from sonar_processing.messages.beam_types import BEAM_TYPES, OWN, AngleUnit, BeamType, RadiansOrGradians, ros1_name
 
 _REFUSED = "beams refused"
 
@@ -52,6 +45,10 @@ class BeamMessageParameters(ParameterSet):
         "which way the head's angle grows, seen from the tip of +z; TYPE: as documented for the message type",
         tunable=False,
     )
+    image_range: float = parameter(
+        0.0, "range of a sonar that sends pictures of its turns, which do not tell it, as Stonefish's do; 0: not known",
+        unit="m", low=0.0, high=1000.0, tunable=False,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -76,11 +73,14 @@ class BeamReader:
         self._guesses: Dict[str, RadiansOrGradians] = {}
         self._units: Dict[str, AngleUnit] = {}
         self._described: Set[str] = set()
+        self._readers: Dict[str, Callable[[Any], List[BeamFields]]] = {}
 
     def read(self, type_name: str, message: Any) -> Reading:
         """Return the beams of a message of the type package/Type; raises RefusedInput for one that cannot be used."""
         kind = beam_type(type_name)
-        found = _fields(kind, type_name, message)
+        if type_name not in self._readers:
+            self._readers[type_name] = kind.reader(self._parameters.image_range)
+        found = _fields(self._readers[type_name], type_name, message)
         unit, before = self._unit(kind, found), self._units.get(type_name)
         # Angles that do not tell the unit are 0, which is the same in all of them.
         beams = self._beams(found, kind, unit or kind.unit)
@@ -152,12 +152,12 @@ class BeamReader:
         return [text] + ([f"{type_name}: {kind.advice}"] if kind.advice else [])
 
 
-def _fields(kind: BeamType, type_name: str, message: Any) -> List[BeamFields]:
+def _fields(read: Callable[[Any], List[BeamFields]], type_name: str, message: Any) -> List[BeamFields]:
     try:
-        found = kind.read(message)
+        found = read(message)
     except RefusedInput:
         raise
-    except (AttributeError, TypeError, ValueError, OverflowError) as error:
+    except (AttributeError, TypeError, ValueError, OverflowError, IndexError, ZeroDivisionError) as error:
         raise RefusedInput(_REFUSED, f"{type_name} not as expected: {error}") from error
     if not found:
         raise RefusedInput(_REFUSED, f"{type_name} without rays")

@@ -10,7 +10,7 @@ from node_support.health import Health
 from node_support.ros.any_messages import MessageClasses
 from node_support.ros.callbacks import guarded
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN
+from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN, UNLIKELY
 from sonar_processing.messages.reader import BeamMessageParameters, BeamReader, Reading, beam_type
 from underwater_map_construction.msg import SonarScanLine
 
@@ -77,9 +77,7 @@ class BeamSubscriber:
 
 def _topics_instead() -> str:
     """Return which topics hold the beams that a LaserScan was made of."""
-    found = [
-        f"{topic} ({kind})" for topic, kind in rospy.get_published_topics() if kind in {*BEAM_TYPES} - {LASER_SCAN}
-    ]
+    found = [f"{topic} ({kind})" for topic, kind in rospy.get_published_topics() if kind in {*BEAM_TYPES} - {*UNLIKELY}]
     if found:
         return f"take the beams themselves instead of the LaserScan: remap {topics.BEAMS} to {' or '.join(found)}"
     return "let the driver publish its beams, and take them instead of the LaserScan"

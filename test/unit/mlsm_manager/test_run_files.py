@@ -179,8 +179,11 @@ def test_beams_beyond_the_odometry_count_as_unplaced(recording):
     assert (len(found.beams), found.unplaced) == (2, 3)
 
 
-@pytest.mark.parametrize(("lengths", "scans"), [((30, 63), [30, 63]), ((9, 63), [63]), ((30, 40), [30, 40])])
-def test_the_part_of_a_turn_before_a_change_of_the_range_is_kept_if_it_shows_a_ring(lengths, scans):
+@pytest.mark.parametrize(
+    ("lengths", "scans"),
+    [((30, 63), [30, 63]), ((9, 63), [63]), ((30, 40), [30, 40]), ((63, 40), [63, 40]), ((63, 20), [63])],
+)
+def test_parts_of_turns_are_kept_before_a_change_of_the_range_and_if_long_at_the_end(lengths, scans):
     echo = 200 * (np.arange(100) == 50).astype(np.uint8)
     settings = np.repeat([0.1, 0.2], lengths)
     beams = [Beam(10**8 * n, "sonar", 0.1 * n, echo, resolution) for n, resolution in enumerate(settings, 1)]

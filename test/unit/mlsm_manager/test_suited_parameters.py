@@ -14,8 +14,8 @@ from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
-from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.offline.suited_parameters import odometry_of, with_cells, with_odometry
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.health import Health
 from recordings.motion.sweep_shifts import SweepMotion
 from recordings.motion.vehicle_motion import MotionSource
@@ -92,6 +92,16 @@ def test_a_velocity_that_is_not_estimated_any_more_fades_as_fast_as_the_profile_
         DeadReckoningParameters(**live["dead_reckoning"]).velocity_fading
         == profile_values(kind)["rate_correlation_time"]
     )
+
+
+@pytest.mark.parametrize(
+    ("reach", "fixed", "cell"), [(45.0, (), 0.5), (8.0, (), 0.2), (1.0, (), 0.05), (8.0, ("resolution",), 0.5)]
+)
+def test_near_echoes_make_small_cells(reach, fixed, cell):
+    """The vehicle has gone 5 m when it hears them."""
+    points = np.column_stack([np.full(100, 5.0 + reach), np.zeros((100, 3))])
+    scan = Scan.from_stamps(points, np.full(100, 5.0), 5.0, track(x=TIMES))
+    assert with_cells(ReplayParameters(), [scan], fixed).resolution == pytest.approx(cell)
 
 
 def command_line(*words):

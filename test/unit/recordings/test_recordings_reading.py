@@ -211,3 +211,20 @@ def test_a_sonars_log_is_surveyed_with_a_command_that_maps_it(log):
     told = report(survey(log, Request()), Request())
     assert "100 beams in" in told
     assert f"map_bag {log} --out turn_map --refine" in told
+
+
+def test_a_table_of_beams_may_change_its_bins_and_hold_damaged_rows(tmp_path):
+    path = tmp_path / "beams.csv"
+    path.write_text("time,angle_deg,range,bins\n1,90,3,1 2 3\n1.1,92,3,4,5\nx,0,3,1\n1.3,0,0,1\n1.4,-90,2,300 -1\n")
+    found = read(path, Request()).recorded
+    assert [beam.intensities.tolist() for beam in found.beams] == [[1, 2, 3], [4, 5], [255, 0]]
+    assert [beam.range_resolution for beam in found.beams] == pytest.approx([1.0, 1.5, 1.0])
+    assert found.beams[0].angle == pytest.approx(np.pi / 2)
+    assert found.refused == 2
+    assert "line 4" in found.notes[0]
+
+
+def test_a_table_of_beams_names_the_columns_that_it_needs(tmp_path):
+    (tmp_path / "beams.csv").write_text("time,bins,range\n1,2,3\n")
+    with pytest.raises(RecordingError, match="needs time, angle, range and, last, bins"):
+        read(tmp_path / "beams.csv", Request())

@@ -64,3 +64,33 @@ def laser_scan_of(ranges=(1.0, np.inf, 3.0), **values):
         values, header=header(), angle_min=-1.0, angle_increment=0.5, time_increment=0.1, range_max=50.0,
         ranges=np.array(ranges, dtype=np.float32), intensities=[],
     )  # fmt: skip
+
+
+def sonar_image_data_of(strengths=(1, 2, 3), **values):
+    """Return a SonarImageData of marine_acoustic_msgs with one beam."""
+    return _made(values, is_bigendian=False, dtype=0, beam_count=1, data=np.array(strengths, dtype=np.uint8))
+
+
+def raw_sonar_image_of(angle=0.5, **values):
+    """Return a RawSonarImage of marine_acoustic_msgs with bins of 0.05 m, the first of which it leaves out."""
+    return _made(
+        values, header=header(), ping_info=SimpleNamespace(sound_speed=1480.0), sample_rate=14800.0, sample0=1,
+        rx_angles=np.array([angle]), image=sonar_image_data_of(),
+    )  # fmt: skip
+
+
+def projected_sonar_image_of(angle=0.5, **values):
+    """Return a ProjectedSonarImage of marine_acoustic_msgs with bins of 0.05 m, the first of which it leaves out."""
+    direction = SimpleNamespace(x=0.0, y=-np.sin(angle), z=np.cos(angle))
+    return _made(
+        values, header=header(), ping_info=SimpleNamespace(sound_speed=1480.0), beam_directions=[direction],
+        ranges=np.array([0.075, 0.125, 0.175], dtype=np.float32), image=sonar_image_data_of(),
+    )  # fmt: skip
+
+
+def turning_image_of(columns=(), **values):
+    """Return an image of Stonefish's MSIS with 8 steps and 3 bins; columns: strengths from the nearest bin on."""
+    image = np.zeros((3, 8), dtype=np.uint8)
+    for column, strengths in dict(columns).items():
+        image[:, column] = strengths[::-1]
+    return _made(values, header=header(), height=3, width=8, step=8, encoding="mono8", data=image.tobytes())

@@ -16,16 +16,21 @@ from sonar_messages import (
     micron_line_of,
     ping_360_of,
     point_cloud_of,
+    projected_sonar_image_of,
+    raw_sonar_image_of,
     scan_line_of,
     sonar_echo_of,
+    sonar_image_data_of,
+    turning_image_of,
 )
 
 from node_support.errors import RefusedInput
-from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN, OWN, POINT_CLOUD
+from sonar_processing.messages.beam_types import BEAM_TYPES, IMAGE, LASER_SCAN, OWN, POINT_CLOUD
 from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
 
 ECHO, PING_360 = "ping360_sonar/SonarEcho", "bluerobotics_sonar_msgs/SonarPing360"
 MICRON = "micron_driver_ros/ScanLine"
+RAW, PROJECTED = "marine_acoustic_msgs/RawSonarImage", "marine_acoustic_msgs/ProjectedSonarImage"
 MADE = {
     OWN: scan_line_of,
     ECHO: sonar_echo_of,
@@ -33,6 +38,8 @@ MADE = {
     MICRON: micron_line_of,
     POINT_CLOUD: point_cloud_of,
     LASER_SCAN: laser_scan_of,
+    RAW: raw_sonar_image_of,
+    PROJECTED: projected_sonar_image_of,
 }
 SONARS_PAGE = (Path(__file__).resolve().parents[3] / "docs/sonars.md").read_text()
 NEEDED = {
@@ -42,6 +49,8 @@ NEEDED = {
     MICRON: "header angle bin_distance_step bins",
     POINT_CLOUD: "header points channels",
     LASER_SCAN: "header angle_min angle_increment time_increment range_max ranges",
+    RAW: "header ping_info sample_rate sample0 rx_angles image",
+    PROJECTED: "header beam_directions ranges image",
 }
 MESSAGES = 5000
 
@@ -105,6 +114,39 @@ def test_a_cloud_that_is_no_single_beam_is_refused():
     for cloud in (bent, point_cloud_of(channels=[]), point_cloud_of(points=[])):
         with pytest.raises(RefusedInput, match="must be one beam"):
             reading(POINT_CLOUD, cloud)
+
+
+@pytest.mark.parametrize("kind", [RAW, PROJECTED])
+def test_a_picture_of_one_beam_is_that_beam(kind):
+    found = beam(kind, MADE[kind](angle=2.0))
+    assert (found.stamp_ns, found.angle, found.range_resolution) == (STAMP_NS, pytest.approx(2.0), pytest.approx(0.05))
+    assert found.intensities.tolist() == [0, 1, 2, 3]
+
+
+@pytest.mark.parametrize("kind", [RAW, PROJECTED])
+@pytest.mark.parametrize("image", [{"beam_count": 2}, {"dtype": 8}, {"strengths": ()}])
+def test_a_picture_of_several_beams_or_without_strengths_is_refused(kind, image):
+    with pytest.raises(RefusedInput):
+        reading(kind, MADE[kind](image=sonar_image_data_of(**image), sample0=0))
+
+
+def test_strengths_of_two_bytes_give_their_higher_one():
+    image = sonar_image_data_of((9, 1, 9, 2, 9, 3), dtype=2)
+    assert beam(RAW, raw_sonar_image_of(image=image)).intensities.tolist() == [0, 1, 2, 3]
+
+
+def test_the_column_that_is_new_in_an_image_of_a_turn_is_the_beam():
+    reader = BeamReader(BeamMessageParameters(image_range=30.0))
+    with pytest.raises(RefusedInput, match="first image"):
+        reader.read(IMAGE, turning_image_of({3: (1, 2, 3)}))
+    columns = {3: (1, 2, 3), 4: (7, 8, 9)}
+    (ahead,) = reader.read(IMAGE, turning_image_of(columns)).beams
+    assert (ahead.angle % (2 * math.pi), ahead.range_resolution) == (pytest.approx(0.0), 10.0)
+    assert ahead.intensities.tolist() == [7, 8, 9]
+    (unchanged,) = reader.read(IMAGE, turning_image_of(columns)).beams
+    assert unchanged.angle == pytest.approx(-math.pi / 4)
+    with pytest.raises(RefusedInput, match="image_range"):
+        reading(IMAGE, turning_image_of())
 
 
 @pytest.mark.parametrize("ros_2_name", ["ping360_sonar_msgs/msg/SonarEcho", "micron_driver_ros/msg/ScanLine"])
@@ -266,5 +308,5 @@ def test_a_laser_scan_whose_rays_all_point_one_way_is_one_beam():
     ("ranges", "intensities"), [((0.5, 1.0), []), ((1.0, 0.5), [1, 2]), ((0.1, 1.0, 1.1), [1, 2, 3])]
 )
 def test_rays_that_all_point_one_way_and_are_no_bins_are_refused_at_once(ranges, intensities):
-    with pytest.raises(RefusedInput, match="all point one way"):
+    with pytest.raises(RefusedInput, match="grow evenly"):
         reading(LASER_SCAN, laser_scan_of(ranges, angle_increment=0.0, intensities=intensities))

@@ -1,0 +1,85 @@
+"""Beams in messages that are made for pictures: of marine_acoustic_msgs, and of the simulator Stonefish.
+
+The functions take and raise what those of beam_types do.
+"""
+
+import math
+from typing import Any, List
+
+import numpy as np
+
+from node_support.errors import RefusedInput
+from node_support.headers import stamp_ns
+from sonar_processing.messages.beam_fields import BeamFields, length_of_bins, speed_of_sound_of
+
+_PIXELS = {0: np.dtype("u1"), 2: np.dtype("u2"), 4: np.dtype("u4")}  # DTYPE_ of SonarImageData that are not signed
+
+
+def raw_sonar_image(message: Any) -> List[BeamFields]:
+    """Read a RawSonarImage of marine_acoustic_msgs; raises RefusedInput for one of several beams.
+
+    Its samples count from `sample0` on; the angle is a turn about the axis that points up.
+    """
+    strengths, speed = _only_beam(message.image), speed_of_sound_of(message.ping_info.sound_speed)
+    padded = np.pad(strengths, (message.sample0, 0), mode="constant")
+    resolution = speed / (2.0 * message.sample_rate)
+    angle = message.rx_angles[0]
+    header = message.header
+    return [BeamFields(stamp_ns(header), header.frame_id, angle, padded, resolution, speed_of_sound=speed)]
+
+
+def projected_sonar_image(message: Any) -> List[BeamFields]:
+    """Read a ProjectedSonarImage of marine_acoustic_msgs; raises RefusedInput for one of several beams.
+
+    Its directions have x up, y to the right and z ahead.
+    """
+    strengths = _only_beam(message.image)
+    resolution = length_of_bins(message.ranges, strengths.size)
+    padded = np.pad(strengths, (max(round(message.ranges[0] / resolution - 0.5), 0), 0), mode="constant")
+    (direction,) = message.beam_directions
+    angle = math.atan2(-direction.y, direction.z)
+    return [BeamFields(stamp_ns(message.header), message.header.frame_id, angle, padded, resolution)]
+
+
+def _only_beam(image: Any) -> np.ndarray:
+    """Return the strengths of the one beam of a SonarImageData. Raises RefusedInput for several, or signed numbers."""
+    if image.beam_count != 1 or image.dtype not in _PIXELS:
+        given = f"{image.beam_count} beams of dtype {image.dtype}"
+        raise RefusedInput("beams refused", f"{given}; must be one beam of a scanning sonar, of DTYPE_UINT8, 16 or 32")
+    kind = _PIXELS[image.dtype].newbyteorder(">" if image.is_bigendian else "<")
+    values = np.frombuffer(bytes(image.data), dtype=kind)
+    return (values >> (8 * kind.itemsize - 8)).astype(np.uint8)
+
+
+class TurningImage:
+    """Reads the images of Stonefish's MSIS: a column for each step of the head, of which each message renews one.
+
+    Columns go clockwise from astern, rows from the farthest bin to the nearest.
+    """
+
+    def __init__(self, reach: float) -> None:
+        """`reach`: of all columns, m, which images do not tell; 0 where nobody said it."""
+        self._reach = reach
+        self._before = np.zeros((0, 0), dtype=np.uint8)
+        self._column, self._step = 0, 1
+
+    def __call__(self, message: Any) -> List[BeamFields]:
+        """Return the beams that are new in an image. Raises RefusedInput for the first, of which none is known."""
+        if not self._reach > 0.0:
+            raise RefusedInput("beams refused", "images do not tell how far they reach; set image_range")
+        image = np.frombuffer(bytes(message.data), dtype=np.uint8).reshape(message.height, message.step)
+        image, before = image[:, : message.width], self._before
+        self._before = image
+        if before.shape != image.shape:
+            raise RefusedInput("beams refused", "the first image of its size does not tell which of its beams is new")
+        found = np.flatnonzero((image != before).any(axis=0) & image.any(axis=0))
+        if not found.size:
+            # A beam that hears what it heard a turn ago.
+            found = np.array([(self._column + self._step) % message.width])
+        self._step, self._column = 1 if found[-1] >= self._column else -1, int(found[-1])
+        stamp, resolution = stamp_ns(message.header), self._reach / message.height
+        angles = 2.0 * math.pi * found / message.width
+        return [
+            BeamFields(stamp, message.header.frame_id, float(angle), image[::-1, column], resolution)
+            for angle, column in zip(angles, found)
+        ]
