@@ -7,6 +7,8 @@ from made_recordings import SECONDS, touring
 
 from mlsm_manager.offline.recording import Recording
 
+pytestmark = pytest.mark.newest_only("about a benchmark")
+
 WHOLE = touring()
 FAULTS = {name: make for name, make in faults(SECONDS).items() if name != "nothing"}
 

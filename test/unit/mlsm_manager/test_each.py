@@ -35,6 +35,8 @@ def test_every_recording_is_mapped_with_the_other_options():
     assert options_of_one(words, [Path("a.bag"), Path("b.bag")]) == ["--refine", "--set", "min_range=1"]
 
 
+@pytest.mark.long
+@pytest.mark.newest_only("dear; test_run_files and test_map_bag write single maps with every version")
 def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, monkeypatch, capsys):
     monkeypatch.setattr(sys, "argv", [str(ROOT / "nodes/map_bag")])
     good, same, bad = ROOT / "test/data/basin.bag", tmp_path / "basin.bag", tmp_path / "bad.bag"

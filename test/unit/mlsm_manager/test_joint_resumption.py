@@ -12,7 +12,7 @@ from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.surface_map.map_file import map_bytes, map_of_bytes
 from node_support.geometry import composed, transformed
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; the solver and its parts are tested with every version")]
 
 HARBOUR = tour(14, direction=0.05)
 KILLED_AFTER = 9
@@ -150,7 +150,6 @@ def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(s
     assert [update.accepted for update in updates] == [False, True]
 
 
-@pytest.mark.newest_only("dear; test_localiser relocalises with every version")
 @pytest.mark.parametrize("has_run", [True, False])
 def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, stored, whole, has_run):
     whole, wanted = whole

@@ -15,7 +15,7 @@ from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_va
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; the solver and its parts are tested with every version")]
 
 STEP = 1e-6
 TIMES = np.array([0.0, 14.0, 28.0])
@@ -154,7 +154,6 @@ def test_a_velocity_that_nobody_reported_is_found_with_its_deviation(made, solve
         assert (deviation < 0.2).all()
 
 
-@pytest.mark.newest_only("dear; the tests above follow the same tour")
 @pytest.mark.parametrize("kind", [OdometryKind.THRUSTERS, OdometryKind.AUTO])
 def test_a_scale_that_is_30_percent_off_is_found(kind, made):
     solver = followed([reporting(scan, 1.0 / 1.3) for scan in made.scans], parameters(kind))
