@@ -9,7 +9,7 @@ import numpy as np
 import yaml
 from benchmarks.harness import ROOT
 from benchmarks.matchers import MATCHERS, MatcherName
-from benchmarks.scans import HEAD, KINDS, ScanMaker, still
+from benchmarks.scans import HEAD, KINDS, ScanMaker, SonarKind, still
 from matplotlib.axes import Axes
 
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
@@ -24,7 +24,7 @@ from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import Pictures, draw_from_above, draw_outlines, new_figure, to_scale
-from thesis_results.thesis_scans import ThesisScans, patient_estimator, thesis_estimator
+from thesis_results.thesis_scans import ThesisScans, fine_estimator, thesis_estimator
 
 SEEDS = 30
 TURNS = 7
@@ -118,31 +118,33 @@ def make(pictures: Pictures) -> str:
             ],
         ),
         prose(f"""The static matching of the thesis (6.5.6): a still scan that is put beside its place by 0.3 m on
-        x, -0.2 m on y and 5 degrees is matched with the map of another one. Medians of {THESIS_SEEDS} runs:"""),
-        table(["", "off by", "heading", "error"], _static_rows()),
+        x, -0.2 m on y and 5 degrees is matched with the map of another one. Median and greatest of {THESIS_SEEDS} runs; the thesis gives no number
+        ("the expected results", 7.4):"""),
+        table(["", "", "off by", "heading", "error"], _static_rows()),
     )  # fmt: skip
 
 
 def _static_rows() -> List[List[str]]:
-    chain = ThesisScans(_SHARP)
-    rows = {
-        _WORD: (chain, thesis_estimator),
-        f"{_WORD} with 0.3 m and 1000 iterations, the code's defaults": (chain, patient_estimator),
-    }
-    return [[name, *_static_cells(*row)] for name, row in rows.items()]
+    rows = {_WORD: thesis_estimator, f"{_WORD} with cells of 0.3 m, the code's default": fine_estimator}
+    return [_static_row(kind, *row) for kind in (_SHARP, _THESIS) for row in rows.items()]
 
 
-def _static_cells(maker: ScanMaker, make_estimator: Callable[[], Estimator]) -> List[str]:
-    found, turn = [], HEAD.seconds_per_turn
+def displaced_fix(maker: ScanMaker, estimator: Estimator, seed: int) -> MatchResult:
+    """Return the match of a still scan at the origin, put beside its place, with the map of another one."""
+    turn, here = HEAD.seconds_per_turn, still(np.zeros(3))
     beside = np.stack([np.zeros(3), np.zeros(3), _DISPLACED, _DISPLACED])
     track = Track(turn * np.array([-1.0, 0.9999, 1.0, 3.0]), beside)
-    for seed in range(THESIS_SEEDS):
-        estimator, here = make_estimator(), still(np.zeros(3))
-        estimator.add_scan(maker.scan(here, here, 2 * seed, track=track))
-        result = estimator.add_scan(maker.scan(here, still(_DISPLACED), 2 * seed + 1, 1, track=track)).result
-        found.append([np.hypot(*result.pose[:2]), abs(np.degrees(result.pose[2])), result.error])
-    distance, yaw, error = np.median(found, axis=0)
-    return [f"{distance:.2f} m", f"{yaw:.2f} deg", f"{error:.2f} m"]
+    estimator.add_scan(maker.scan(here, here, 2 * seed, track=track))
+    return estimator.add_scan(maker.scan(here, still(_DISPLACED), 2 * seed + 1, 1, track=track)).result
+
+
+def _static_row(kind: SonarKind, name: str, make_estimator: Callable[[], Estimator]) -> List[str]:
+    maker = ThesisScans(kind)
+    results = [displaced_fix(maker, make_estimator(), seed) for seed in range(THESIS_SEEDS)]
+    found = [[np.hypot(*one.pose[:2]), abs(np.degrees(one.pose[2])), one.error] for one in results]
+    (distance, yaw, error), (most, most_yaw, _) = np.median(found, axis=0), np.max(found, axis=0)
+    cells = [f"{distance:.2f} m, {most:.2f} m", f"{yaw:.2f} deg, {most_yaw:.2f} deg", f"{error:.2f} m"]
+    return [str(kind), name, *cells]
 
 
 def _corrections(found: Dict[str, List[Fix]]) -> List[List[str]]:

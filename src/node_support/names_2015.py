@@ -118,9 +118,10 @@ KEYS: List[Key] = [
         "4.4.1: the basin of 120 by 50 m; the map grows beyond it"),
     Key("MLSM_core", "sizeYMeters", 60.0, "mlsm_core", "size_y_meters", "as above"),
     Key("MLSM_core", "maxIterations", 1000, "mlsm_core", "max_iterations",
-        "only for `estimator: THESIS`; iterations end when the error stops falling"),
+        "only for `estimator: THESIS`; iterations end when the points stand still, or with a moving scan when the error "
+        "rises. The yaml of 2015 has 10: a still scan that is 5 degrees off needs 40 to 150"),
     Key("MLSM_core", "errorThreshold", 0.3, "mlsm_core", "",
-        "it only ended the iterations; here they end when the error stops falling, and `error_threshold` is the "
+        "it only ended the iterations, which end by themselves here (see above); `error_threshold` is the "
         "greatest error of a match that is accepted"),
     Key("MLSM_core", "nSamples", 5, "mlsm_core", "n_samples", "only for `estimator: THESIS`"),
     Key("MLSM_core", "sampleStep", 0.25, "mlsm_core", "sample_step", "as in the yaml of 2015"),

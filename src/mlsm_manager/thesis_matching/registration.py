@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from mlsm_manager.surface_map.blocks import Blocks
 from node_support.geometry import rotated
 
+_MEDIANS = 3.0  # of normal errors across a wall 4 % are farther
 _FEWEST_TIMES = 3  # two times always lie on a line, and show no error of it
 
 
@@ -55,6 +56,17 @@ class ClosestBlocks:
         return closest
 
 
+def belonging(places: np.ndarray, targets: np.ndarray, resolution: float) -> np.ndarray:
+    """Return (n,) bool: which places (n, 2) and targets (n, 2) [m] are pairs, and no echo that the map does not have.
+
+    The thesis pairs every point (6.5.6). Its noise echoes then pull still scans up to 0.2 m along walls, even from the
+    true pose; so only pairs count that are within three medians (as by Zhang 1994), or within one cell, as points and
+    their blocks are when a map is drawn (6.5.6).
+    """
+    distance = np.linalg.norm(targets - places, axis=1)
+    return distance <= max(resolution, _MEDIANS * float(np.median(distance)))
+
+
 def rigid_motion(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
     """Return the motion (3,) x y yaw that takes points (n, 2) nearest to their targets (n, 2) (Besl and McKay 1992)."""
     middle, target = points.mean(axis=0), targets.mean(axis=0)
@@ -71,24 +83,27 @@ class SegmentFit(NamedTuple):
     slope: np.ndarray
 
 
-def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray) -> SegmentFit:
+def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray, counted: np.ndarray) -> SegmentFit:
     """Return the translations that segments of points need.
 
     times: (n,) s, increasing or equal. moving: (n,) bool; a segment is a run of equal values. errors: (n, 2) m from
-    each point to its block. A still segment moves by its mean error (the centroids' difference); a moving one starts
-    with the translation that the segment before it ended with and goes on along a line.
+    each point to its block. counted: (n,) bool, whose errors count; a segment without any goes on as the one before.
+    A still segment moves by its mean error (the centroids' difference); a moving one starts with the translation that
+    the segment before it ended with and goes on along a line.
     """
     translations = np.zeros((len(times), 2))
     slope = np.zeros(2)
     last: Optional[np.ndarray] = None
     for first, end in _runs(moving):
-        part = slice(first, end)
-        if not moving[first]:
+        part, chosen = slice(first, end), counted[first:end]
+        if not chosen.any():
+            translations[part] = 0.0 if last is None else last
+        elif not moving[first]:
             slope = np.zeros(2)
-            translations[part] = errors[part].mean(axis=0)
+            translations[part] = errors[part][chosen].mean(axis=0)
         else:
             since = times[part] - (times[first - 1] if first else times[first])
-            offset, slope = _line(since, errors[part], last)
+            offset, slope = _line(since[chosen], errors[part][chosen], last)
             translations[part] = offset + since[:, np.newaxis] * slope
         last = translations[end - 1]
     return SegmentFit(translations, slope)

@@ -3,13 +3,16 @@
 import numpy as np
 import pytest
 from benchmarks.matchers import GicpMatcher
+from benchmarks.scans import KINDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_maps import map_with
 from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
+from thesis_results.moves import displaced_fix
+from thesis_results.thesis_scans import ThesisScans, thesis_estimator
 
 from mlsm_manager.scan_matching.scan import MatchStatus
-from mlsm_manager.thesis_matching.registration import ClosestBlocks, rigid_motion, translate_segments
+from mlsm_manager.thesis_matching.registration import ClosestBlocks, belonging, rigid_motion, translate_segments
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.geometry import composed, transformed
 
@@ -20,6 +23,11 @@ OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)
 def match(scan, target, expected, **changes):
     matcher = ThesisMatcher(ThesisMatcherParameters().changed(changes))
     return matcher.match(scan, target, prior_of_pose(scan, expected))
+
+
+def segments(times, moving, errors):
+    """Return the fit of segments all of whose errors count."""
+    return translate_segments(times, moving, errors, np.ones(len(times), dtype=bool))
 
 
 def column(*heights):
@@ -57,7 +65,7 @@ def test_without_samples_or_movement_the_search_takes_the_closest_block():
 @given(OFFSETS)
 def test_a_still_segment_moves_by_its_mean_error(error):
     errors = error + np.array([[0.1, 0.0], [-0.1, 0.2], [0.0, -0.2]])
-    fit = translate_segments(np.arange(3.0), np.zeros(3, dtype=bool), errors)
+    fit = segments(np.arange(3.0), np.zeros(3, dtype=bool), errors)
     np.testing.assert_allclose(fit.translations, np.tile(error, (3, 1)), atol=1e-12)
     np.testing.assert_array_equal(fit.slope, np.zeros(2))
 
@@ -66,7 +74,7 @@ def test_a_still_segment_moves_by_its_mean_error(error):
 def test_a_moving_segment_moves_along_a_line_over_time(offset, slope):
     times = np.linspace(0.0, 8.0, 20)
     errors = offset + times[:, np.newaxis] * slope
-    fit = translate_segments(times, np.ones(20, dtype=bool), errors)
+    fit = segments(times, np.ones(20, dtype=bool), errors)
     np.testing.assert_allclose(fit.translations, errors, atol=1e-9)
     np.testing.assert_allclose(fit.slope, slope, atol=1e-9)
 
@@ -76,19 +84,36 @@ def test_a_moving_segment_begins_where_the_still_one_ended(offset, slope):
     times = np.arange(20.0)
     moving = times >= 8.0
     errors = offset + np.maximum(times - 7.0, 0.0)[:, np.newaxis] * slope
-    fit = translate_segments(times, moving, errors)
+    fit = segments(times, moving, errors)
     np.testing.assert_allclose(fit.translations, errors, atol=1e-9)
 
 
 def test_every_change_between_still_and_moving_begins_a_segment():
     moving = np.array([False, False, True, True, True, False, False])
     errors = np.array([[1.0, 0.0]] * 2 + [[2.0, 0.0], [3.0, 0.0], [4.0, 0.0]] + [[9.0, 0.0]] * 2)
-    translations = translate_segments(np.arange(7.0), moving, errors).translations
+    translations = segments(np.arange(7.0), moving, errors).translations
     np.testing.assert_allclose(translations[:, 0], [1.0, 1.0, 2.0, 3.0, 4.0, 9.0, 9.0])
 
 
+def test_errors_that_do_not_count_move_nothing_and_a_segment_of_such_goes_on_as_the_one_before():
+    moving = np.repeat([False, True, False], [4, 6, 3])
+    errors = np.repeat([[1.0, 0.0], [1.0, 0.0], [7.0, 7.0]], [4, 6, 3], axis=0)
+    counted = np.repeat([True, False], [10, 3])
+    errors[[0, 6]], counted[[0, 6]] = 50.0, False
+    fit = translate_segments(np.arange(13.0), moving, errors, counted)
+    np.testing.assert_allclose(fit.translations, np.tile([1.0, 0.0], (13, 1)), atol=1e-12)
+
+
+def test_pairs_belong_together_within_a_cell_or_three_medians():
+    places = np.column_stack([[0.1, 0.2, 0.3, 0.61, 5.0], np.zeros(5)])
+    targets = np.zeros_like(places)
+    assert belonging(places, targets, 0.6).tolist() == [True, True, True, True, False]
+    assert belonging(places, targets, 10.0).all()
+    assert belonging(10.0 * places, targets, 0.6).tolist() == [True, True, True, True, False]
+
+
 def test_a_moving_segment_of_two_times_has_no_slope():
-    fit = translate_segments(np.array([0.0, 1.0]), np.ones(2, dtype=bool), np.array([[0.0, 0.0], [1.0, 0.0]]))
+    fit = segments(np.array([0.0, 1.0]), np.ones(2, dtype=bool), np.array([[0.0, 0.0], [1.0, 0.0]]))
     np.testing.assert_allclose(fit.translations, [[0.5, 0.0], [0.5, 0.0]])
 
 
@@ -110,6 +135,15 @@ def test_the_rigid_motion_takes_points_to_their_targets(offset, yaw):
 
 def test_a_still_scan_is_turned_back_too():
     result = match(scan_of(harbour(), still()), map_of(harbour()), [0.3, -0.2, np.radians(5.0)])
+    assert result.accepted
+    assert np.hypot(*result.pose[:2]) < 0.05
+    assert abs(result.pose[2]) < np.radians(1.0)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_still_scan_of_the_basin_comes_back_to_its_place(seed):
+    """Through the chain of thesis:=true, with the echoes of a real pulse; put beside by .36 m and 5 degrees."""
+    result = displaced_fix(ThesisScans(KINDS[0]), thesis_estimator(), seed)
     assert result.accepted
     assert np.hypot(*result.pose[:2]) < 0.05
     assert abs(result.pose[2]) < np.radians(1.0)
