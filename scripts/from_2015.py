@@ -39,6 +39,8 @@ That your bag makes a map can be tested; what fails says how far its beams came:
     rostest underwater_map_construction play_bag.test bag:=$PWD/old.bag beams:=/charle/sonar thesis:=true \\
         least_blocks:=1000 most_minutes:=10
 
+The tests of our own recordings look for these in the folder that the environment variable `UMC_DATA` names.
+
 ## What is different
 
 - **A bin** is drawn in its middle, half a bin nearer than in 2015. `thesis:=true` draws it at its far end again
@@ -49,10 +51,13 @@ That your bag makes a map can be tested; what fails says how far its beams came:
 - **The types** of `/MLSM/cloud` and `/MLSM/Markers` are swapped in the list of section 4.5.1. They are as in the
   code: a PointCloud2 and a MarkerArray.
 - **One package** takes the place of the suite: `rosrun sonar_processing thresholder` is `rosrun
-  underwater_map_construction thresholder`, and so on; messages are `underwater_map_construction/...` instead of
+  underwater_map_construction thresholder`, `rosrun mlsm_manager MLSM_core` is `rosrun underwater_map_construction
+  mlsm_core`, `roslaunch mlsm_manager MLSM.launch` is `roslaunch underwater_map_construction mlsm_core.launch`, and so
+  on through the tables below; messages are `underwater_map_construction/...` instead of
   `avora_msgs/...`, with the same md5 sums.
 - **Matching**: a scan that is matched goes into the map, as the thesis says; the code of 2015 left it out. `map ->
-  odom` has a yaw, since still scans are turned too (6.5.6). What is corrected of the code stands in
+  odom` has a yaw, since still scans are turned too (6.5.6). Echoes that the map does not have do not count: they pulled still scans up
+  to 0.2 m along walls ([results](results.md#74-three-moves-with-an-odometry-that-is-30--off)). What is corrected of the code stands in
   `src/mlsm_manager/thesis_matching/thesis_matcher.py`.
 - **CONT** publishes from the `scan_size`-th beam on, then with every beam.
 - **Old names** of topics, and the service `sonar_control`, are there with `thesis:=true`: the node

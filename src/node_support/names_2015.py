@@ -185,7 +185,7 @@ NAMES: List[Name] = [
     Name(Kind.TOPIC, "/sonar/walls/markers", "sonar/scan/line/markers", "MarkerArray"),
     Name(Kind.TOPIC, "/Debug/Wall, /Sonar/Walls/image/debug", "", "what is left of a cloud behind each wall"),
     Name(Kind.TOPIC, "/MLSM/Markers", "MLSM/Markers", "MarkerArray; the list in 4.5.1 swaps the types of these two"),
-    Name(Kind.TOPIC, "/MLSM/cloud", "MLSM/cloud", "PointCloud2, with height, depth and count of each block"),
+    Name(Kind.TOPIC, "/MLSM/cloud", "MLSM/cloud", "PointCloud2, with height, depth, count and type of each block (with `cloud_free` FREE ones too)"),
     Name(Kind.TOPIC, "debug_cloud", "MLSM/scan", "with `thesis:=true` `debug_cloud` too, accepted or not"),
     Name(Kind.TOPIC, "startMatching", "startMatching", "matching is on from the start; see `start_matching`"),
     Name(Kind.TOPIC, "/cmd_vel", "cmd_vel"),

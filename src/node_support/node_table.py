@@ -192,7 +192,10 @@ NODES: Dict[str, NodeDescription] = {
                 "every block at its true size; all at first, then what changed",
             ),
             _publishes(
-                topics.MAP_CLOUD, "sensor_msgs/PointCloud2", "mean, height, depth and number of points of every block"
+                topics.MAP_CLOUD,
+                "sensor_msgs/PointCloud2",
+                "mean, height, depth, number of points and type of every block (0 horizontal, 1 vertical; with "
+                "`cloud_free` 2 free)",
             ),
             _publishes(topics.MAP_GRID, "nav_msgs/OccupancyGrid", "free, unknown and occupied from above"),
             _publishes(topics.MAP_OCTOMAP, "octomap_msgs/Octomap", "voxels; where these messages are installed"),
@@ -216,7 +219,7 @@ NODES: Dict[str, NodeDescription] = {
             _serves("~save_map", "SaveMap", "writes the map into `map_directory`"),
             _serves("~load_map", "LoadMap", "takes a map of `map_directory` in the place of the present one"),
             _serves("~reset_map", "std_srvs/Trigger", "discards the map, the position in it and the path"),
-            _serves("~get_region", "GetRegion", "returns the blocks in a box"),
+            _serves("~get_region", "GetRegion", "returns the blocks in a box, as they are on `MLSM/cloud`"),
         ),
     ),
     "thesis_topics": NodeDescription(

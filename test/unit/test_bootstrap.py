@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
 ROWS = [
@@ -81,10 +82,21 @@ def test_every_key_of_the_package_is_installed():
     assert "rospy" in keys
 
 
-def test_every_pip_key_of_the_package_is_in_the_requirements():
+def _pip_keys():
     package = ET.parse(str(ROOT / "package.xml")).getroot()
-    keys = {element.text for element in package if (element.text or "").endswith("-pip")}
-    wanted = {key.replace("python3-", "").replace("-pip", "").replace("collada", "pycollada") for key in keys}
+    return {element.text for element in package if (element.text or "").endswith("-pip")}
+
+
+def test_rosdep_knows_every_pip_key_of_the_package_on_both_systems():
+    rosdep = yaml.safe_load((ROOT / "test/data/rosdep_python.yaml").read_text())
+    assert _pip_keys() == set(rosdep)
+    assert all(rosdep[key][system]["pip"]["packages"] for key in rosdep for system in ("debian", "ubuntu"))
+
+
+def test_every_pip_key_of_the_package_is_in_the_requirements_unless_apt_has_it():
+    from_apt = {row[0] for row in ROWS if row[1] != "-"}
+    rosdep = yaml.safe_load((ROOT / "test/data/rosdep_python.yaml").read_text())
+    wanted = {rosdep[key]["ubuntu"]["pip"]["packages"][0] for key in _pip_keys() - from_apt}
     required = {re.split("[<>=]", line)[0] for line in (ROOT / "scripts" / "requirements.txt").read_text().splitlines()}
     assert wanted == {"bluerobotics-ping", "trimesh", "pycollada"}
     assert wanted | {"embreex"} <= required

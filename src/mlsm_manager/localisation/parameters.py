@@ -202,6 +202,10 @@ class MlsmNodeParameters(ParameterSet):
         unit="s", low=0.05, high=3600.0, tunable=False,
     )  # fmt: skip
     color_by: ColorBy = parameter(ColorBy.TYPE, "what the colour of a block's marker tells", tunable=False)
+    cloud_free: bool = parameter(
+        False, "MLSM/cloud and get_region hold what is known to be free too, as blocks of type 2 (thesis 6.2.1)",
+        tunable=False, expert="who takes every point for a surface must not get them",
+    )  # fmt: skip
     grid_low: float = parameter(
         -1000.0, "lowest height that MLSM/grid shows", unit="m", low=-20000.0, high=20000.0, tunable=False
     )

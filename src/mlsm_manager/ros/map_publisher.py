@@ -15,7 +15,7 @@ from visualization_msgs.msg import MarkerArray
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.ros.markers import BlockMarkers
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.export.octomap import octree
 from mlsm_manager.surface_map.export.rasters import Raster, occupancy
 from mlsm_manager.surface_map.map_file import ExportError
@@ -25,14 +25,20 @@ from node_support.health import Health
 from node_support.ros.callbacks import guarded, on_change
 from sonar_processing.ros.conversions import header, point_cloud
 
-CLOUD_FIELDS = ("x", "y", "z", "intensity", "height", "depth", "count")
+CLOUD_FIELDS = ("x", "y", "z", "intensity", "height", "depth", "count", "type")
 _MOST_TIME = 0.1  # share of the time that may go into sending the whole map on one topic again and again
 
 
-def map_cloud(blocks: Blocks, stamp_ns: int, frame_id: str) -> PointCloud2:
-    """Return mean, height, depth and number of points of every block."""
-    rows = np.column_stack([blocks.mean, blocks.height, blocks.depth, blocks.count])
+def map_cloud(blocks: Blocks, free: Optional[Blocks], stamp_ns: int, frame_id: str) -> PointCloud2:
+    """Return mean, height, depth, number of points and BlockType of every block, and behind them those of `free`."""
+    rows = _cloud_rows(blocks, blocks.type)
+    if free is not None:
+        rows = np.concatenate([rows, _cloud_rows(free, np.full(len(free), BlockType.FREE))])
     return point_cloud(rows, stamp_ns, frame_id, fields=CLOUD_FIELDS)
+
+
+def _cloud_rows(blocks: Blocks, kinds: np.ndarray) -> np.ndarray:
+    return np.column_stack([blocks.mean, blocks.height, blocks.depth, blocks.count, kinds])
 
 
 def occupancy_grid(grid: Raster, stamp_ns: int, frame_id: str) -> OccupancyGrid:
@@ -182,7 +188,8 @@ class MapPublisher:
         # In each message the stamp is read before the map: a cloud that comes between them may be there early, but
         # none that the stamp tells of is missing.
         stamp_ns = self._stamp_ns
-        return map_cloud(self._localiser.blocks, stamp_ns, self._parameters.map_frame)
+        free = self._localiser.free if self._parameters.cloud_free else None
+        return map_cloud(self._localiser.blocks, free, stamp_ns, self._parameters.map_frame)
 
     def _grid(self) -> OccupancyGrid:
         parameters, stamp_ns = self._parameters, self._stamp_ns

@@ -70,8 +70,11 @@ class MapServices:
 
     def _get_region(self, request: srv.GetRegionRequest) -> srv.GetRegionResponse:
         low, high = (np.array([corner.x, corner.y, corner.z]) for corner in (request.low, request.high))
-        blocks = self._localiser.region(low, high)
-        return srv.GetRegionResponse(map_cloud(blocks, rospy.Time.now().to_nsec(), self._parameters.map_frame))
+        free = self._localiser.free.in_box(low, high) if self._parameters.cloud_free else None
+        cloud = map_cloud(
+            self._localiser.region(low, high), free, rospy.Time.now().to_nsec(), self._parameters.map_frame
+        )
+        return srv.GetRegionResponse(cloud)
 
     def _relocalise(self, _request: TriggerRequest) -> TriggerResponse:
         update = self._localiser.relocalise()

@@ -11,7 +11,6 @@ from document import LIVE_NODES
 from test_live_parameters import launched
 
 from mlsm_manager.migrate_yaml import NODES, migrated, migrated_text
-from node_support import topics
 from node_support.help import HOSTS
 from node_support.names_2015 import KEYS, NAMES, Kind
 from node_support.node_table import NODES as DESCRIBED
@@ -39,24 +38,33 @@ def named(kind):
 
 @named(Kind.NODE)
 def test_every_node_exists(name):
+    """And is started by every_node.test, but for those that host several of them."""
     assert name in {**DESCRIBED, **HOSTS}
 
 
 @named(Kind.LAUNCH)
-def test_every_launch_file_exists(name):
-    assert (ROOT / "launch" / name).is_file()
+def test_every_launch_file_can_be_launched(name):
+    """With everything that it includes."""
+    assert launched(name)
 
 
-@named(Kind.TOPIC)
-def test_every_topic_exists(name):
-    known = [value for value in vars(topics).values() if isinstance(value, str)]
-    assert any(name == one or name.rpartition("/")[0] == one for one in known)
+def _served(node):
+    """Return the names of a node's topics and services, which every_node.test compares with the running node."""
+    return {one.name.replace("~", f"{node}/") for one in DESCRIBED[node].interfaces}
 
 
-@named(Kind.SERVICE)
-def test_every_service_exists(name):
-    node, _, service = name.partition("/")
-    assert f"~{service}" in [one.name for one in DESCRIBED[node].interfaces]
+@pytest.mark.parametrize("name", [one.here for one in NAMES if one.kind in (Kind.TOPIC, Kind.SERVICE) and one.here])
+def test_every_topic_and_service_is_one_of_a_running_node(name):
+    served = {"/tf"}.union(*map(_served, DESCRIBED))
+    assert name in served or name.rpartition("/")[0] in served
+
+
+@pytest.mark.parametrize("one", [one for one in NAMES if "`thesis:=true`" in one.remark], ids=lambda one: one.before)
+def test_old_names_are_those_of_thesis_topics(one):
+    """Each of which old_names.test sends a message through, or calls."""
+    served = {name.lstrip("/") for name in _served("thesis_topics")}
+    before = {name.split(" ")[0].lstrip("/") for name in one.before.split(", ")}
+    assert before & served
 
 
 @named(Kind.FIELD)

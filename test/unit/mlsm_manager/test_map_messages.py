@@ -17,7 +17,7 @@ from made_maps import blocks_of, random_map
 from std_msgs.msg import Header
 from visualization_msgs.msg import Marker, MarkerArray
 
-from mlsm_manager.ros.map_publisher import has_octomap_messages, octomap_message
+from mlsm_manager.ros.map_publisher import CLOUD_FIELDS, has_octomap_messages, map_cloud, octomap_message
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
 from mlsm_manager.surface_map.export.octomap import octree, write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
@@ -96,6 +96,16 @@ def test_a_class_of_boxes_that_vanished_is_deleted_once():
     assert actions.pop((shown.ns, shown.id)) == Marker.DELETE
     assert list(actions.values()) == [Marker.ADD]
     assert [m.action for m in _read(markers.whole(blocks_of([(0.0, 4.0)]), HEADER))] == [Marker.ADD]
+
+
+@pytest.mark.parametrize("with_free", [False, True])
+def test_a_cloud_tells_the_type_of_each_block_and_holds_free_ones_when_asked(with_free):
+    blocks, free = blocks_of([(-4.0, 3.0), (0.0, 0.1)]), blocks_of([(-2.0, -2.0)])
+    message = map_cloud(blocks, free if with_free else None, 10**9, "map")
+    rows = np.frombuffer(message.data, "<f4").reshape(-1, len(CLOUD_FIELDS))
+    assert [field.name for field in message.fields] == list(CLOUD_FIELDS)
+    assert rows[:, CLOUD_FIELDS.index("type")].tolist() == [1, 0, 2][: 2 + with_free]
+    np.testing.assert_allclose(rows[:2, :3], blocks.mean[:, :3], rtol=1e-6)
 
 
 def test_blocks_are_coloured_one_by_one_when_asked():
