@@ -100,6 +100,18 @@ class Health:
         with self._lock:
             self._inputs[topic] = _Input(self._clock(), True)
 
+    def need_no_more(self, topic: str) -> None:
+        """Learn that the stage does not listen to a topic any more."""
+        with self._lock:
+            self._inputs.pop(topic, None)
+
+    def silent(self) -> Dict[str, float]:
+        """Return for how many seconds each topic that is needed, and ceased, did not come."""
+        with self._lock:
+            now = self._clock()
+            silences = {topic: one.silence(now) for topic, one in self._inputs.items()}
+        return {topic: seconds for topic, seconds in silences.items() if seconds}
+
     def show(self, what: str, value: str) -> None:
         """Report a value as it is."""
         with self._lock:
@@ -162,8 +174,7 @@ class Health:
                 for kind, problem in self._problems.items()
                 if now - problem.last_seen < WARNING_PERIOD
             }
-            silent = {topic: one.silence(now) for topic, one in self._inputs.items()}
-        ceased = {f"nothing on {topic} for {seconds:.0f} s": Level.WARN for topic, seconds in silent.items() if seconds}
+        ceased = {f"nothing on {topic} for {seconds:.0f} s": Level.WARN for topic, seconds in self.silent().items()}
         recent = {**ceased, **recent}
         return HealthReport(max(recent.values(), default=Level.OK), "; ".join(recent) or "running", values)
 

@@ -185,6 +185,11 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(topics.CLEANED, "StampedIntensityCloud", "points of the map that is shown"),
             _subscribes(topics.ECHOES, "StampedIntensityCloud", "points to match, unless `match_input` is CLEANED"),
             _subscribes(topics.START_MATCHING, "std_msgs/Bool", "switches matching on or off"),
+            _subscribes(
+                topics.SEEN_POSE,
+                "geometry_msgs/PoseWithCovarianceStamped",
+                'where somebody sees the vehicle, as rviz\'s "2D Pose Estimate"; the next scans are searched there',
+            ),
             _subscribes("tf", "", "`odom -> base_link`: dead reckoning"),
             _publishes(
                 topics.MAP_MARKERS,
@@ -198,11 +203,23 @@ NODES: Dict[str, NodeDescription] = {
                 "`cloud_free` 2 free)",
             ),
             _publishes(topics.MAP_GRID, "nav_msgs/OccupancyGrid", "free, unknown and occupied from above"),
+            _publishes(topics.MAP_OF_NAVIGATION, "nav_msgs/OccupancyGrid", "the same, as map_server names it"),
+            _publishes(topics.MAP_METADATA, "nav_msgs/MapMetaData", "size and place of that grid"),
             _publishes(topics.MAP_OCTOMAP, "octomap_msgs/Octomap", "voxels; where these messages are installed"),
             _publishes(
                 topics.MATCHED_POSE,
                 "geometry_msgs/PoseWithCovarianceStamped",
                 "the fix of each matched scan, at the stamp of its newest beam",
+            ),
+            _publishes(
+                topics.POSE_NOW,
+                "geometry_msgs/PoseWithCovarianceStamped",
+                "each second, also between fixes: the position now, with the covariance that it has by now",
+            ),
+            _publishes(
+                topics.STATUS_MARKERS,
+                "visualization_msgs/MarkerArray",
+                "the status for rviz: in words at the vehicle, green, amber or red, with its ellipse of 95 %",
             ),
             _publishes(
                 topics.MATCHED_ODOMETRY, "nav_msgs/Odometry", "the fix with the velocity, for robot_localization"
@@ -216,6 +233,7 @@ NODES: Dict[str, NodeDescription] = {
                 "tf", "", "`map -> odom` at `transform_rate`; it changes smoothly to a new fix within `blend_time`"
             ),
             _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scan"),
+            _serves(topics.DYNAMIC_MAP, "nav_msgs/GetMap", "returns `map`"),
             _serves("~save_map", "SaveMap", "writes the map into `map_directory`"),
             _serves("~load_map", "LoadMap", "takes a map of `map_directory` in the place of the present one"),
             _serves("~reset_map", "std_srvs/Trigger", "discards the map, the position in it and the path"),

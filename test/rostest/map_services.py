@@ -11,7 +11,8 @@ import rospy
 from geometry_msgs.msg import Point
 from graph import Inbox, run
 from messages import publisher, still_cloud
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import MapMetaData, OccupancyGrid
+from nav_msgs.srv import GetMap
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -103,6 +104,9 @@ class MapServices(unittest.TestCase):
         grid = Inbox("/MLSM/grid", OccupancyGrid).wait_for(lambda grid: bool(grid.data))
         self.assertEqual((grid.info.width, grid.info.height, grid.info.resolution), (11, 11, 0.5))
         self.assertEqual([value for value in grid.data if value != -1], [100, 100])
+        self.assertEqual(Inbox("/map", OccupancyGrid).wait_for().data, grid.data)
+        self.assertEqual(Inbox("/map_metadata", MapMetaData).wait_for().width, 11)
+        self.assertEqual(rospy.ServiceProxy("/dynamic_map", GetMap)().map.data, grid.data)
 
     def test_a_name_that_leaves_the_folder_is_refused(self) -> None:
         answer = rospy.ServiceProxy("/mlsm_core/save_map", SaveMap)("../pillar", False)

@@ -68,9 +68,9 @@ class DeadReckoning:
             kind, depth_of = depths[parameters.depth_type]
             inputs.append((topics.DEPTH, kind, lambda message: self._take_depth(depth_of(message))))
         self.health.expect(rospy.resolve_name(topics.HEADING))
-        for number, (topic, kind, take) in enumerate(inputs):
-            # Commands of thrusters come only while somebody drives; heading and depth must not cease.
-            call = guarded(self.health, take, topic if number else "")
+        for topic, kind, take in inputs:
+            # Commands of thrusters come only while somebody drives; all else must not cease.
+            call = guarded(self.health, take, "" if topic == topics.VELOCITY_COMMANDS else topic)
             rospy.Subscriber(topic, kind, call, queue_size=QUEUE_SIZE, tcp_nodelay=True)
 
     def _depth_of_pressure(self, message: FluidPressure) -> float:

@@ -79,8 +79,11 @@ class Estimator(ABC):
         self._uncarved: Deque[Tuple[np.ndarray, np.ndarray]] = deque(maxlen=_MOST_WAITING)
 
     def start_from(self, belief: Belief, correction: np.ndarray) -> None:
-        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says."""
-        self._expected = belief
+        """Expect the next scan where `correction` T_map_odom (3,) puts the odometry, as sure as `belief` says.
+
+        In an empty map, in which nothing can be found, the run begins there.
+        """
+        self._expected = belief if len(self.matched) else None
         self.correction = np.array(correction, dtype=np.float64)
 
     def mount(self, sonar_in_base: np.ndarray) -> None:

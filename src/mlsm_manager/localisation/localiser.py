@@ -11,22 +11,29 @@ import numpy as np
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.continuous_input import continuous_cloud, continuous_scan
 from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.joint_session import belief_at
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.place_now import FixAge, PlaceNow
 from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
+from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Matcher, Scan, Track
+from mlsm_manager.scan_matching.scan_path import POSE, POSITION
+from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed
+from node_support.geometry import composed, inverse
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
+# s: by more an odometry that goes on leaps only where its clock does.
+_LEAP = 600.0
 # s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
 # that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
@@ -73,6 +80,7 @@ class Localiser:
         self._live = LiveCorrection(settings.blend_time)
         self._odometry = ContinuousOdometry(limits)
         self._age = FixAge()
+        self._causes = LiveCauses()
         self._clock = clock
         self._came: Optional[Tuple[float, float]] = None
         self._newest: Optional[Scan] = None
@@ -108,6 +116,7 @@ class Localiser:
         """Learn where the sonar is in base_link, (2,) m."""
         with self._lock:
             self.estimator.mount(sonar_in_base)
+            self._causes.sonar_in_base = sonar_in_base
 
     @property
     def odometry(self) -> str:
@@ -139,8 +148,11 @@ class Localiser:
             if update.belief is not None:
                 self._live.believe(update.belief)
                 self._age.learn_odometry(scan.reference_time, scan.reference_pose)
+                self._causes.take(scan, update.belief.theta[POSITION])
             if update.accepted and update.result is not None:
                 self._age.learn_fix(scan.reference_time)
+                added = self._causes.covariance(self.steps)
+                update = replace(update, result=update.result.widened(added))
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
                 clouds.append(self.estimator.add_cloud(MapCloud.of_scan(scan)))
@@ -190,23 +202,65 @@ class Localiser:
         """
         with self._lock:
             pose, belief = composed(self._odometry.fixes(np.array(time)), odometry), self.estimator.belief
-            return None if belief is None else self._age.place_at(time, pose, belief, self.estimator.errors)
+            if belief is None:
+                return None
+            return self._age.place_at(time, pose, belief, self.estimator.errors, self._causes.covariance(self.steps))
+
+    def look_for_causes(self) -> None:
+        """Look for what is wrong where new scans may show it, which takes most of a second.
+
+        Scans and corrections are taken meanwhile.
+        """
+        self._causes.look()
+
+    def causes(self) -> List[Cause]:
+        """Return what was found to be wrong, ranked."""
+        return self._causes.causes(self.steps)
 
     @property
     def steps(self) -> Sequence[Step]:
         """What the odometry did that no vehicle does, oldest first; it was left out."""
         return self._odometry.steps
 
-    def notice_time(self, time: float) -> float:
-        """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did."""
+    def notice_time(self, time: float, odometry: Optional[np.ndarray] = None) -> float:
+        """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did.
+
+        odometry: T_odom_base (3,) of that time, where `time` is its own. Where it goes on as if nothing had happened
+        only the clock jumped, back or far forward, and the vehicle is expected where it was.
+        """
         until = self.believed_until
-        if until is None or time >= until - _JUMP_BACK:
+        if until is None or until - _JUMP_BACK <= time <= until + _LEAP:
             return 0.0
         with self._lock:
-            self.estimator.forget_place()
-            self._forget_scans()
+            goes_on = odometry is not None and self._odometry.goes_on_at(odometry)
+            if time > until and not goes_on:
+                return 0.0
+            place = StoredPlace(self.last_correction, self.estimator.belief)
+            self._forget_place()
             self._search.jump()
+            if goes_on:
+                self._expect(place.correction, place.widened)
         return until - time
+
+    def expect(self, pose: np.ndarray, covariance: np.ndarray, odometry: np.ndarray) -> None:
+        """Take T_map_base `pose` (3,), with its covariance (3, 3), as where somebody sees the vehicle now.
+
+        The next scan is searched about there. odometry: T_odom_base (3,) now.
+        """
+        with self._lock:
+            belief = belief_at(np.nan, pose, self.estimator.errors)
+            belief.covariance[POSE, POSE] = covariance
+            self._forget_place()
+            self._expect(composed(pose, inverse(odometry)), belief)
+
+    def _forget_place(self) -> None:
+        self.estimator.forget_place()
+        self._forget_scans()
+
+    def _expect(self, correction: np.ndarray, belief: Belief) -> None:
+        self.estimator.start_from(belief, correction)
+        self._live.start_from(correction)
+        self._search.expect()
 
     def check_time(self, time: float) -> None:
         """Raise RefusedInput for a `time` [s] of a scan long before the belief's, which cannot be predicted back."""
@@ -265,6 +319,11 @@ class Localiser:
     def is_lost(self) -> bool:
         """Whether a map was loaded, scans are matched, and the vehicle is not found in the map yet."""
         return self._search.is_lost and self.estimator.matching
+
+    @property
+    def is_expected(self) -> bool:
+        """Whether the next scans are searched about where the vehicle is expected."""
+        return self._search.may_be_near
 
     @property
     def changes(self) -> int:
@@ -333,9 +392,7 @@ class Localiser:
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
             self._resumed_at = place
             if place is not None:
-                self.estimator.start_from(place.widened, place.correction)
-                self._live.start_from(place.correction)
-                self._search.expect()
+                self._expect(place.correction, place.widened)
         return reason
 
     def clear(self) -> int:
@@ -352,4 +409,5 @@ class Localiser:
         self._live.clear()
         self._odometry.clear()
         self._age.clear()
+        self._causes.clear()
         self._newest = self._came = self._resumed_at = None

@@ -1,16 +1,20 @@
-"""How old the newest fix is, and how well the position is known now that the odometry alone has carried it on."""
+"""How old the newest fix is, how well the position is known now that the odometry alone has carried it on, and why."""
 
 from enum import IntEnum
-from typing import NamedTuple, Optional, Sequence, Tuple
+from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
+from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
+from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health, Level
 from node_support.timing import UsualInterval
+
+_TOLD = 60.0  # s: so long a fault that was left out is told: some turns of the head, which show the place
 
 
 class PositionState(IntEnum):
@@ -23,18 +27,18 @@ class PositionState(IntEnum):
 
 
 class PlaceNow(NamedTuple):
-    """age: s since the end of the scan of the newest fix. overdue: s since two more should have come.
-
-    covariance: (3, 3) of x, y and yaw in the map [m, rad], propagated to now by the odometry's errors.
+    """time: s, of what is told. age: s since the end of the scan of the newest fix. overdue: s since two more should
+    have come. covariance: (3, 3) of the pose, propagated to now by the odometry's errors, with what causes add to it.
     """
 
+    time: float
     age: float
     overdue: float
     covariance: np.ndarray
 
     @property
     def deviation(self) -> float:
-        """Root of the sum of both variances of the position, m."""
+        """Root of both variances' sum, m."""
         return float(np.sqrt(max(np.trace(self.covariance[POSITION, POSITION]), 0.0)))
 
 
@@ -59,15 +63,37 @@ class FixAge:
         """Learn T_odom_base (3,) at the time [s] of the newest belief."""
         self._believed = time, pose
 
-    def place_at(self, time: float, pose: np.ndarray, belief: Belief, errors: OdometryErrors) -> Optional[PlaceNow]:
-        """Return what is known at `time` [s], when the odometry says T_odom_base (3,); None before the first fix."""
+    def place_at(
+        self, time: float, pose: np.ndarray, belief: Belief, errors: OdometryErrors, added: np.ndarray
+    ) -> Optional[PlaceNow]:
+        """Return what is known at `time` [s], when the odometry says T_odom_base (3,); None before the first fix.
+
+        added: (2, 2) m^2, what causes add to the covariance of the position.
+        """
         if self._fixed_at is None or self._believed is None:
             return None
-        covariance = belief.covariance
         if time > belief.time and self._believed[0] == belief.time:
             track = Track(np.array([belief.time, time]), np.array([self._believed[1], pose]))
-            covariance = predicted(belief, track, time, errors).covariance
-        return PlaceNow(time - self._fixed_at, self._fixes.overdue(time), covariance[POSE, POSE])
+            belief = predicted(belief, track, time, errors)
+        covariance = belief.covariance[POSE, POSE].copy()
+        covariance[POSITION, POSITION] += added
+        return PlaceNow(time, time - self._fixed_at, self._fixes.overdue(time), covariance)
+
+
+def doubts_of(
+    place: Optional[PlaceNow], causes: Sequence[Cause], verdicts: Sequence[Verdict], silent: Mapping[str, float]
+) -> List[str]:
+    """Return what speaks against a position, the worst first.
+
+    causes: ranked. silent: seconds for which a topic that is needed did not come.
+    """
+    said = [f"nothing on {topic} for {seconds:.0f} s" for topic, seconds in silent.items()]
+    if place is not None:
+        said = said or ([f"no fix for {place.age:.0f} s"] if place.overdue > 0.0 else [])
+        # A fault that was left out is over once scans show the place again.
+        recent = [cause for cause in causes if not (cause.is_mended and place.time - cause.begin > _TOLD)]
+        said += [_clause(cause, place.time) for cause in recent]
+    return said + [verdict.text for verdict in verdicts if verdict.fires]
 
 
 def position_state(
@@ -75,20 +101,24 @@ def position_state(
 ) -> Tuple[PositionState, str]:
     """Return how well the position is known, and that in words.
 
-    place: None before the first fix. doubts: texts of the checks that fire.
+    place: None before the first fix. doubts: see `doubts_of`.
     """
     if is_lost:
         return PositionState.UNKNOWN, "position lost: it is searched for in the whole map"
     if place is None:
-        return PositionState.UNKNOWN, "no position yet"
+        return PositionState.UNKNOWN, "; ".join(["no position yet", *doubts[:1]])
     if place.deviation > LARGEST_DEVIATION:
-        return PositionState.UNKNOWN, f"position not known, {place.deviation:.1f} m"
+        return PositionState.UNKNOWN, "; ".join([f"position not known, {place.deviation:.1f} m", *doubts[:1]])
     if doubts:
-        return PositionState.DOUBTFUL, f"position doubtful: {'; '.join(doubts)}"
+        return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
-    late = f", no fix for {place.age:.0f} s" if place.overdue > 0.0 else ""
-    return PositionState.GOOD, f"position good, {place.deviation:.1f} m{late}"
+    return PositionState.GOOD, f"position good, {place.deviation:.1f} m"
+
+
+def _clause(cause: Cause, time: float) -> str:
+    text = cause.text.rstrip(",")
+    return text if np.isnan(cause.begin) else f"{text} {time - cause.begin:.0f} s ago"
 
 
 def report_place(health: Health, place: PlaceNow) -> None:

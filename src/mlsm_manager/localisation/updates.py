@@ -3,9 +3,12 @@
 from dataclasses import dataclass
 from typing import List, Optional, Sequence
 
+import numpy as np
+
 from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import MatchResult, Scan
+from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.free_space import CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
@@ -99,6 +102,14 @@ def report_steps(health: Health, steps: Sequence[Step], told: int) -> None:
     for step in steps[told:]:
         detail = f"{step.text} at {step.time:.1f} s; the step is left out, check the odometry"
         health.problem("steps of the odometry that no vehicle makes", detail)
+
+
+def report_causes(health: Health, causes: Sequence[Cause]) -> None:
+    """Show what is found to be wrong, and warn of what still is."""
+    lines = [cause.text if np.isnan(cause.begin) else f"{cause.text} at {cause.begin:.1f} s" for cause in causes]
+    health.show("causes", "; ".join(lines) or "none found")
+    for line in [line for line, cause in zip(lines, causes) if not cause.is_mended][:1]:
+        health.problem("seconds with a cause to doubt the position", line)
 
 
 def report_verdicts(health: Health, verdicts: Sequence[Verdict]) -> None:

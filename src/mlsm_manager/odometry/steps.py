@@ -15,6 +15,7 @@ LEAST_STEP = np.array([0.3, np.radians(4.0)])  # m, rad: less is noise of a DVL 
 _LARGEST_ACCELERATION = np.array([5.0, 3.0])  # m/s^2, rad/s^2: half of gravity; from rest to a turn in two seconds
 _OUTSTANDING = 8.0  # times the usual step around
 _AROUND = 10  # poses before and after that tell what is usual
+_NEXT = 0.3  # s: between two poses of a slow odometry that goes on
 _AT_ZERO = 0.5  # m: where an odometry is that began again
 
 
@@ -118,6 +119,16 @@ class ContinuousOdometry:
         # The fix comes first: others search the starts.
         self._fixes.append(fix)
         self._starts.append(float(track.times[number]))
+
+    def goes_on_at(self, pose: np.ndarray) -> bool:
+        """Return whether T_odom_base `pose` (3,) is where the vehicle was just before, so that only a clock jumped."""
+        if not self._known:
+            return False
+        move = pose - self._newest.poses[-1]
+        limits = self._limits
+        return bool(
+            np.hypot(*move[:2]) < _NEXT * limits.max_speed and abs(wrapped(move[2])) < _NEXT * limits.max_turn_rate
+        )
 
     def fixes(self, times: np.ndarray) -> np.ndarray:
         """Return T_continuous_odom (..., 3) at `times` (...) s."""

@@ -7,7 +7,7 @@ from typing import Any, Callable, Optional
 
 import numpy as np
 import rospy
-from nav_msgs.msg import OccupancyGrid
+from nav_msgs.msg import MapMetaData, OccupancyGrid
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Header
 from visualization_msgs.msg import MarkerArray
@@ -145,7 +145,7 @@ class _Tiles(rospy.SubscribeListener):
 
 
 class MapPublisher:
-    """Publishes /MLSM/Markers, /MLSM/cloud, /MLSM/grid and, where its messages are installed, /MLSM/octomap."""
+    """Publishes /MLSM/Markers, /MLSM/cloud, /MLSM/grid, the same as /map, and, where it is installed, /MLSM/octomap."""
 
     def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
         self._parameters = parameters
@@ -154,7 +154,9 @@ class MapPublisher:
         self._tiles = _Tiles(parameters, localiser, health)
         self._whole = [
             _WholeMap(topics.MAP_CLOUD, PointCloud2, self._cloud, localiser, health),
-            _WholeMap(topics.MAP_GRID, OccupancyGrid, self._grid, localiser, health),
+            _WholeMap(topics.MAP_GRID, OccupancyGrid, self.grid, localiser, health),
+            _WholeMap(topics.MAP_OF_NAVIGATION, OccupancyGrid, self.grid, localiser, health),
+            _WholeMap(topics.MAP_METADATA, MapMetaData, lambda: self.grid().info, localiser, health),
         ]
         if has_octomap_messages():
             from octomap_msgs.msg import Octomap
@@ -191,7 +193,8 @@ class MapPublisher:
         free = self._localiser.free if self._parameters.cloud_free else None
         return map_cloud(self._localiser.blocks, free, stamp_ns, self._parameters.map_frame)
 
-    def _grid(self) -> OccupancyGrid:
+    def grid(self) -> OccupancyGrid:
+        """Return the map from above: free, unknown and occupied."""
         parameters, stamp_ns = self._parameters, self._stamp_ns
         grid = occupancy(self._localiser.blocks, self._localiser.free, parameters.grid_low, parameters.grid_high)
         return occupancy_grid(grid, stamp_ns, parameters.map_frame)

@@ -4,12 +4,13 @@ from typing import List, Optional
 
 import numpy as np
 import rospy
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from nav_msgs.srv import GetMap, GetMapResponse
 from std_msgs.msg import Bool
 
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
-from mlsm_manager.localisation.place_now import PlaceNow, position_state, report_place
 from mlsm_manager.localisation.updates import (
     CloudUpdate,
     ScanUpdate,
@@ -19,25 +20,24 @@ from mlsm_manager.localisation.updates import (
     report_turn,
     report_verdicts,
 )
-from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform
+from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform, planar_pose
 from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import Autosave, MapServices
-from mlsm_manager.ros.odometry_track import OdometryTrack
+from mlsm_manager.ros.odometry_track import OdometryTrack, planar
+from mlsm_manager.ros.status_teller import StatusTeller
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry import matrices
-from node_support.headers import DAY
 from node_support.health import Health
-from node_support.ros.callbacks import every_clock_period, guarded, make_health
+from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import report_broken, subscribe_to_clouds
 from sonar_processing.ros.pipeline import Pipeline
 
-_TELLING = 1.0  # s
 _Z_DOWN_ADVICE = (
     "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true); "
     "if the head turns the other way, set head_turns"
@@ -60,17 +60,18 @@ class MlsmCore:
         )
         self._mounted = False
         self._steps_told = 0
-        self._doubts: List[str] = []
-        self._provisional = False
         self._z_down = ZDownSigns()
         self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
-        every_clock_period(_TELLING, self._tell_place, self.health)
+        self.status = StatusTeller(self._localiser, self._odometry, self._transform, parameters.map_frame, self.health)
         # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
         found = guarded(self.health, self._publish_found)
         self._services = MapServices(namespace, self._localiser, parameters, self._after_replacing, found)
+        seen = guarded(self.health, self._expect)
+        rospy.Subscriber(topics.SEEN_POSE, PoseWithCovarianceStamped, seen, queue_size=10)
+        rospy.Service(topics.DYNAMIC_MAP, GetMap, lambda _request: GetMapResponse(self._map.grid()))
         rospy.Subscriber(topics.START_MATCHING, Bool, guarded(self.health, self._start_matching), queue_size=10)
 
     @classmethod
@@ -125,6 +126,7 @@ class MlsmCore:
             return
         self._mount(cloud.stamp_ns)
         self._look_for_z_down(scan)
+        self.status.hear(np.hypot(*(scan.points[:, :2] - scan.reference_pose[:2]).T))
         taken = self._localiser.take_scan(scan)
         for update in taken.clouds:
             self._report_cloud(update, cloud.stamp_ns)
@@ -136,12 +138,10 @@ class MlsmCore:
         report_turn(self.health, scan.reference_time - scan.start, self._longest_turn)
         report_steps(self.health, self._localiser.steps, self._steps_told)
         self._steps_told = len(self._localiser.steps)
-        verdicts = self._localiser.verdicts()
-        report_verdicts(self.health, verdicts)
-        self._doubts = [verdict.text for verdict in verdicts if verdict.fires]
-        self._provisional = taken.scan.provisional
+        self.status.verdicts, self.status.is_provisional = self._localiser.verdicts(), taken.scan.provisional
+        report_verdicts(self.health, self.status.verdicts)
         self.health.show("odometry", self._localiser.odometry or self._live.current.odometry.value)
-        self._tell_state()
+        self.status.tell()
         self._publish_fix(taken.scan, cloud.stamp_ns)
 
     def _look_for_z_down(self, scan: Scan) -> None:
@@ -214,49 +214,49 @@ class MlsmCore:
         newest = self._odometry.newest()
         if newest is None:
             return self._localiser.last_correction
-        time, pose = newest
+        time, pose = newest[0], planar(newest[1])
         if time is None:
             return self._localiser.standing_correction(pose)
-        self._notice_time(time)
+        self._notice_time(time, pose)
         since = self._localiser.silent_since(time)
         if since is not None:
             self._localiser.follow(self._odometry.track(since, np.empty(0), time), time)
         return self._localiser.correction(time, pose)
 
-    def _tell_place(self) -> None:
-        """Tell how old and how good the position is, also while no scan and no odometry come."""
-        place = self._tell_state()
-        if place is not None:
-            report_place(self.health, place)
-
-    def _tell_state(self) -> Optional[PlaceNow]:
-        """Publish how well the position is known now, and return it; None before the first fix."""
-        newest, now = self._odometry.newest(), rospy.Time.now().to_sec()
+    def _expect(self, message: PoseWithCovarianceStamped) -> None:
+        """Take where somebody sees the vehicle in the map as where it is."""
+        frame, newest = message.header.frame_id, self._odometry.newest()
+        if frame != self._live.current.map_frame:
+            raise RefusedInput("poses refused", f"frame {frame!r}, must be {self._live.current.map_frame!r}")
         if newest is None:
-            return None
-        # Stamps of another clock are as far off as no silence lasts: then the odometry, or the newest scan, tells the
-        # time.
-        told = newest[0] or self._localiser.believed_until or now
-        time = now if 0.0 < now - told < DAY else told
-        place = self._localiser.place_now(time, newest[1])
-        state = position_state(place, self._localiser.is_lost, self._provisional, self._doubts)
-        self._fix.tell(state, place, round(time * 1e9))
-        return place
+            raise RefusedInput("poses refused", "no odometry yet that would tell how the vehicle goes on from there")
+        pose, covariance = planar_pose(message.pose)
+        limit = self._live.current.map_limit
+        if np.abs(pose[:2]).max() > limit:
+            raise RefusedInput("poses refused", f"{pose[:2]} m is beyond map_limit of {limit:g} m")
+        self._localiser.expect(pose, covariance, planar(newest[1]))
+        rospy.loginfo("%s: the vehicle is expected at x %.1f m, y %.1f m", self.health.name, *pose[:2])
 
     def _notice_time_of_scan(self, time: float) -> None:
         """Notice that time jumped back; while the odometry goes on, an old scan is merely late."""
         newest = self._odometry.newest()
-        self._notice_time(time if newest is None or newest[0] is None else max(time, newest[0]))
+        if newest is None or newest[0] is None or newest[0] < time:
+            self._notice_time(time)
+        else:
+            self._notice_time(newest[0], planar(newest[1]))
 
-    def _notice_time(self, time: float) -> None:
-        seconds = self._localiser.notice_time(time)
+    def _notice_time(self, time: float, odometry: Optional[np.ndarray] = None) -> None:
+        seconds = self._localiser.notice_time(time, odometry)
         if seconds:
             self._odometry.clear()
-            self._z_down = ZDownSigns()
-            detail = f"by {seconds:.1f} s; the map stays, the position in it starts at odom's again"
-            self.health.problem("jumps back in time", detail)
+            self._z_down, self.status.verdicts = ZDownSigns(), ()
+            place = "the vehicle is expected where it was" if self._localiser.is_expected else (
+                "the position in it starts at odom's again"
+            )  # fmt: skip
+            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, {place}")
 
     def _after_replacing(self) -> None:
+        self.status.verdicts = ()
         self._fix.clear()
         self._map.replace()
 
@@ -268,6 +268,7 @@ class Mapping:
         """Raises ParameterError for a bad parameter of any stage."""
         self._core = MlsmCore(rospy.resolve_name("mlsm_core"))
         self._pipeline = Pipeline(CloudSink(self._core.insert), CloudSink(self._core.match))
+        self._core.status.stages_before = self._pipeline.healths
         self.healths: List[Health] = [*self._pipeline.healths, *self._core.healths]
 
 

@@ -21,7 +21,9 @@ class OdometryTrack:
     def __init__(self, odom_frame: str, base_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frames = odom_frame, base_frame
-        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance)
+        self._health = health
+        self._newest_ns = 0
+        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, parent=odom_frame)
 
     def check_stamp(self, stamp_ns: int) -> None:
         """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
@@ -61,7 +63,7 @@ class OdometryTrack:
             return None
 
     def newest(self) -> Optional[Tuple[Optional[float], np.ndarray]]:
-        """Return the time [s] and T_odom_base (3,) that tf knows last; None when it knows none.
+        """Return the time [s] and T_odom_base (4, 4) that tf knows last; None when it knows none.
 
         Static transforms hold at all times and have none of their own: the time is then None.
         """
@@ -69,11 +71,14 @@ class OdometryTrack:
         if found is None:
             return None
         stamp_ns, matrix = found
-        return (stamp_ns * 1e-9 if stamp_ns else None), _planar(matrix)
+        if stamp_ns != self._newest_ns:
+            self._newest_ns = stamp_ns
+            self._health.heard("tf of {} -> {}".format(*self._frames))
+        return (stamp_ns * 1e-9 if stamp_ns else None), matrix
 
     def _pose(self, time: float) -> Optional[np.ndarray]:
         try:
-            return _planar(self.matrix(time))
+            return planar(self.matrix(time))
         except RefusedInput:
             return None
 
@@ -81,5 +86,6 @@ class OdometryTrack:
         return RefusedInput("scans without odometry", f"from {self._frames[1]} to {self._frames[0]}: {reason}")
 
 
-def _planar(matrix: np.ndarray) -> np.ndarray:
+def planar(matrix: np.ndarray) -> np.ndarray:
+    """Return x, y [m] and yaw [rad] (3,) of a pose (4, 4)."""
     return np.array([matrix[0, 3], matrix[1, 3], np.arctan2(matrix[1, 0], matrix[0, 0])])

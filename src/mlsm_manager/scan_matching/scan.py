@@ -1,6 +1,6 @@
 """A scan, and what a matcher takes besides it and returns."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Protocol
 
@@ -176,6 +176,12 @@ class MatchResult:
         correction = composed(self.pose, inverse(scan.reference_pose))
         correction[2] = wrapped(correction[2])
         return correction
+
+    def widened(self, covariance: np.ndarray) -> "MatchResult":
+        """Return the match with an uncertain position, by a `covariance` (2, 2) m^2 besides its own."""
+        whole = self.covariance.copy()
+        whole[:2, :2] += covariance
+        return replace(self, covariance=whole)
 
 
 class Matcher(Protocol):

@@ -5,7 +5,12 @@ from typing import Any, Dict, Iterable, List, Sequence
 
 import numpy as np
 
+from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
+
+CERTAIN = 1e3  # nats: of what needs no echo to be seen
+_FEW = 3  # steps that are told one by one
+_LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, besides what it did just before
 
 
 @dataclass(frozen=True)
@@ -40,6 +45,20 @@ class Cause:
 def ranked(causes: Iterable[Cause]) -> List[Cause]:
     """Return causes, those with most evidence first; what was mended comes last."""
     return sorted(causes, key=lambda cause: (cause.is_mended, -cause.evidence))
+
+
+def of_steps(steps: Sequence[Step]) -> List[Cause]:
+    """Return a cause for each of a few steps of a kind, and one for all of many; all were left out."""
+    kinds = ([step for step in steps if step.kind is kind] for kind in StepKind)
+    return [cause for of_kind in kinds for cause in _of_kind(of_kind)]
+
+
+def _of_kind(steps: Sequence[Step]) -> List[Cause]:
+    if len(steps) <= _FEW:
+        return [Cause(step.text, CERTAIN + step.size, step.time, True, metres=_LEFT) for step in steps]
+    most = max(steps, key=lambda step: (step.size, abs(step.turn)))
+    text = f"{most.text} at most, {len(steps)} times, first"
+    return [Cause(text, CERTAIN + most.size, steps[0].time, True, metres=_LEFT * float(np.sqrt(len(steps))))]
 
 
 def widened(

@@ -28,6 +28,7 @@ _KIND = "transforms refused"
 _QUEUE_SIZE = 1000  # some seconds of a busy /tf, while a slow callback holds the others up
 _REMEMBERED = 64  # stamps: about a second of /tf, with each of its publishers among them
 _MOST_FRAMES = 1000  # tf2 never forgets a frame; no vehicle has as many
+_PARENT_CEASED = 5.0  # s of wall time: tf that changes comes more often
 _ROUNDING = 1e-6  # s: more than a float64 loses of the seconds since 1970
 _SQUARED_NORM_ERROR = 0.01  # tf2 refuses quaternions that are farther from a unit, and tells of each on stderr
 
@@ -40,10 +41,11 @@ class TfBuffer:
     """
 
     def __init__(
-        self, health: Health, cache: float = 10.0, tolerance: float = DAY, on_news: Callable[[], None] = lambda: None
-    ) -> None:
+        self, health: Health, cache: float = 10.0, tolerance: float = DAY, on_news: Callable[[], None] = lambda: None,
+        parent: str = "",
+    ) -> None:  # fmt: skip
         """`cache`: how long transforms are remembered, s. `tolerance`: stamp_tolerance, s. `on_news`: called with each
-        message of tf.
+        message of tf. `parent`: which of two parents of a frame is taken; of others the one that came first.
         """
         self._health = health
         self._tolerance = tolerance
@@ -52,6 +54,8 @@ class TfBuffer:
         self._condition = threading.Condition()
         self._recent_ns: Deque[int] = deque(maxlen=_REMEMBERED)
         self._newest_ns: Dict[str, int] = {}
+        self._parent = parent
+        self._parents: Dict[str, Tuple[str, float]] = {}
         for topic, add in ((topics.TRANSFORMS, self._add), (topics.STATIC_TRANSFORMS, self._add_static)):
             rospy.Subscriber(topic, TFMessage, guarded(health, self._taker(add)), queue_size=_QUEUE_SIZE)
 
@@ -156,6 +160,17 @@ class TfBuffer:
         if child not in self._newest_ns and len(self._newest_ns) >= _MOST_FRAMES:
             raise RefusedInput(_KIND, f"{child!r} after {_MOST_FRAMES} other frames; check who publishes so many")
         _check_pose(transform.transform.translation, transform.transform.rotation)
+        self._check_parent(child, parent)
+
+    def _check_parent(self, child: str, parent: str) -> None:
+        """Refuse a second parent of a frame, between which tf could not interpolate; one that ceased is replaced."""
+        known, heard = self._parents.get(child, (parent, 0.0))
+        if known != parent:
+            if known == self._parent or (parent != self._parent and time.monotonic() - heard < _PARENT_CEASED):
+                detail = f"{child!r} in {parent!r} too, besides {known!r}, which is taken; end one of the publishers"
+                raise RefusedInput("transforms of a second parent", detail)
+            self.clear()
+        self._parents[child] = parent, time.monotonic()
 
 
 class JointAngle:

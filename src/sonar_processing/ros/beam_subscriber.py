@@ -49,6 +49,7 @@ class BeamSubscriber:
     def unregister(self) -> None:
         """Stop to listen."""
         self._subscriber.unregister()
+        self._health.need_no_more(self._subscriber.resolved_name)
 
     def _take_message(self, message: rospy.AnyMsg) -> None:
         self._health.count("messages in")

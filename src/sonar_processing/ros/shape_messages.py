@@ -14,6 +14,7 @@ from sonar_processing.shapes.circles import Circle
 from sonar_processing.shapes.lines import Line
 from underwater_map_construction import msg
 
+_TEXT_COLOR = ColorRGBA(r=1.0, g=1.0, b=1.0, a=1.0)  # which can be read on the line of the wall too
 WALL_COLOR = ColorRGBA(r=1.0, g=0.25, b=0.75, a=1.0)
 CIRCLE_COLOR = ColorRGBA(r=0.2, g=1.0, b=0.45, a=0.8)
 # Heights of texts in a scan's longest distance, legible where the scan fills the window; m, where it is a marina's.
@@ -111,7 +112,7 @@ def _marker(head: Header, namespace: str, number: int, kind: int, color: ColorRG
 
 
 def _distance(head: Header, number: int, place: np.ndarray, height: float, distance: float) -> Marker:
-    marker = _marker(head, "wall distances", number, Marker.TEXT_VIEW_FACING, WALL_COLOR)
+    marker = _marker(head, "wall distances", number, Marker.TEXT_VIEW_FACING, _TEXT_COLOR)
     marker.pose.position = Point(place[0], place[1], place[2] + height)
     marker.scale = Vector3(0.0, 0.0, height)
     marker.text = f"{distance:.1f} m"

@@ -87,6 +87,7 @@ class SonarToCloud:
         )
         self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)
+        self.health.expect(rospy.resolve_name(topics.BEAMS))
         BeamSubscriber(self._take_beam, parameters, self.health, self._filter.forget, self._filter.make_room)
 
     def _use_parameters(self, parameters: SonarToCloudParameters) -> None:

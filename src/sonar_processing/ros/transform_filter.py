@@ -102,7 +102,7 @@ class TransformFilter(message_filters.SimpleFilter):
         self._newest_ns: Optional[int] = None
         self._jumped = False
         self._has_news = False
-        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, self._notify)
+        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, self._notify, target_frame)
         self._take = guarded(health, self._deliver_ready)
         threading.Thread(target=self._work, daemon=True).start()
 

@@ -14,6 +14,7 @@ from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
+from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
@@ -130,6 +131,25 @@ def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
     trust = mapped_bag(broken.mount_turned(WHOLE, 120.0), options).findings.trust
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
     assert "mended: the sonar is turned by" in trust.line
+
+
+@pytest.mark.parametrize(
+    ("recording", "said"),
+    [
+        (WHOLE, []),
+        (broken.mount_turned(WHOLE, 120.0), ["the sonar is turned by 12"]),
+        (broken.odometry_freezes(WHOLE, MIDDLE, 60.0), ["odometry frozen for "]),
+    ],
+)
+def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(recording, said):
+    live = LiveCauses()
+    for scan in scans_in(recording):
+        live.take(scan, scan.reference_pose[:2])
+    live.look()
+    assert [cause.text[: len(text)] for cause, text in zip(live.causes([]), said)] == said
+    assert (np.trace(live.covariance([])) > 0.25) == bool(said)
+    live.clear()
+    assert live.causes([]) == []
 
 
 def test_causes_are_ranked_by_evidence_and_what_was_mended_comes_last():

@@ -10,8 +10,10 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
-from mlsm_manager.localisation.place_now import PlaceNow, PositionState, position_state, report_place
+from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state, report_place
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, inverse, transformed
 from node_support.health import Health, Level
 
@@ -240,11 +242,68 @@ def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
     ],
 )
 def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lost, is_provisional, doubts, state):
-    place = PlaceNow(10.0, 0.0, variance * np.eye(3))
+    place = PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3))
     found, text = position_state(place, is_lost, is_provisional, doubts)
     assert found is state
     assert all(doubt in text for doubt in doubts) or state is PositionState.UNKNOWN
     assert position_state(None, is_lost, is_provisional, doubts)[0] is PositionState.UNKNOWN
+
+
+JUMP = Cause("odometry jumped by 30.0 m", 1e3, 88.0, is_mended=True, metres=0.5)
+TURNED = Cause("the sonar is turned by 20 deg", 40.0)
+SMEARED = Verdict("scans on the map", 0.2, 0.5, "scans beside the map", more_is_better=True)
+
+
+@pytest.mark.parametrize(
+    ("overdue", "causes", "verdicts", "silent", "said"),
+    [
+        (0.0, [], [], {}, []),
+        (0.0, [JUMP], [], {}, ["odometry jumped by 30.0 m 12 s ago"]),
+        (0.0, [replace(JUMP, begin=20.0)], [], {}, []),
+        (0.0, [TURNED], [SMEARED], {}, [TURNED.text, SMEARED.text]),
+        (3.0, [TURNED], [], {}, ["no fix for 30 s", TURNED.text]),
+        (3.0, [], [], {"/sonar/raw": 28.0}, ["nothing on /sonar/raw for 28 s"]),
+        (None, [], [], {"/sonar/raw": 12.0}, ["nothing on /sonar/raw for 12 s"]),
+    ],
+)
+def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes, verdicts, silent, said):
+    place = None if overdue is None else PlaceNow(100.0, 30.0, overdue, np.eye(3))
+    doubts = doubts_of(place, causes, verdicts, silent)
+    assert doubts == said
+    assert all(doubt in position_state(place, False, False, doubts)[1] for doubt in said)
+
+
+def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
+    for hour in (3600.0, -3600.0):
+        localiser, _ = localiser_after(6)
+        end, pose = SCANS[5].track.times[-1], SCANS[5].track.poses[-1]
+        expected = localiser.last_correction
+        localiser.correction(end, pose)
+        assert localiser.notice_time(end + 1.0 + hour, pose) * hour < 0.0
+        np.testing.assert_allclose(localiser.correction(end + 1.0 + hour, pose), expected, atol=1e-9)
+        later = SCANS[6]
+        track = Track(later.track.times + hour, later.track.poses)
+        found = localiser.take_scan(replace(later, times=later.times + hour, track=track,
+                                            reference_time=later.reference_time + hour)).scan  # fmt: skip
+        assert np.hypot(*(found.belief.theta[:2] - later.reference_pose[:2])) < 0.5
+
+
+def test_an_hour_in_which_the_vehicle_went_elsewhere_is_no_jump_of_the_clock():
+    localiser, _ = localiser_after(3)
+    localiser.correction(SCANS[2].reference_time, SCANS[2].reference_pose)
+    assert localiser.notice_time(SCANS[2].reference_time + 3600.0, np.array([40.0, 0.0, 0.0])) == 0.0
+
+
+def test_where_somebody_points_at_the_vehicle_it_is_searched():
+    localiser, _ = localiser_after(6)
+    shift, scan = np.array([30.0, -7.0, 0.4]), SCANS[6]
+    pose = np.add(scan.reference_pose, (0.4, -0.4, 0.05))
+    localiser.expect(pose, np.diag([0.25, 0.25, 0.07]), composed(shift, scan.reference_pose))
+    moved = replace(scan, points=transformed(shift, scan.points),
+                    track=Track(scan.track.times, composed(shift, scan.track.poses)))  # fmt: skip
+    found = localiser.take_scan(moved).scan
+    assert found.accepted
+    assert np.hypot(*(found.belief.theta[:2] - scan.reference_pose[:2])) < 0.3
 
 
 def test_nothing_is_told_of_a_position_before_the_first_fix():

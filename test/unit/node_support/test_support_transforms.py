@@ -127,6 +127,18 @@ def test_a_transform_that_tf2_cannot_take_is_counted_and_the_next_of_its_message
     assert tf.x(CLOCK) == 2.0
 
 
+@pytest.mark.parametrize(("parent", "taken"), [("", "elsewhere"), ("odom", "odom")])
+def test_of_two_parents_the_named_one_is_taken_or_the_first(tf, parent, taken):
+    buffer = TfBuffer(tf.health, parent=parent)
+    for seconds in range(4):
+        for other in ("elsewhere", "odom"):
+            tf.send(transform(CLOCK + seconds, x=1.0, parent=other))
+    assert buffer.obstacle(taken, "base_link", int((CLOCK + 2.0) * SECOND)) == ""
+    (refused,) = {"elsewhere", "odom"} - {taken}
+    assert buffer.obstacle(refused, "base_link", int((CLOCK + 2.0) * SECOND))
+    assert int(tf.health.report().values["transforms of a second parent"]) >= 3
+
+
 def test_a_static_transform_holds_at_any_time_whatever_its_stamp(tf):
     tf.send(transform(4294967295.0, x=4.0, child="sonar"), topic="/tf_static")
     assert tf.x(CLOCK, source="sonar") == 4.0

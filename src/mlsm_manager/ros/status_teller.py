@@ -1,0 +1,191 @@
+"""Tells the position as it is known now: in words, as a pose with its covariance, and in rviz at the vehicle."""
+
+from typing import List, Optional, Sequence, Tuple
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import Point, PoseWithCovarianceStamped, Vector3
+from std_msgs.msg import ColorRGBA, Header
+from visualization_msgs.msg import Marker, MarkerArray
+
+from mlsm_manager.localisation.localiser import Localiser
+from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state, report_place
+from mlsm_manager.localisation.updates import report_causes
+from mlsm_manager.ros.fix_publisher import MapTransform, pose_covariance
+from mlsm_manager.ros.odometry_track import OdometryTrack, planar
+from mlsm_manager.self_check.verdict import Verdict
+from node_support import topics
+from node_support.geometry import matrices
+from node_support.headers import DAY
+from node_support.health import Health
+from node_support.ros.callbacks import every
+from node_support.ros.transforms import pose_from_matrix
+from sonar_processing.ros.conversions import header
+from underwater_map_construction.msg import PositionStatus
+
+_PERIOD = 1.0  # s
+_AMBER = ColorRGBA(1.0, 0.75, 0.1, 1.0)
+_COLORS = {
+    PositionState.GOOD: ColorRGBA(0.35, 0.9, 0.4, 1.0),
+    PositionState.PROVISIONAL: _AMBER,
+    PositionState.DOUBTFUL: _AMBER,
+    PositionState.UNKNOWN: ColorRGBA(1.0, 0.3, 0.25, 1.0),
+}
+_WHITE = ColorRGBA(0.9, 0.92, 0.95, 1.0)
+_SHARE = 12.0  # of how far the sonar hears: the height of a letter, from which all else follows
+_MOST = 2.5  # m, of a letter: larger ones hide the map
+_LINE, _VEHICLE, _ABOVE = 0.08, 2.0, 1.5  # letters: width of a line, length of the vehicle's arrow, height over it
+_ASIDE = (-6.0, -7.0)  # letters from the vehicle, where scale bar and north arrow begin
+_BARS = (0.1, 1.0, 10.0)  # m: the longest one that eight letters hold is drawn
+_WITHIN = float(np.sqrt(-2.0 * np.log(0.05)))  # deviations of a plane's ellipse that holds 95 %
+_ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
+_WIDEST = 52  # letters of a line of the status
+
+
+class StatusTeller:
+    """Tells each second how old and how good the position is: on /diagnostics, /MLSM/status and /MLSM/pose_now.
+
+    It does so by the wall clock, and goes on while no scan, no odometry and no other clock come.
+    """
+
+    def __init__(
+        self, localiser: Localiser, odometry: OdometryTrack, transform: MapTransform, map_frame: str, health: Health
+    ) -> None:  # fmt: skip
+        self.verdicts: Sequence[Verdict] = ()
+        """What the run says of itself."""
+        self.is_provisional = False
+        self.stages_before: Sequence[Health] = ()
+        """Of the same process, whose inputs must come too."""
+        self._localiser, self._odometry, self._transform = localiser, odometry, transform
+        self._health, self._map_frame = health, map_frame
+        self._status = rospy.Publisher(topics.POSITION_STATUS, PositionStatus, queue_size=10, latch=True)
+        self._pose = rospy.Publisher(topics.POSE_NOW, PoseWithCovarianceStamped, queue_size=2)
+        self._markers = rospy.Publisher(topics.STATUS_MARKERS, MarkerArray, queue_size=2)
+        self._letter = 0.0
+        every(_PERIOD, self._look_and_tell, health)
+
+    def hear(self, distances: np.ndarray) -> None:
+        """Learn how far (n,) [m] the echoes of a scan are: as large as these is what is drawn, and never smaller."""
+        if len(distances):
+            self._letter = max(self._letter, min(float(np.quantile(distances, 0.9)) / _SHARE, _MOST))
+
+    def tell(self) -> None:
+        """Publish how well the position is known now."""
+        place, T_map_base = self._place_now()
+        if place is not None:
+            report_place(self._health, place)
+        causes = self._localiser.causes()
+        report_causes(self._health, causes)
+        stages = (*self.stages_before, self._health)
+        silent = {topic: seconds for stage in stages for topic, seconds in stage.silent().items()}
+        doubts = doubts_of(place, causes, self.verdicts, silent)
+        state, text = position_state(place, self._localiser.is_lost, self.is_provisional, doubts)
+        self._health.show("position", text)
+        if T_map_base is not None:
+            self._publish(state, text, place, T_map_base)
+
+    def _look_and_tell(self) -> None:
+        self._localiser.look_for_causes()
+        self.tell()
+
+    def _place_now(self) -> Tuple[Optional[PlaceNow], Optional[np.ndarray]]:
+        """Return how good the position is, and T_map_base (4, 4) as tf tells it; None for what is not known."""
+        newest, now = self._odometry.newest(), rospy.Time.now().to_sec()
+        if newest is None:
+            return None, None
+        known, T_odom_base = newest
+        if known is None:
+            known = self._localiser.believed_until or now
+        # Stamps of another clock are as far off as no silence lasts: then the odometry tells the time.
+        time = now if 0.0 < now - known < DAY else known
+        T_map_base = matrices(self._transform.newest) @ T_odom_base
+        return self._localiser.place_now(time, planar(T_odom_base)), T_map_base
+
+    def _publish(self, state: PositionState, text: str, place: Optional[PlaceNow], T_map_base: np.ndarray) -> None:
+        time = rospy.Time.now().to_sec() if place is None else place.time
+        status = PositionStatus(header=header(round(time * 1e9), self._map_frame), state=state, text=text)
+        status.age = np.nan if place is None else place.age
+        status.covariance = np.full(9, np.nan) if place is None else place.covariance.ravel()
+        self._status.publish(status)
+        if place is not None:
+            told = PoseWithCovarianceStamped(header=status.header)
+            told.pose.pose, told.pose.covariance = pose_from_matrix(T_map_base), pose_covariance(place.covariance)
+            self._pose.publish(told)
+        if self._markers.get_num_connections():
+            made = _Maker(self._map_frame, T_map_base[:3, 3], self._letter or _MOST)
+            self._markers.publish(MarkerArray(status_markers(made, status, T_map_base[:2, 0])))
+
+
+def status_markers(made: "_Maker", status: PositionStatus, ahead: np.ndarray) -> List[Marker]:
+    """Return status text, vehicle, scale bar, north arrow and ellipse; all but the ellipse stand in letters.
+
+    ahead: (2,) where the vehicle looks, of length 1.
+    """
+    color, letter = _COLORS[PositionState(status.state)], made.letter
+    length = max([bar for bar in _BARS if bar <= 8.0 * letter], default=_BARS[0])
+    half, origin = np.multiply(ahead, _VEHICLE * letter / 2.0), np.multiply(_ASIDE, letter)
+    bar, north = (np.array([origin, np.add(origin, way)]) for way in ((length, 0.0), (0.0, 2.5 * letter)))
+    markers = [
+        made.text(wrapped_text(status.text), np.array([0.0, 2.5 * letter]), color),
+        made.arrow(np.array([-half, half]), color),
+        made.line(bar, _WHITE),
+        made.text(f"{length:g} m", np.add(bar[1], (1.2 * letter, 0.0)), _WHITE),
+        made.arrow(north, _WHITE),
+        made.text("N", np.add(north[1], (0.0, 0.6 * letter)), _WHITE),
+    ]
+    covariance = np.reshape(status.covariance, (3, 3))[:2, :2]
+    return [*markers, *([made.line(ellipse(covariance), color)] if np.isfinite(covariance).all() else [])]
+
+
+def ellipse(covariance: np.ndarray) -> np.ndarray:
+    """Return the line (n, 2) [m] around 0 within which a position with a covariance (2, 2) lies with 95 %."""
+    values, vectors = np.linalg.eigh(covariance)
+    axes = _WITHIN * np.sqrt(np.maximum(values, 0.0))
+    return (np.column_stack([np.cos(_ROUND), np.sin(_ROUND)]) * axes) @ vectors.T
+
+
+def wrapped_text(text: str) -> str:
+    """Return a text in lines that fit beside a vehicle."""
+    lines = [""]
+    for word in text.split():
+        lines = [*lines[:-1], f"{lines[-1]} {word}".strip()] if len(lines[-1]) + len(word) < _WIDEST else [*lines, word]
+    return "\n".join(lines)
+
+
+class _Maker:
+    """Makes markers over one place in the map, numbered as they are made; letter: m, the height of one."""
+
+    def __init__(self, frame: str, vehicle: np.ndarray, letter: float) -> None:
+        self._frame, self._number, self.letter = frame, 0, letter
+        self._origin = np.add(vehicle, (0.0, 0.0, _ABOVE * letter))
+
+    def _marker(self, kind: int, color: ColorRGBA) -> Marker:
+        self._number += 1
+        # Stamp 0: shown at once, also where rviz has the newest transforms of map a moment later.
+        marker = Marker(header=Header(frame_id=self._frame), ns="status", id=self._number, type=kind, color=color)
+        marker.pose.orientation.w = 1.0
+        return marker
+
+    def _points(self, places: np.ndarray) -> List[Point]:
+        x, y, z = self._origin
+        return [Point(x + one, y + other, z) for one, other in places]
+
+    def text(self, text: str, place: np.ndarray, color: ColorRGBA) -> Marker:
+        """Return a text at a place (2,) [m] from the origin."""
+        marker = self._marker(Marker.TEXT_VIEW_FACING, color)
+        marker.text, marker.scale.z = text, self.letter
+        (marker.pose.position,) = self._points([place])
+        return marker
+
+    def line(self, places: np.ndarray, color: ColorRGBA) -> Marker:
+        """Return a line along places (n, 2) [m] from the origin."""
+        marker = self._marker(Marker.LINE_STRIP, color)
+        marker.scale.x, marker.points = _LINE * self.letter, self._points(places)
+        return marker
+
+    def arrow(self, ends: Sequence[np.ndarray], color: ColorRGBA) -> Marker:
+        """Return an arrow between two places (2,) [m] from the origin."""
+        marker = self._marker(Marker.ARROW, color)
+        width = _LINE * self.letter
+        marker.scale, marker.points = Vector3(3.0 * width, 8.0 * width, 10.0 * width), self._points(ends)
+        return marker

@@ -1,0 +1,162 @@
+#!/usr/bin/env python3
+"""A tour that is broken five times: mlsm_core goes on, names what happened, and tells a deviation that covers it."""
+
+import unittest
+from typing import List
+
+import numpy as np
+import rospy
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
+from graph import Diagnostics, Inbox, run
+from messages import place, publisher, transform
+from rosgraph_msgs.msg import Clock
+from tf2_msgs.msg import TFMessage
+
+from node_support.geometry import composed, inverse, transformed
+from sonar_processing.cloud import Cloud
+from sonar_processing.ros.conversions import cloud_to_message
+from underwater_map_construction.msg import PositionStatus, StampedIntensityCloud
+
+TURN, STEP = 16.0, 1.0  # s
+SIDES = [((-12, 12), (14, 12)), ((14, 12), (14, -10)), ((14, -10), (-12, -10)), ((-12, -10), (-12, 12))]
+WALLS = np.vstack([np.linspace(*ends, 40, endpoint=False) for ends in np.array(SIDES, dtype=float)])
+HOUR = 3600.0
+COVERS = 2.5  # deviations
+LEAST = 0.3  # m: what echoes of half a metre tell
+
+
+class Trust(unittest.TestCase):
+    """Sends odometry and echoes of a vehicle that goes round in a basin, and the clock with them."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.seconds, cls.shift, cls.offset = 0.0, 1000.0, np.zeros(3)
+        cls.strangers: List[TransformStamped] = []
+        cls.fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        cls.now = Inbox("/MLSM/pose_now", PoseWithCovarianceStamped)
+        cls.corrections = Inbox("/tf", TFMessage, lambda message: message.transforms[0].header.frame_id == "map")
+        cls.status, cls.diagnostics = Inbox("/MLSM/status", PositionStatus), Diagnostics()
+        cls.clock, cls.tf = publisher("/clock", Clock), publisher("/tf", TFMessage, 2)
+        cls.echoes = publisher("/sonar/scan/echoes", StampedIntensityCloud)
+        cls.seen = publisher("/initialpose", PoseWithCovarianceStamped)
+        for inbox in (cls.fixes, cls.now, cls.corrections, cls.status):
+            inbox.wait_for_link()
+        cls.send_odometry()
+        for _ in range(2):
+            cls.turn_of_the_head()
+        cls.fixes.wait_for_number(1)
+        for _ in range(4):
+            cls.turn_of_the_head()
+
+    def test_1_a_jump_of_the_odometry_is_left_out_and_named(self) -> None:
+        type(self).offset = np.array([30.0, 5.0, 0.0])
+        self.assert_goes_on()
+        self.assert_said("odometry jumped by 30.")
+
+    def test_2_an_odometry_that_starts_again_from_zero_is_followed_and_named(self) -> None:
+        type(self).offset = inverse(truth(self.seconds))
+        self.assert_goes_on()
+        self.assert_said("odometry started again from zero")
+
+    def test_3_a_second_parent_in_tf_is_refused(self) -> None:
+        type(self).strangers = [transform("elsewhere", "base_link")]
+        self.assert_goes_on()
+        type(self).strangers = []
+        self.diagnostics.wait_for("mlsm_core", "transforms of a second parent", 1)
+
+    def test_4_a_clock_that_jumps_leaves_the_vehicle_where_it_is(self) -> None:
+        for shift in (HOUR, -HOUR):
+            type(self).shift += shift
+            self.assert_goes_on()
+        self.diagnostics.wait_for("mlsm_core", "jumps in time", 2)
+
+    def test_5_a_place_that_somebody_points_at_is_searched(self) -> None:
+        """They point .7 m beside it."""
+        pose = PoseWithCovarianceStamped()
+        pose.header.frame_id = "map"
+        x, y, yaw = truth(self.seconds)
+        pose.pose.pose.position.x, pose.pose.pose.position.y = x + 0.5, y - 0.5
+        pose.pose.pose.orientation.z, pose.pose.pose.orientation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
+        pose.pose.covariance = np.diag([0.25, 0.25, 0.01, 0.01, 0.01, 0.07]).ravel().tolist()
+        self.seen.publish(pose)
+        self.status.wait_for(lambda found: found.text == "no position yet")
+        self.assert_goes_on()
+
+    def test_6_a_sonar_that_falls_silent_is_named_while_the_position_grows_uncertain(self) -> None:
+        before = self.now.wait_for()
+        for _ in range(round(4.0 * TURN / STEP)):
+            self.send_odometry()
+        self.assert_said("nothing on /sonar/scan/echoes for ")
+        late = self.now.wait_for(lambda pose: pose.header.stamp.to_sec() > before.header.stamp.to_sec() + 3.0 * TURN)
+        self.assertGreater(deviation(late), deviation(before))
+        self.assertGreater(float(self.diagnostics.values("mlsm_core")["age of the newest fix [s]"]), 3.0 * TURN)
+
+    def assert_goes_on(self) -> None:
+        """After three turns of the head the fix is where the vehicle is, within what is told."""
+        for _ in range(3):
+            self.turn_of_the_head()
+        fix = self.fixes.wait_for(lambda pose: pose.header.stamp.to_sec() > self.stamp() - 2.0 * STEP)
+        error = np.hypot(*(place(fix) - truth(self.seconds)[:2]))
+        self.assertLess(error, max(COVERS * deviation(fix), LEAST))
+        self.assertLess(error, 1.5)
+
+    def assert_said(self, text: str) -> None:
+        self.status.wait_for(lambda found: text in found.text and found.state != PositionStatus.GOOD)
+
+    @classmethod
+    def turn_of_the_head(cls) -> None:
+        """Send the odometry of a turn, and then its echoes; wait until they are matched."""
+        start, known = cls.seconds, len(cls.fixes.messages)
+        while cls.seconds < start + TURN:
+            cls.send_odometry()
+        cls.echoes.publish(cloud_to_message(cls.scan(start)))
+        # Odometry goes on while the scan is matched, for a little time.
+        cls.send_odometry()
+        if known:
+            cls.fixes.wait_for_number(known + 1)
+        else:
+            # The first scan of all makes the map and is no fix.
+            cls.diagnostics.wait_for("mlsm_core", "scans in", 1)
+
+    @classmethod
+    def send_odometry(cls) -> None:
+        """Send clock and odometry, and wait until map -> odom follows."""
+        cls.seconds += STEP
+        x, y, yaw = composed(cls.offset, truth(cls.seconds))
+        message = transform("odom", "base_link", cls.stamp(), x)
+        message.transform.translation.y = y
+        message.transform.rotation.z, message.transform.rotation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
+        strangers = [transform(one.header.frame_id, one.child_frame_id, cls.stamp()) for one in cls.strangers]
+        count = len(cls.corrections.messages)
+        cls.tf.publish(TFMessage([message, *strangers]))
+        cls.clock.publish(Clock(rospy.Time.from_sec(cls.stamp())))
+        cls.corrections.wait(lambda messages: len(messages) > count)
+
+    @classmethod
+    def stamp(cls) -> float:
+        return cls.shift + cls.seconds
+
+    @classmethod
+    def scan(cls, start: float) -> Cloud:
+        """Return the echoes of all walls in odom, each where the odometry puts it at its time."""
+        middle = truth(start + TURN / 2.0)
+        walls = WALLS[np.argsort(np.arctan2(*(WALLS - middle[:2]).T[::-1]))]
+        points, times = transformed(cls.offset, walls), start + np.linspace(0.0, TURN, len(walls))
+        rows = np.column_stack([points, np.full(len(points), -2.0), np.full(len(points), 50.0)])
+        stamps = cls.shift + times
+        return Cloud(rows.astype(np.float32), -stamps, round(stamps[-1] * 1e9), "odom")
+
+
+def truth(seconds: float) -> np.ndarray:
+    """Return T_map_base (3,) of a vehicle that goes round at .4 m/s."""
+    angle = 0.4 / 6.0 * seconds
+    return np.array([6.0 * np.sin(angle), 6.0 - 6.0 * np.cos(angle) - 5.0, angle])
+
+
+def deviation(pose: PoseWithCovarianceStamped) -> float:
+    """Return the root of both variances' sum, m."""
+    return float(np.sqrt(pose.pose.covariance[0] + pose.pose.covariance[7]))
+
+
+if __name__ == "__main__":
+    run(Trust)
