@@ -56,8 +56,9 @@ The tests of our own recordings look for these in the folder that the environmen
   on through the tables below; messages are `underwater_map_construction/...` instead of
   `avora_msgs/...`, with the same md5 sums.
 - **Matching**: a scan that is matched goes into the map, as the thesis says; the code of 2015 left it out. `map ->
-  odom` has a yaw, since still scans are turned too (6.5.6). Echoes that the map does not have do not count: they pulled still scans up
-  to 0.2 m along walls ([results](results.md#74-three-moves-with-an-odometry-that-is-30--off)). What is corrected of the code stands in
+  odom` has a yaw, since still scans are turned too (6.5.6). Echoes that the map does not have do not count: they
+  pulled still scans up to 0.2 m along walls
+  ([results](results.md#74-three-moves-with-an-odometry-that-is-30--off)). What is corrected of the code stands in
   `src/mlsm_manager/thesis_matching/thesis_matcher.py`.
 - **CONT** publishes from the `scan_size`-th beam on, then with every beam.
 - **Old names** of topics, and the service `sonar_control`, are there with `thesis:=true`: the node

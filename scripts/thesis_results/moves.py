@@ -118,7 +118,8 @@ def make(pictures: Pictures) -> str:
             ],
         ),
         prose(f"""The static matching of the thesis (6.5.6): a still scan that is put beside its place by 0.3 m on
-        x, -0.2 m on y and 5 degrees is matched with the map of another one. Median and greatest of {THESIS_SEEDS} runs; the thesis gives no number
+        x, -0.2 m on y and 5 degrees is matched with the map of another one. Median and greatest of
+        {THESIS_SEEDS} runs; the thesis gives no number
         ("the expected results", 7.4):"""),
         table(["", "", "off by", "heading", "error"], _static_rows()),
     )  # fmt: skip

@@ -118,8 +118,8 @@ KEYS: List[Key] = [
         "4.4.1: the basin of 120 by 50 m; the map grows beyond it"),
     Key("MLSM_core", "sizeYMeters", 60.0, "mlsm_core", "size_y_meters", "as above"),
     Key("MLSM_core", "maxIterations", 1000, "mlsm_core", "max_iterations",
-        "only for `estimator: THESIS`; iterations end when the points stand still, or with a moving scan when the error "
-        "rises. The yaml of 2015 has 10: a still scan that is 5 degrees off needs 40 to 150"),
+        "only for `estimator: THESIS`; iterations end when the points stand still, or with a moving scan when the "
+        "error rises. The yaml of 2015 has 10: a still scan that is 5 degrees off needs 40 to 150"),
     Key("MLSM_core", "errorThreshold", 0.3, "mlsm_core", "",
         "it only ended the iterations, which end by themselves here (see above); `error_threshold` is the "
         "greatest error of a match that is accepted"),
@@ -185,7 +185,8 @@ NAMES: List[Name] = [
     Name(Kind.TOPIC, "/sonar/walls/markers", "sonar/scan/line/markers", "MarkerArray"),
     Name(Kind.TOPIC, "/Debug/Wall, /Sonar/Walls/image/debug", "", "what is left of a cloud behind each wall"),
     Name(Kind.TOPIC, "/MLSM/Markers", "MLSM/Markers", "MarkerArray; the list in 4.5.1 swaps the types of these two"),
-    Name(Kind.TOPIC, "/MLSM/cloud", "MLSM/cloud", "PointCloud2, with height, depth, count and type of each block (with `cloud_free` FREE ones too)"),
+    Name(Kind.TOPIC, "/MLSM/cloud", "MLSM/cloud",
+         "PointCloud2, with height, depth, count and type of each block (with `cloud_free` FREE ones too)"),
     Name(Kind.TOPIC, "debug_cloud", "MLSM/scan", "with `thesis:=true` `debug_cloud` too, accepted or not"),
     Name(Kind.TOPIC, "startMatching", "startMatching", "matching is on from the start; see `start_matching`"),
     Name(Kind.TOPIC, "/cmd_vel", "cmd_vel"),

@@ -59,8 +59,8 @@ class LiveCauses:
         """Return what the causes add to the covariance (2, 2) [m^2] of the newest place."""
         causes = self.causes(steps)
         with self._lock:
-            places = np.array(self._places)
-        if not causes or not len(places):
+            places = np.array(self._places if causes else [])
+        if not len(places):
             return np.zeros((2, 2))
         return widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
 

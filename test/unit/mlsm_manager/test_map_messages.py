@@ -19,6 +19,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.ros.map_publisher import CLOUD_FIELDS, has_octomap_messages, map_cloud, octomap_message
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
+from mlsm_manager.ros.status_teller import ellipse, wrapped_text
 from mlsm_manager.surface_map.export.octomap import octree, write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
 from mlsm_manager.surface_map.tiles import THINNEST, TILE_BITS, box_lists, box_size, box_type
@@ -244,3 +245,17 @@ def test_the_message_holds_the_tree_of_a_file(tmp_path, received):
     assert np.array(received.data, dtype=np.int8).tobytes() == tree
     assert f"id {received.id}\n".encode() in header
     assert (received.binary, received.header.frame_id, received.resolution) == (True, "map", 0.5)
+
+
+def test_the_ellipse_of_a_position_holds_it_with_95_percent():
+    covariance = np.array([[4.0, 1.5], [1.5, 1.0]])
+    line = ellipse(covariance)
+    squares = np.einsum("ni,ij,nj->n", line, np.linalg.inv(covariance), line)
+    np.testing.assert_allclose(np.exp(-squares / 2.0), 0.05)
+
+
+def test_a_long_status_is_wrapped_between_words():
+    text = "position doubtful, 0.4 m: " + "nothing on /sonar/raw for 12 s; " * 3
+    lines = wrapped_text(text).split("\n")
+    assert max(map(len, lines)) <= 52
+    assert " ".join(lines) == text.strip()
