@@ -6,11 +6,15 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Callable, List, Optional, Tuple, TypeVar
 
+import numpy as np
+
 from node_support.geometry import quaternion_of
 from recordings.bags.bag import Bag, RecordingError, missing_topic
 from recordings.beams import RecordedBeams, beam_topic, beams_of_bag
 from recordings.makers_logs import is_makers_log, makers_beams, makers_headings
-from recordings.motion.frame_tree import FrameTree, pose_track
+from recordings.motion.autopilot_log import is_autopilot_log, motion_of_autopilot
+from recordings.motion.clock_offset import clock_offset
+from recordings.motion.frame_tree import FrameTree, frame_tree, pose_track
 from recordings.motion.motion_table import is_table, motion_of_csv
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import (
@@ -39,14 +43,14 @@ class Request:
 
     beams: topic of the beams; None: the likeliest. truth: topic of the true pose, or None. vehicle: a bag or table with
     the motion, where the recording itself has none. offset: s that are added to the stamps of the beams, so that they
-    are of the same clock as the motion.
+    are of the same clock as the motion; None: 0, or what the echoes tell where `vehicle` is an autopilot's log.
     """
 
     beams: Optional[str] = None
     truth: Optional[str] = None
     motion: MotionNames = field(default_factory=MotionNames)
     vehicle: Optional[Path] = None
-    offset: float = 0.0
+    offset: Optional[float] = None
     parameters: ReadingParameters = field(default_factory=ReadingParameters)
 
 
@@ -68,7 +72,7 @@ def read(path: Path, request: Request) -> Content:
     """Return what is wanted of a recording. Raises RecordingError, with everything that is missing at once."""
     with ExitStack() as stack:
         main = None if is_makers_log(path) else stack.enter_context(Bag(path))
-        vehicle = None if request.vehicle is None or is_table(request.vehicle) else Bag(request.vehicle)
+        vehicle = None if request.vehicle is None or _reader_of_motion(request.vehicle) else Bag(request.vehicle)
         bags = [main, stack.enter_context(vehicle) if vehicle else None]
         problems: List[str] = []
         topic = tried(problems, lambda: None if main is None else beam_topic(main, request.beams))
@@ -79,8 +83,8 @@ def read(path: Path, request: Request) -> Content:
         recorded = makers_beams(path) if main is None else beams_of_bag(main, topic, request.parameters)
     if not recorded.beams:
         raise RecordingError(f"{path}: {recorded.notes[-1] if recorded.notes else 'no message of beams'}")
-    recorded = recorded.later(request.offset)
     tree, notes = mounted(motion.tree, request.motion.base_frame, recorded, request.parameters)
+    recorded = recorded.later(_offset(recorded, tree, request, notes))
     _check_common_time(path, recorded, tree, request)
     return Content(recorded, Motion(tree, motion.source, [*motion.notes, *notes]), truth)
 
@@ -116,10 +120,33 @@ def tried(problems: List[str], step: Callable[[], Optional[_Result]]) -> Optiona
         return None
 
 
+def _offset(recorded: RecordedBeams, tree: FrameTree, request: Request, notes: List[str]) -> float:
+    """Return what is added to the stamps of the beams, s; adds to the notes what echoes tell. Raises RecordingError."""
+    if request.offset is not None or request.vehicle is None or not is_autopilot_log(request.vehicle):
+        return request.offset or 0.0
+    names, now = request.motion, np.zeros(1, dtype=np.int64)
+    mount = tree.poses(names.base_frame, recorded.beams[0].frame_id, now)[0][0]
+    found = clock_offset(recorded.beams, tree.tracks[(names.odom_frame, names.base_frame)], mount)
+    notes.append(
+        f"by the echoes the clock of {request.vehicle.name} is {found.seconds:.2f} s ahead of that of the beams, "
+        f"deviation {found.deviation:.2f} s (--offset sets it)"
+    )
+    return found.seconds
+
+
+def _reader_of_motion(path: Path) -> Optional[Callable[[Path, MotionNames], Motion]]:
+    """Return what reads a file that is no bag and holds the vehicle's motion, None for any other."""
+    if is_table(path):
+        return motion_of_csv
+    return motion_of_autopilot if is_autopilot_log(path) else None
+
+
 def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
     """Return the motion that a request for a recording at `path` asks for; `bag` may hold it. Raises RecordingError."""
-    if request.vehicle is not None and is_table(request.vehicle):
-        return motion_of_csv(request.vehicle, request.motion)
+    own = None if request.vehicle is None else _reader_of_motion(request.vehicle)
+    if own is not None:
+        motion = own(request.vehicle, request.motion)
+        return motion if bag is None else _with_mounts(motion, bag, request.motion)
     if bag is not None:
         return motion_of_bag(bag, request.motion, request.truth)
     if request.motion.declared is not None:
@@ -130,6 +157,13 @@ def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
         tree = linked(FrameTree(), replace(request.motion, z_is_down=False), headings)
         return Motion(tree, MotionSource.HEADING, [note])
     return unsaid_motion(FrameTree(), request.motion, "beams only")
+
+
+def _with_mounts(motion: Motion, bag: Bag, names: MotionNames) -> Motion:
+    """Return the motion of a file without frames, with what the bag of the beams says of where things are mounted."""
+    fixed = {link: track for link, track in frame_tree(bag).tracks.items() if track.is_fixed}
+    track = motion.tree.tracks[(names.odom_frame, names.base_frame)]
+    return replace(motion, tree=linked(FrameTree(fixed), replace(names, z_is_down=False), track))
 
 
 def _truth(bags: List[Bag], request: Request) -> Optional[PoseTrack]:
@@ -179,11 +213,15 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="the vehicle moved, and nothing tells how: no position, no heading",
     )  # fmt: skip
     parser.add_argument(
-        "--vehicle", type=Path, metavar="FILE", help="bag or table with the motion, if the recording has none"
+        "--vehicle",
+        type=Path,
+        metavar="FILE",
+        help="bag, table or autopilot's log (.tlog, .BIN) with the motion, if the recording has none",
     )
     parser.add_argument(
-        "--offset", type=float, default=0.0, metavar="SECONDS",
-        help="added to the stamps of the beams, whose clock is not that of the motion",
+        "--offset", type=float, metavar="SECONDS",
+        help="added to the stamps of the beams, whose clock is not that of the motion; the default is 0, or with an "
+        "autopilot's log what the echoes tell",
     )  # fmt: skip
     parser.add_argument("--odom-frame", default="odom", help="frame of the dead reckoning (default: %(default)s)")
     parser.add_argument("--base-frame", default="base_link", help="frame of the vehicle (default: %(default)s)")

@@ -1,5 +1,7 @@
 """A small recording: a vehicle tours an angular basin, without a simulator."""
 
+from typing import Callable, Tuple
+
 import numpy as np
 
 from mlsm_manager.offline.recording import Recording
@@ -18,9 +20,18 @@ _BEAM, _STEP = 0.1, np.radians(3.6)
 
 def touring() -> Recording:
     """Return 300 s of a vehicle that goes ahead on an ellipse, with a beam and a pose each tenth."""
+    return _along(lambda angle: (12.0 * np.cos(angle) - 2.0, 8.0 * np.sin(angle)))
+
+
+def wandering() -> Recording:
+    """Return as much of a vehicle on a way that does not repeat itself."""
+    return _along(lambda angle: (12.0 * np.cos(0.9 * angle) - 2.0, 8.0 * np.sin(1.7 * angle + 0.1 * angle**2)))
+
+
+def _along(way: Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]]) -> Recording:
+    """Return a recording of a vehicle that is at way(angle), x and y [m], while the angle [rad] grows to 4 pi."""
     times = _START + np.arange(0.0, SECONDS + 0.05, 0.1)
-    angle = 4.0 * np.pi * (times - _START) / SECONDS
-    x, y = 12.0 * np.cos(angle) - 2.0, 8.0 * np.sin(angle)
+    x, y = way(4.0 * np.pi * (times - _START) / SECONDS)
     yaw = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))
     track = Track(times, np.column_stack([x, y, yaw]))
     stamps = np.arange(_START + 1.0, _START + SECONDS - 1.0, _BEAM)

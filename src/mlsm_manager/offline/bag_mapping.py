@@ -164,7 +164,7 @@ def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Na
     if not bags:
         return []
     known = _stored(first, parameters)
-    with executor_for(len(bags), options.scheduler) as executor:
+    with executor_for(len(bags)) as executor:
         read = partial(read_recording, request=replace(options.request, truth=None))
         waiting = [executor.submit(prepared, bag, read, parameters) for bag in bags]
         for bag, job in zip(bags, waiting):

@@ -6,10 +6,11 @@ import os
 import signal
 import subprocess
 import sys
-from concurrent.futures import ThreadPoolExecutor, as_completed
+from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, NamedTuple, Sequence
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence
 
+from mlsm_manager.offline.cluster import Cluster
 from node_support.files import make_folder, write_whole
 from recordings.bags.bag import RecordingError
 from recordings.makers_logs import is_makers_log
@@ -19,6 +20,8 @@ _SUFFIXES = (".bag", ".mcap", ".db3")
 _METADATA = "metadata.yaml"  # of a ROS 2 folder
 _MESSAGES = "messages.txt"
 _SUMMARY = "summary.json"
+_PROGRAM = "from mlsm_manager.offline.program import main; main()"
+_LOOK = 2.0  # s after which one looks whether workers are left
 _COLUMNS = ("recording", "result", "scans", "blocks", "odometry", "trust", "s")
 
 
@@ -69,32 +72,41 @@ def _is_recording(path: Path) -> bool:
 
 
 def options_of_one(arguments: Sequence[str], recordings: Sequence[Path]) -> List[str]:
-    """Return the command line without the recordings, --each and --out: what is said of each of them."""
+    """Return the command line without the recordings, --each, --out and --scheduler: what is said of each of them."""
     words, kept = iter(arguments), []
     for word in words:
-        if word == "--out":
+        if word in ("--out", "--scheduler"):
             next(words, None)
-        elif word != "--each" and not word.startswith("--out=") and Path(word) not in recordings:
+        elif word != "--each" and not word.startswith(("--out=", "--scheduler=")) and Path(word) not in recordings:
             kept.append(word)
     return kept
 
 
-def map_each(recordings: Sequence[Path], out: Path, options: Sequence[str]) -> List[Outcome]:
-    """Map each recording as `map_bag RECORDING --out FOLDER` with `options` does, on all cores; what is there stays.
+def map_each(
+    recordings: Sequence[Path], out: Path, options: Sequence[str], scheduler: Optional[str] = None
+) -> List[Outcome]:
+    """Map each recording as `map_bag RECORDING --out FOLDER` with `options` does; what is there stays.
 
-    The index is written anew after each of them. Raises OSError where `out` cannot be written.
+    They run on all cores, or on the Dask cluster at the address `scheduler`, whose workers see the same folders. The
+    index is written anew after each of them. Raises OSError where `out` cannot be written, and RecordingError where
+    the cluster cannot be used, or is lost.
     """
     make_folder(out)
     jobs = _jobs(recordings, out)
     outcomes: Dict[Job, Outcome] = {}
-    with ThreadPoolExecutor(os.cpu_count()) as threads:
-        running = [threads.submit(_mapped, job, options) for job in jobs]
+    with ThreadPoolExecutor(os.cpu_count()) if scheduler is None else Cluster(scheduler, out) as workers:
+        running = {workers.submit(_mapped, job, options) for job in jobs}
         try:
-            for one in as_completed(running):
-                outcome = one.result()
-                outcomes[outcome.job] = outcome
-                print(f"{len(outcomes)}/{len(jobs)} {outcome.job.recording}: {outcome.problem or 'mapped'}", flush=True)
-                write_whole(out / INDEX, _index([outcomes[job] for job in jobs if job in outcomes]).encode())
+            while running:
+                done, running = wait(running, _LOOK, FIRST_COMPLETED)
+                if isinstance(workers, Cluster) and not done:
+                    workers.check(f"{len(outcomes)} of {len(jobs)} recordings are done and stay")
+                for one in done:
+                    outcome = one.result()
+                    outcomes[outcome.job] = outcome
+                    line = f"{len(outcomes)}/{len(jobs)} {outcome.job.recording}: {outcome.problem or 'mapped'}"
+                    print(line, flush=True)
+                    write_whole(out / INDEX, _index([outcomes[job] for job in jobs if job in outcomes]).encode())
         except BaseException:
             for one in running:
                 one.cancel()
@@ -109,7 +121,7 @@ def _jobs(recordings: Sequence[Path], out: Path) -> List[Job]:
     for recording in recordings:
         name = recording.stem
         taken[name] = taken.get(name, 0) + 1
-        jobs.append(Job(recording, out / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
+        jobs.append(Job(recording.absolute(), out.absolute() / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
     return jobs
 
 
@@ -117,8 +129,9 @@ def _mapped(job: Job, options: Sequence[str]) -> Outcome:
     """Run map_bag for one recording, unless its map is there; its messages stand in its folder."""
     if not all((job.folder / name).is_file() for name in (_SUMMARY, _MESSAGES)):
         make_folder(job.folder)
-        words = [sys.executable, sys.argv[0], str(job.recording), "--out", str(job.folder), *options]
-        done = subprocess.run(words, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
+        words = [sys.executable, "-c", _PROGRAM, str(job.recording), "--out", str(job.folder), *options]
+        found = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
+        done = subprocess.run(words, env=found, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
         if done.returncode:
             return Outcome(job, {}, _problem(done))
         # Last, for a folder without it is mapped anew.

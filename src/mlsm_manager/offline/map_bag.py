@@ -49,7 +49,8 @@ def run_map_bag() -> None:
 
 def _map_each(options: Namespace, arguments: List[str]) -> None:
     """Map each recording by itself; ends with status 1 when one of them has no map. Raises RecordingError, OSError."""
-    outcomes = map_each(recordings_in(options.bags), options.out, options_of_one(arguments, options.bags))
+    own = options_of_one(arguments, options.bags)
+    outcomes = map_each(recordings_in(options.bags), options.out, own, options.scheduler)
     without = [outcome for outcome in outcomes if not outcome.summary]
     print(f"{len(outcomes) - len(without)} of {len(outcomes)} mapped; {options.out / INDEX} shows them")
     if without:
@@ -142,7 +143,7 @@ def _parser() -> CommandLine:
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
     parser.add_argument(
-        "--scheduler", metavar="ADDRESS", help="a running Dask cluster that prepares further recordings"
+        "--scheduler", metavar="ADDRESS", help="with --each: a running Dask cluster whose workers map the recordings"
     )
     return parser
 
@@ -179,8 +180,10 @@ def _check(parser: argparse.ArgumentParser, options: argparse.Namespace) -> None
     Of a vehicle of whose motion nothing is known the odometry is none.
     """
     if options.each:
-        if options.inspect or options.vehicle or options.scheduler:
-            parser.error("--each goes with neither --inspect, --vehicle nor --scheduler")
+        if options.inspect or options.vehicle:
+            parser.error("--each goes with neither --inspect nor --vehicle")
+    elif options.scheduler:
+        parser.error("--scheduler shares the recordings of --each among workers; give both")
     elif options.refine and len(options.bags) > 1:
         parser.error("--refine fits one recording, not several")
     if options.check and not options.refine:

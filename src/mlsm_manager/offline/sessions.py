@@ -1,11 +1,10 @@
 """Further recordings of the same water: each starts in the map of those before, finds itself, and adds to it."""
 
 from concurrent.futures import Executor, ProcessPoolExecutor
-from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import cpu_count, get_context
 from pathlib import Path
-from typing import Callable, Dict, Iterator, List, Optional, Tuple
+from typing import Callable, Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -14,12 +13,9 @@ from mlsm_manager.offline.replay import CORRECTED, Replayed
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
-from recordings.bags.bag import RecordingError
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
-# A cluster in the same network answers within a second, a busy one within a few.
-CLUSTER_TIMEOUT = 10.0
 _SHOWN_AFTER = 3.0
 """s after the end of a scan at which its correction is shown: it waits for odometry and is blended in."""
 Reader = Callable[[Path], Recording]
@@ -64,24 +60,7 @@ def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Rec
     return recording, whole_turns(bag, len(recording.beams), scans)
 
 
-@contextmanager
-def executor_for(jobs: int, scheduler: Optional[str]) -> Iterator[Executor]:
-    """Give what runs jobs: processes of this machine, or a running Dask cluster at the address `scheduler`.
-
-    Raises RecordingError where the cluster cannot be reached.
-    """
-    if scheduler is None:
-        # No fork: the parent may have threads that hold locks.
-        with ProcessPoolExecutor(max(min(jobs, cpu_count()), 1), get_context("spawn")) as executor:
-            yield executor
-        return
-    try:
-        from distributed import Client
-    except ImportError:
-        raise RecordingError("--scheduler needs Dask; install it with: apt install python3-distributed") from None
-    try:
-        client = Client(scheduler, timeout=CLUSTER_TIMEOUT)
-    except (OSError, ValueError) as error:
-        raise RecordingError(f"--scheduler {scheduler}: {error or 'cannot be reached'}") from None
-    with client, client.get_executor() as executor:
-        yield executor
+def executor_for(jobs: int) -> Executor:
+    """Return processes of this machine that run jobs."""
+    # No fork: the parent may have threads that hold locks.
+    return ProcessPoolExecutor(max(min(jobs, cpu_count()), 1), get_context("spawn"))

@@ -1,11 +1,12 @@
 """Many recordings are mapped by themselves; a bad one costs no other, and what is there stays."""
 
 import shutil
-import sys
+import time
 from pathlib import Path
 
 import pytest
 
+from mlsm_manager.offline.cluster import Cluster
 from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
 from recordings.bags.bag import RecordingError
 
@@ -31,19 +32,42 @@ def test_folders_without_a_recording_are_refused(tmp_path):
 
 
 def test_every_recording_is_mapped_with_the_other_options():
-    words = ["--each", "a.bag", "./b.bag", "--out", "maps", "--refine", "--set", "min_range=1", "--out=maps"]
+    words = [
+        "--each",
+        "a.bag",
+        "--scheduler",
+        "tcp://a:1",
+        "./b.bag",
+        "--out",
+        "maps",
+        "--refine",
+        "--set",
+        "min_range=1",
+        "--out=maps",
+    ]
     assert options_of_one(words, [Path("a.bag"), Path("b.bag")]) == ["--refine", "--set", "min_range=1"]
+
+
+@pytest.fixture
+def cluster():
+    """A scheduler with a worker, a thread here that is spoken to over TCP as any other."""
+    distributed = pytest.importorskip("distributed")
+    with distributed.LocalCluster(
+        n_workers=1, threads_per_worker=2, processes=False, protocol="tcp", dashboard_address=None, host="127.0.0.1"
+    ) as running:
+        yield running
 
 
 @pytest.mark.long
 @pytest.mark.newest_only("dear; test_run_files and test_map_bag write single maps with every version")
-def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, monkeypatch, capsys):
-    monkeypatch.setattr(sys, "argv", [str(ROOT / "nodes/map_bag")])
+@pytest.mark.parametrize("is_shared", [False, True])
+def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, capsys, request, is_shared):
+    scheduler = request.getfixturevalue("cluster").scheduler_address if is_shared else None
     good, same, bad = ROOT / "test/data/basin.bag", tmp_path / "basin.bag", tmp_path / "bad.bag"
     shutil.copy(good, same)
     bad.write_bytes(b"no bag")
     out = tmp_path / "maps"
-    first = map_each([good, bad, same], out, [])
+    first = map_each([good, bad, same], out, [], scheduler)
     assert [bool(outcome.summary) for outcome in first] == [True, False, True]
     assert "not a bag, or damaged" in first[1].problem
     assert first[0].summary["scans"] == first[2].summary["scans"]
@@ -52,7 +76,35 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
     assert page.count("<img") == 2
     assert "not a bag, or damaged" in page
     written = (out / "basin/summary.json").stat().st_mtime_ns
-    again = map_each([good, bad, same], out, [])
+    again = map_each([good, bad, same], out, [], scheduler)
     assert [outcome.cells for outcome in again] == [outcome.cells for outcome in first]
     assert (out / "basin/summary.json").stat().st_mtime_ns == written
     assert "3/3" in capsys.readouterr().out
+
+
+def test_a_cluster_that_is_not_there_is_told_before_the_first_map(tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    monkeypatch.setattr("mlsm_manager.offline.cluster.TIMEOUT", 0.5)
+    with pytest.raises(RecordingError, match=r"--scheduler tcp://127\.0\.0\.1:9: "):
+        map_each([ROOT / "test/data/basin.bag"], tmp_path / "maps", [], "tcp://127.0.0.1:9")
+    assert not list((tmp_path / "maps").iterdir())
+
+
+def test_a_folder_that_a_worker_does_not_see_is_told(tmp_path, cluster):
+    with pytest.raises(RecordingError, match="does not see"):
+        Cluster(cluster.scheduler_address, tmp_path / "nowhere")
+
+
+def test_a_cluster_without_workers_ends_in_one_line_and_says_what_stays(tmp_path, cluster, monkeypatch):
+    monkeypatch.setattr("mlsm_manager.offline.cluster.PATIENCE", 0.0)
+    with Cluster(cluster.scheduler_address, tmp_path) as workers:
+        workers.check("all stays")
+        cluster.scale(0)
+        with pytest.raises(RecordingError, match="all workers are lost; 3 of 5 stay, and the same command goes on"):
+            check_for_a_minute(workers)
+
+
+def check_for_a_minute(workers):
+    for _ in range(600):
+        workers.check("3 of 5 stay")
+        time.sleep(0.1)

@@ -2,7 +2,6 @@
 
 import subprocess
 import sys
-from functools import partial
 from importlib.util import find_spec
 
 import numpy as np
@@ -13,12 +12,7 @@ from heading_only import reduce_bag
 from map_bag_runs import BASIN, refused, run, summary_of
 from programs import ROOT
 
-from mlsm_manager.offline import sessions
-from mlsm_manager.offline.recording import read_recording
-from mlsm_manager.offline.replay_parameters import ReplayParameters
-from mlsm_manager.offline.sessions import executor_for, prepared
 from mlsm_manager.surface_map.map_file import Layer, read_map
-from recordings.reader import Request
 
 pytestmark = pytest.mark.long
 pytest.importorskip("tf2_py")
@@ -164,19 +158,6 @@ def test_the_report_shows_the_way_of_each_recording(twice):
     assert "corrected, basin.bag" in (twice / "report.html").read_text()
 
 
-def test_a_dask_cluster_prepares_further_recordings():
-    distributed = pytest.importorskip("distributed")
-    read = partial(read_recording, request=Request())
-    # The worker is a thread here, but is spoken to over TCP, as any other.
-    with distributed.LocalCluster(
-        n_workers=1, threads_per_worker=1, processes=False, protocol="tcp", dashboard_address=None, host="127.0.0.1"
-    ) as cluster, executor_for(2, cluster.scheduler_address) as executor:
-        there, scans = executor.submit(prepared, BASIN, read, ReplayParameters()).result()
-    here, expected = prepared(BASIN, read, ReplayParameters())
-    assert len(there.beams) == len(here.beams)
-    assert [scan.points.tobytes() for scan in scans] == [scan.points.tobytes() for scan in expected]
-
-
 @pytest.mark.parametrize(
     ("words", "reason"),
     [
@@ -238,10 +219,3 @@ def test_a_further_recording_that_cannot_be_read_is_told_by_its_path(tmp_path):
     broken = tmp_path / "no.bag"
     broken.write_bytes(b"no bag")
     assert refused(BASIN, broken, "--out", tmp_path).startswith(f"map_bag: {broken}: ")
-
-
-def test_a_cluster_that_is_not_there_is_told_in_one_line(tmp_path, monkeypatch):
-    pytest.importorskip("distributed")
-    monkeypatch.setattr(sessions, "CLUSTER_TIMEOUT", 0.5)
-    line = refused(BASIN, BASIN, "--out", tmp_path, "--scheduler", "tcp://127.0.0.1:9")
-    assert line.startswith("map_bag: --scheduler tcp://127.0.0.1:9: ")
