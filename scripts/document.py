@@ -13,6 +13,7 @@ from typing import Dict, List, Type
 import yaml
 from from_2015 import from_2015_page
 
+from autopilot_link.parameters import AutopilotLinkParameters
 from dead_reckoning.parameters import DeadReckoningParameters
 from imagenex_852_driver.emulated_852 import EmulatorParameters
 from imagenex_852_driver.line.parameters import DriverParameters
@@ -87,6 +88,7 @@ LAUNCH = """\
 
 
 LIVE_NODES: Dict[str, Type[ParameterSet]] = {
+    "autopilot_link": AutopilotLinkParameters,
     "circle_detector": CircleDetectorParameters,
     "dead_reckoning": DeadReckoningParameters,
     "imagenex_852_driver": DriverParameters,

@@ -286,6 +286,28 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "the same with the velocity"),
         ),
     ),
+    "autopilot_link": NodeDescription(
+        "Sends the position to ArduSub or PX4 by MAVLink, or to MAVROS, while it is good; reads heading, depth and "
+        "velocity of an autopilot without MAVROS. See [autopilot_link](autopilot_link.md).",
+        (
+            _subscribes("tf", "", "`map -> odom -> base_link`: the position at the newest odometry"),
+            _subscribes(topics.POSITION_STATUS, "PositionStatus", "whether the position is good, and its covariance"),
+            _subscribes(topics.MATCHED_POSE, "geometry_msgs/PoseWithCovarianceStamped", "fixes, which count at once"),
+            _publishes(topics.HEADING, "sensor_msgs/Imu", "ATTITUDE of the autopilot, x east, z up"),
+            _publishes(topics.DEPTH, "sensor_msgs/FluidPressure", "SCALED_PRESSURE2 of the autopilot"),
+            _publishes(
+                topics.MEASURED_VELOCITY, "geometry_msgs/TwistStamped", "velocity of LOCAL_POSITION_NED, in base_link"
+            ),
+            _publishes(
+                topics.MAVROS_ODOMETRY, "nav_msgs/Odometry", "the position, if `connection` is empty: MAVROS runs"
+            ),
+            _publishes(
+                topics.MAVROS_POSE,
+                "geometry_msgs/PoseWithCovarianceStamped",
+                "the same, if `message` is VISION_POSITION_ESTIMATE",
+            ),
+        ),
+    ),
     "sonar_simulator": NodeDescription(
         "Simulates the vehicle Charl-e with a scanning sonar on a tilt servo, in a world from a file (thesis 6.4). It "
         "publishes `/clock`. The vehicle follows a script or `cmd_vel`; the odometry error is configurable. See "

@@ -41,5 +41,7 @@ POSITION_STATUS = "MLSM/status"  # PositionStatus: how well the position is know
 STATUS_MARKERS = "MLSM/status/markers"  # MarkerArray: the same at the vehicle
 SEEN_POSE = "initialpose"  # PoseWithCovarianceStamped: where somebody sees the vehicle, as rviz's "2D Pose Estimate"
 MATCHED_ODOMETRY = "MLSM/odometry"  # Odometry: the vehicle in the map at the newest match
+MAVROS_ODOMETRY = "mavros/odometry/out"  # Odometry: what MAVROS sends to the autopilot as ODOMETRY
+MAVROS_POSE = "mavros/vision_pose/pose_cov"  # PoseWithCovarianceStamped: the same as VISION_POSITION_ESTIMATE
 MATCHED_SCAN = "MLSM/scan"  # PointCloud2: the newest scan where matching puts it, accepted or not
 MATCHED_PATH = "MLSM/path"  # Path: the vehicle in the map at all matches

@@ -51,16 +51,16 @@ def recording(name: str) -> Path:
     path = folder / name
     if not path.is_file():
         reason = f"{name} is not in {folder}; set UMC_DATA to the folder of the recordings"
-        _report_skip(path.stem, reason)
-        raise unittest.SkipTest(reason)
+        skip(path.stem, reason)
     return path
 
 
-def _report_skip(name: str, reason: str) -> None:
-    """Leave a result beside rosunit's own, which knows no skipped tests and would leave them out."""
-    case = f'<testcase classname="recording" name="{name}"><skipped message={quoteattr(reason)}/></testcase>'
+def skip(name: str, reason: str) -> None:
+    """Skip a test, and leave a result beside rosunit's own, which knows no skipped tests and would leave them out."""
+    case = f'<testcase classname="skipped" name="{name}"><skipped message={quoteattr(reason)}/></testcase>'
     folder = Path(os.environ.get("ROS_TEST_RESULTS_DIR", "/tmp"))
     (folder / f"rosunit-skipped-{name}.xml").write_text(f'<testsuite tests="1">{case}</testsuite>')
+    raise unittest.SkipTest(reason)
 
 
 def temporary_folder(case: unittest.TestCase) -> Path:

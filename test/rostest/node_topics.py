@@ -25,6 +25,7 @@ COMMON_ENDINGS = (
 # What a node has with other parameters than it has here, and where messages are installed that are missing here.
 OPTIONAL = {
     "sonar_simulator": {"/cmd_vel", "/imu", "/depth"},
+    "autopilot_link": {"/mavros/odometry/out", "/mavros/vision_pose/pose_cov"},
     "dead_reckoning": {"/cmd_vel", "/depth", "/dvl"},
     "mlsm_core": set() if has_octomap_messages() else {"/MLSM/octomap"},
 }

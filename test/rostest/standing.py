@@ -1,12 +1,18 @@
 #!/usr/bin/env python3
 """A vehicle that stands still, with a static odometry, keeps its place from scan to scan."""
 
+import subprocess
 import unittest
+from typing import Optional
 
 import numpy as np
+import rospkg
 import rospy
-from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
+import yaml
+from geometry_msgs.msg import PoseWithCovarianceStamped
+from graph import PACKAGE_ROOT, Diagnostics, Inbox, run, skip, wait_for_links, wait_for_publisher_links
 from nav_msgs.msg import Odometry
+from rep_rules import broken_rules, broken_tree
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
@@ -15,6 +21,7 @@ from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import PositionStatus, StampedIntensityCloud
 
 SCANS = 4
+FILTER = "robot_localization"
 SECONDS = 16.0
 WALLS = [((-12, 12), (14, 12)), ((14, 12), (14, -10)), ((-10, -8), (-4, -10)), ((3, 6), (5, 8))]
 
@@ -25,12 +32,16 @@ class Standing(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.fixes, cls.transforms = Inbox("/MLSM/odometry", Odometry), Inbox("/tf", TFMessage)
+        cls.poses = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
         cls.statuses = Inbox("/MLSM/status", PositionStatus)
+        cls.filtered = Inbox("/odometry/filtered", Odometry)
+        cls.filter = start_filter()
         cls.diagnostics = Diagnostics()
         publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
         wait_for_publisher_links(publisher, 1)
         wait_for_links("/tf_static")
         cls.fixes.wait_for_link()
+        cls.poses.wait_for_link()
         cls.transforms.wait_for()
         start = rospy.Time.now().to_sec()
         for turn in range(SCANS):
@@ -52,6 +63,19 @@ class Standing(unittest.TestCase):
         self.assertEqual(good.header.frame_id, "map")
         self.assertTrue(0.0 < good.covariance[0] + good.covariance[4] < 25.0, good)
 
+    def test_fixes_and_transforms_obey_rep_103_and_105(self) -> None:
+        fixes, poses = self.fixes.wait_for_number(SCANS - 1), self.poses.wait_for_number(SCANS - 1)
+        self.assertEqual(broken_rules(fixes, "map", "base_link"), [])
+        self.assertEqual(broken_rules(poses, "map"), [])
+        transforms = [one for message in self.transforms.messages for one in message.transforms]
+        self.assertEqual(broken_tree(transforms), [])
+
+    def test_robot_localization_follows_the_fixes(self) -> None:
+        if self.filter is None:
+            skip("robot_localization", f"{FILTER} is not installed: yaml/robot_localization.yaml was not played")
+        self.addCleanup(self.filter.terminate)
+        self.filtered.wait_for(lambda message: abs(message.pose.pose.position.x - 0.5) < 0.1)
+
     def test_the_place_can_be_searched_for(self) -> None:
         answer = rospy.ServiceProxy("/mlsm_core/relocalise", Trigger)()
         self.assertTrue(answer.success, answer.message)
@@ -59,6 +83,14 @@ class Standing(unittest.TestCase):
     def test_time_did_not_jump(self) -> None:
         """A transform that holds for all time has the stamp 0."""
         self.assertNotIn("jumps in time", self.diagnostics.values("mlsm_core"))
+
+
+def start_filter() -> Optional["subprocess.Popen[bytes]"]:
+    """Start robot_localization with the example's parameters, where it is installed."""
+    if FILTER not in rospkg.RosPack().list():
+        return None
+    rospy.set_param("/ekf", yaml.safe_load((PACKAGE_ROOT / "yaml/robot_localization.yaml").read_text()))
+    return subprocess.Popen(["rosrun", FILTER, "ekf_localization_node", "__name:=ekf"])
 
 
 def scan(start: float, moved: float) -> Cloud:

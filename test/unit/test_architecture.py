@@ -16,6 +16,7 @@ import pytest
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 ALLOWED = {
     "node_support": set(),
+    "autopilot_link": {"node_support", "sonar_driver"},
     "dead_reckoning": {"node_support"},
     "sonar_driver": {"node_support"},
     "imagenex_852_driver": {"node_support", "sonar_driver"},
