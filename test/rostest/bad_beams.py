@@ -2,7 +2,6 @@
 """No beam can end the graph: what cannot be used is counted, and the next scan arrives in the map."""
 
 import math
-import sys
 import unittest
 
 import rospy
@@ -28,9 +27,8 @@ class BadBeams(unittest.TestCase):
         cls.beams = publisher("/sonar/raw", SonarScanLine)
         # The beams wait a few seconds for it and no longer.
         wait_for_links("/tf_static")
-        if "many" in sys.argv:
-            wait_for_links("/sonar/scan/sonarCloud")
-            wait_for_links("/sonar/scan/thresholded")
+        wait_for_links("/sonar/scan/sonarCloud")
+        wait_for_links("/sonar/scan/thresholded")
         cls.scans.wait_for_link()
         cls.time = rospy.get_time()
 
