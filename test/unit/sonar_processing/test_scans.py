@@ -32,19 +32,25 @@ def test_a_scan_size_of_one_gives_a_cloud_per_beam():
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("start", [0.0, 0.5, math.pi, -math.pi, 100.0])
 def test_a_scan_ends_before_the_head_passes_its_start_again(direction, start):
-    assert _scan_ends(start + direction * STEP * np.arange(360)) == [120, 240, 360]
+    angles = start + direction * STEP * np.arange(360)
+    assert _scan_ends(angles) == _scan_ends(np.arctan2(np.sin(angles), np.cos(angles))) == [120, 240, 360]
 
 
-@pytest.mark.parametrize("direction", [1, -1])
-def test_a_head_that_counts_from_minus_pi_to_pi_makes_no_difference(direction):
-    angles = direction * STEP * np.arange(360)
-    assert _scan_ends(np.arctan2(np.sin(angles), np.cos(angles))) == [120, 240, 360]
+SWING = np.concatenate([np.arange(60), np.arange(60, 0, -1)] * 5) * STEP
 
 
-@pytest.mark.parametrize("missed", [1, 60, 118])
-def test_a_missed_beam_does_not_lengthen_the_scan(missed):
-    angles = np.delete(STEP * np.arange(240), missed)
-    assert _scan_ends(angles) == [119, 239]
+@pytest.mark.parametrize(
+    ("angles", "values", "ends"),
+    [
+        *((np.delete(STEP * np.arange(240), missed), {}, [119, 239]) for missed in (1, 60, 118)),
+        (SWING, {}, []),
+        (np.full(500, 1.0), {}, []),
+        (STEP * np.arange(500), {"end_at_full_turn": False}, []),
+    ],
+    ids=["2nd missed", "61st missed", "119th missed", "swinging sector", "standing head", "turns that end nothing"],
+)
+def test_only_whole_turns_end_a_scan_though_a_beam_is_missed(angles, values, ends):
+    assert _scan_ends(angles, **values) == ends
 
 
 @pytest.mark.parametrize("lost", [[119], [118, 119], [100, 117, 118, 119]])
@@ -67,19 +73,6 @@ def test_steps_that_vary_still_make_a_full_turn():
     lengths = np.diff([0, *_scan_ends(np.cumsum(steps))])
     assert len(lengths) == 3
     assert all(abs(length - 120) <= 2 for length in lengths)
-
-
-def test_a_sector_that_swings_back_and_forth_never_makes_a_turn():
-    swing = np.concatenate([np.arange(60), np.arange(60, 0, -1)] * 5) * STEP
-    assert _scan_ends(swing) == []
-
-
-def test_a_head_that_stands_still_never_makes_a_turn():
-    assert _scan_ends(np.full(500, 1.0)) == []
-
-
-def test_a_full_turn_can_be_told_not_to_end_a_scan():
-    assert _scan_ends(STEP * np.arange(500), end_at_full_turn=False) == []
 
 
 def test_a_servo_step_ends_the_scan_before_the_beam_that_saw_it():
@@ -256,31 +249,26 @@ def test_beams_of_different_bin_counts_cannot_be_organised():
     assert assembler.add(placed(strengths=(1, 2, 3))).height == 1
 
 
-def test_laser_keeps_the_strongest_echo_of_every_beam():
-    assembler = assembler_with(mode="LASER", scan_size=2)
-    assembler.add(placed(strengths=(10, 90, 20)))
-    scan = assembler.add(placed(strengths=(5, 6, 70)))
-    assert scan.points[:, [0, 3]].tolist() == [[1.5, 90], [2.5, 70]]
+@pytest.mark.parametrize(
+    ("strengths", "values", "points"),
+    [
+        ((10, 90, 20), {}, [[1.5, 0.0, 0.0, 90.0]]),
+        ((0, 90, 90), {}, [[1.5, 0.0, 0.0, 90.0]]),
+        ((120, 10, 20), {"min_range": 1.0}, [[2.5, 0.0, 0.0, 20.0]]),
+        ((0, 0, 0), {}, []),
+        ((10, 20, 30), {"dispersed_points": 5}, [[2.5, 0.0, 0.0, 30.0]]),
+    ],
+    ids=["the strongest", "of equal ones the nearest", "beyond min_range", "no echo", "on the axis of a wide beam"],
+)
+def test_laser_keeps_one_echo_of_every_beam(strengths, values, points):
+    scan = assembler_with(mode="LASER", scan_size=1, **values).add(placed(strengths=strengths))
+    assert scan.points.tolist() == points
 
 
-def test_laser_keeps_the_nearest_of_equal_echoes():
-    assert assembler_with(mode="LASER", scan_size=1).add(placed(strengths=(0, 90, 90))).points[0, 0] == 1.5
-
-
-def test_laser_looks_beyond_min_range_only():
-    scan = assembler_with(mode="LASER", scan_size=1, min_range=1.0).add(placed(strengths=(120, 10, 20)))
-    assert scan.points[:, 3].tolist() == [20]
-
-
-def test_laser_has_no_point_where_there_is_no_echo():
+def test_laser_points_have_the_stamps_of_their_beams():
     assembler = assembler_with(mode="LASER", scan_size=2)
     assembler.add(placed(strengths=(0, 0, 0), seconds=1))
     assert assembler.add(placed(strengths=(0, 7, 0), seconds=2)).time_stamps.tolist() == [-2]
-
-
-def test_laser_points_lie_on_the_axis_of_a_dispersed_beam():
-    scan = assembler_with(mode="LASER", scan_size=1, dispersed_points=5).add(placed())
-    assert scan.points[:, :3].tolist() == [[2.5, 0.0, 0.0]]
 
 
 def test_projecting_a_beam_shows_it_and_leaves_the_scan_alone():
