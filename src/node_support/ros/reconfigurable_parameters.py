@@ -31,11 +31,11 @@ class _Server(Server):
         self.config.update({field.name: values[field.name] for field in self._parameters.tunable_fields()})
 
     def _copy_to_parameter_server(self) -> None:
-        """Write what differs: each value is a call to the master, and there are a hundred of some nodes."""
+        """Write what differs: each value is a call to the master, and some nodes have a hundred."""
         held = rospy.get_param(self.ns.rstrip("/"), {}) or {}
         for field in self._parameters.tunable_fields():
             folder = f"{EXPERT}/" if describe(field).expert else ""
-            beside = held.get(EXPERT, {}) if folder else held
+            beside = held.get(EXPERT) or {} if folder else held
             if beside.get(field.name) != self.config[field.name]:
                 rospy.set_param(f"{self.ns}{folder}{field.name}", self.config[field.name])
 
