@@ -9,6 +9,7 @@ from typing import Callable, Optional
 
 import numpy as np
 
+from mlsm_manager.odometry.faults import integrated
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, matrices
@@ -26,14 +27,6 @@ def _odometry(recording: Recording, poses: np.ndarray) -> Recording:
 def _after(recording: Recording, at: float) -> np.ndarray:
     """Return which poses (m,) are `at` seconds or more after the first one."""
     return recording.track.times - recording.track.times[0] >= at
-
-
-def integrated(poses: np.ndarray, steps: np.ndarray) -> np.ndarray:
-    """Return poses (m, 3) that begin as `poses` and go on by `steps` (m - 1, 3), each in the vehicle's frame."""
-    yaws = poses[0, 2] + np.append(0.0, np.cumsum(steps[:, 2]))
-    moves = (steps[:, 0] + 1j * steps[:, 1]) * np.exp(1j * yaws[:-1])
-    places = complex(*poses[0, :2]) + np.append(0.0, np.cumsum(moves))
-    return np.column_stack([places.real, places.imag, yaws])
 
 
 def _steps(poses: np.ndarray) -> np.ndarray:
@@ -73,7 +66,7 @@ def odometry_freezes(recording: Recording, at: float, seconds: float = np.inf, g
         return _odometry(recording, frozen)
     steps = _steps(poses)
     steps[after[1:]] = 0.0
-    return _odometry(recording, integrated(poses, steps))
+    return _odometry(recording, integrated(poses[0], steps))
 
 
 def odometry_missing(recording: Recording, at: float, seconds: float) -> Recording:
@@ -90,7 +83,7 @@ def odometry_scaled(recording: Recording, factor: float, at: float = 0.0) -> Rec
     """Let reported distances be `factor` times as long from a moment on."""
     steps = _steps(recording.track.poses)
     steps[_after(recording, at)[1:], :2] *= factor
-    return _odometry(recording, integrated(recording.track.poses, steps))
+    return _odometry(recording, integrated(recording.track.poses[0], steps))
 
 
 def dvl_turned(recording: Recording, degrees: float) -> Recording:
@@ -98,7 +91,7 @@ def dvl_turned(recording: Recording, degrees: float) -> Recording:
     steps = _steps(recording.track.poses)
     moves = (steps[:, 0] + 1j * steps[:, 1]) * np.exp(1j * np.radians(degrees))
     steps[:, :2] = np.column_stack([moves.real, moves.imag])
-    return _odometry(recording, integrated(recording.track.poses, steps))
+    return _odometry(recording, integrated(recording.track.poses[0], steps))
 
 
 def _compass(recording: Recording, error: np.ndarray, positions_follow: bool = True) -> Recording:
@@ -108,7 +101,7 @@ def _compass(recording: Recording, error: np.ndarray, positions_follow: bool = T
         return _odometry(recording, poses)
     steps = _steps(recording.track.poses)
     steps[:, 2] = np.diff(poses[:, 2])
-    return _odometry(recording, integrated(poses, steps))
+    return _odometry(recording, integrated(poses[0], steps))
 
 
 def compass_steps(recording: Recording, at: float, degrees: float, positions_follow: bool = True) -> Recording:

@@ -38,7 +38,8 @@ class BatchResult:
     """The whole run. steps: how many were taken. converged: the last one was as short as the parameters ask for.
 
     node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2). told: what the echoes
-    alone tell of the unknowns of a mixture of priors; None without one.
+    alone tell of the unknowns of a mixture of priors; None without one. log_likelihood: of echoes on surfaces, less
+    that of odd motions.
     """
 
     state: State
@@ -48,6 +49,7 @@ class BatchResult:
     steps: int
     converged: bool
     told: Optional[Gaussian]
+    log_likelihood: float
 
 
 @dataclass(frozen=True)
@@ -94,10 +96,7 @@ def with_loops_closed(live: LiveSolver, batch: BatchResult) -> LoopClosure:
     for _ in range(_PULLED_STEPS):
         problem.step()
     other = solved(live, start=problem.state)
-    without, with_loops = (
-        _Batch(live.solution.with_state(some.state.copy())).log_likelihood() for some in (batch, other)
-    )
-    gain = with_loops - without
+    gain = other.log_likelihood - batch.log_likelihood
     return LoopClosure(other, loops, gain) if gain > _CONVINCING else LoopClosure(batch, [], gain)
 
 
@@ -113,11 +112,18 @@ def solved(
     steps are known to _FIXED_STEP; None where none are.
     """
     parameters, start = parameters or live.parameters, start or live.state
-    problem = _Batch(replace(live.solution, parameters=parameters, state=start.copy()), fixed_steps=fixed_steps)
+    return fit_of(replace(live.solution, parameters=parameters, state=start), fixed_steps)
+
+
+def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
+    """Return the fit of a whole run that begins at its state; arguments as those of `solved`."""
+    problem = _Batch(run.with_state(run.state.copy()), fixed_steps=fixed_steps)
     steps, converged = problem.converge()
-    poses, run = problem.covariances()
-    poses = poses + misfit_covariance(_misfit(live, problem.state))
-    return BatchResult(problem.state, live.log.node_times.copy(), poses, run, steps, converged, problem.told())
+    poses, of_run = problem.covariances()
+    poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
+    likelihood = problem.log_likelihood()
+    times = run.log.node_times.copy()
+    return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
 
 
 def fit_path(live: LiveSolver, start: State) -> State:
@@ -143,10 +149,10 @@ def solved_part(live: LiveSolver, first: int) -> PartResult:
     return PartResult(state.nodes[-1].copy(), state.run.copy(), problem.newest_covariance(), steps)
 
 
-def _misfit(live: LiveSolver, state: State) -> np.ndarray:
+def _misfit(run: Solution) -> np.ndarray:
     """Return how uncertain scans that fit nowhere make the place of each node (n,) [m^2]."""
-    parts = live.parameters.parts_per_turn
-    of_turns = misfit_variances(live.solution.with_state(state), 0)
+    parts = run.parameters.parts_per_turn
+    of_turns = misfit_variances(run, 0)
     return np.cumsum(np.append(0.0, np.repeat(of_turns / parts, parts)))
 
 

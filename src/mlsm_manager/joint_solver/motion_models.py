@@ -4,7 +4,7 @@ Here are the interface, the terms that models share, and the models of odometrie
 the velocity is unknown are in velocity_models.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, fields, replace
 from typing import Dict, NamedTuple, Optional, Protocol
 
 import numpy as np
@@ -21,6 +21,9 @@ DRIFT_SCALE = 3  # row of a drift
 DIRECTION, SCALE, CURRENT_X, CURRENT_Y = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw
 _CURRENT = slice(5, 7)
 _CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far below any effect
+# Of an odometry with which something is wrong: rad, s within which a compass may err otherwise as the vehicle turns,
+# relative and 1/sqrt(s): distances are known as a DVL's at first and may be wrong by half two minutes later.
+_FREED_HEADING, _FREED_TIME, _FREED_SCALE, _FREED_SCALE_WALK = 0.15, 60.0, 0.09, 0.025
 _ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not divide by zero
 
 
@@ -54,6 +57,11 @@ class OdometryModel(Protocol):
     @property
     def rival(self) -> "Optional[OdometryModel]":
         """The model of another odometry that the vehicle may have; None where its kind was named."""
+        return None
+
+    @property
+    def freed(self) -> "Optional[OdometryModel]":
+        """The model of an odometry with which something is wrong; None where nothing is known that could be."""
         return None
 
     @property
@@ -154,6 +162,11 @@ class Compass:
         kept = np.exp(-durations / self.heading_correlation_time)
         return Change(kept, self.heading_deviation**2 * (1.0 - kept**2) + self.heading_walk**2 * durations)
 
+    @property
+    def freed(self) -> "Compass":
+        """A compass with which something is wrong: iron beside it, or a gyro that drifts."""
+        return replace(self, heading_deviation=_FREED_HEADING, heading_correlation_time=_FREED_TIME)
+
 
 @dataclass(frozen=True)
 class DvlOdometry:
@@ -192,6 +205,13 @@ class DvlFactors(OdometryModel):
 
     def __init__(self, parameters: DvlOdometry) -> None:
         self._parameters = parameters
+
+    @property
+    def freed(self) -> "ThrusterFactors":
+        own = {field.name: getattr(self._parameters, field.name) for field in fields(DvlOdometry)}
+        own.update(compass=self._parameters.compass.freed, scale_deviation=_FREED_SCALE)
+        still = {"current_deviation": HELD_DEVIATION, "current_walk": 0.0}
+        return ThrusterFactors(ThrusterOdometry(**own, scale_walk=_FREED_SCALE_WALK, **still))
 
     @property
     def calibrated(self) -> Dict[str, int]:

@@ -160,10 +160,13 @@ class RunLog:
         gone = before - len(self.odometry)
         self._odometry_lengths = [max(length - gone, 0) for length in self._odometry_lengths]
 
-    def since(self, scan: int) -> "RunLog":
-        """Return a log of `scan` and all later ones, the first of which is number 0 there. It shares the odometry."""
+    def since(self, scan: int, odometry: Optional[OdometryLog] = None) -> "RunLog":
+        """Return a log of `scan` and all later ones, the first of which is number 0 there. It shares the odometry.
+
+        odometry: what was reported instead, if anything.
+        """
         later = RunLog(self.sonar_in_base)
-        later.odometry = self.odometry
+        later.odometry = odometry or self.odometry
         later._node_times.extend(self.node_times[scan:])
         later._surfaces, later.posts = self._surfaces.since(scan), self.posts.since(scan)
         later._forgotten.extend(self.forgotten[scan:])

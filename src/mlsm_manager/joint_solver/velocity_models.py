@@ -76,6 +76,10 @@ class HeadingFactors(OdometryModel):
     def __init__(self, parameters: HeadingOdometry) -> None:
         self._speeds, self._compass = parameters.speeds, parameters.compass
 
+    @property
+    def freed(self) -> "HeadingFactors":
+        return HeadingFactors(HeadingOdometry(self._speeds, self._compass.freed))
+
     def first_node(self) -> np.ndarray:
         return np.zeros(self.width)
 
@@ -184,6 +188,11 @@ class UnaidedFactors(HeadingFactors):
 
     def __init__(self, parameters: UnaidedOdometry) -> None:
         self._speeds, self._own = parameters.speeds, parameters
+
+    @property
+    def freed(self) -> None:
+        """There is no compass that could be wrong."""
+        return None
 
     def first_deviations(self) -> np.ndarray:
         """The first heading defines the map."""

@@ -93,10 +93,12 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
             refined = refine(recording.track, replayed.scans, replayed.hypotheses, parameters.map_settings())
     if options.check:
         with _bar(None, "", "check"):
-            refitted = refitted_verdicts(replayed.solver, refined.batch)
+            refitted = refitted_verdicts(refined.solution, refined.batch)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    causes = ranked([*causes, *of_echoes, *beam_causes(recording.beams), *standing_causes(scans, recording.track)])
+    of_motion = [] if refined is None or of_echoes else refined.motion.causes
+    of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
+    causes = ranked([*causes, *of_echoes, *of_beams, *of_motion])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(of_echoes))

@@ -183,7 +183,7 @@ def _trust(
         expected = solver.expected_deviations(solver.estimates)
     else:
         path, solution, times = refined.poses, refined.solution, refined.batch.node_times
-        covariances = refined.batch.pose_covariances[:, :2, :2]
+        covariances = refined.batch.pose_covariances[:, :2, :2] + refined.motion.spread(times)
         places = solution.node_places(np.arange(len(times)))
         lengths = np.full(len(times), solver.estimates[-1].length_deviation)
         expected = expected_deviations(places - places[0], lengths, solver.heading_deviation)

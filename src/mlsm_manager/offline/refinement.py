@@ -5,9 +5,8 @@ from typing import List, Mapping, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, solved, with_loops_closed
+from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, fit_of, with_loops_closed
 from mlsm_manager.joint_solver.hypotheses import Hypotheses
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -17,6 +16,7 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.odometry_profiles import fitted
+from mlsm_manager.offline.motion_findings import MotionFindings, motion_findings
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
@@ -28,18 +28,24 @@ from mlsm_manager.surface_map.map_file import Layer
 class Refined:
     """poses: (m, 3) T_map_base at the recording's odometry times. layers: of the map drawn anew.
 
-    closing: the fit, and the places visited again that it goes back to. solution: the run as fitted.
+    closing: places visited again that the fit goes back to. motion: the run as fitted, and what speaks against its
+    odometry.
     """
 
     poses: np.ndarray
     layers: Mapping[Layer, Blocks]
     closing: LoopClosure
-    solution: Solution
+    motion: MotionFindings
 
     @property
     def batch(self) -> BatchResult:
         """The fit."""
-        return self.closing.batch
+        return self.motion.fit
+
+    @property
+    def solution(self) -> Solution:
+        """The run as fitted."""
+        return self.motion.run
 
 
 def refine(track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings: MapSettings) -> Refined:
@@ -50,14 +56,15 @@ def refine(track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings
     best = hypotheses.believed([fitted(solver) for solver in hypotheses.solvers])
     solver = hypotheses.shown
     closing = with_loops_closed(solver, best)
-    solution = solver.solution.with_state(closing.batch.state)
+    motion = motion_findings(solver.solution.with_state(closing.batch.state), closing.batch, track)
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
-        surfaces.add(MapCloud.of_scan(scan))
-    surfaces.settle(solution)
-    whole, batch = OdometryLog.of(track), closing.batch
+        surfaces.add(MapCloud.of_scan(motion.placed(scan, track)))
+    surfaces.settle(motion.run)
+    whole, batch = OdometryLog.of(motion.track), motion.fit
     poses = solved_path(whole, solver.odometry, batch.node_times, batch.state.nodes, track.times)
-    return Refined(poses, {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}, closing, solution)
+    layers = {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}
+    return Refined(poses, layers, closing, motion.with_course(Track(track.times, poses)))
 
 
 _NARROWER, _WIDER, _HALF = 0.75, 1.4, 0.5  # factors of settings that nobody knows better than that
@@ -66,17 +73,17 @@ _MANY_SCANS = 40  # in a group, from which on it is made smaller
 _TURNS = 1.0  # of the direction in which the second start lies beside the path, along the whole run
 
 
-def refitted_verdicts(solver: LiveSolver, batch: BatchResult) -> List[Verdict]:
-    """Return what further fits of the run that `solver` followed say of `batch`, its fit with its own settings."""
+def refitted_verdicts(run: Solution, batch: BatchResult) -> List[Verdict]:
+    """Return what further fits of a run say of `batch`, its fit with its own settings."""
 
     def path(state: State) -> np.ndarray:
-        return solver.solution.with_state(state).node_places(np.arange(len(state.nodes)))
+        return run.with_state(state).node_places(np.arange(len(state.nodes)))
 
     deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
-    start = displaced(batch.state, deviations, solver.parameters.cut)
-    others = [solved(solver, parameters, batch.state).state for parameters in other_settings(solver.parameters)]
-    paths = np.stack([path(state) for state in (batch.state, *others)])
-    again = [path(state) for state in (batch.state, start, solved(solver, start=start).state)]
+    start = displaced(batch.state, deviations, run.parameters.cut)
+    fitted_with = [replace(run, parameters=one, state=batch.state) for one in other_settings(run.parameters)]
+    paths = np.stack([path(state) for state in (batch.state, *(fit_of(one).state for one in fitted_with))])
+    again = [path(state) for state in (batch.state, start, fit_of(run.with_state(start)).state)]
     return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
 
 

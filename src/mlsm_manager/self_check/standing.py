@@ -14,6 +14,7 @@ _FAR = 4.0  # m: echoes that are farther from all others say no more than that s
 _APART = (1, 2, 3)  # scans between two that are compared
 _FEWEST_PAIRS = 3
 _CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose itself says that nobody measured it
+_STRAIGHT = 2  # stretches of one heading, without positions: more are straight ways by a compass without noise
 _FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle
 
@@ -21,7 +22,8 @@ _SPEED = 0.3  # m/s: the usual speed of a small vehicle
 def standing_causes(scans: Sequence[Scan], track: Track) -> List[Cause]:
     """Return the stretches in which T_odom_base stands while scans do not lie on each other as they do elsewhere."""
     stretches = [(float(track.times[first]), float(track.times[last])) for first, last in standing_stretches(track)]
-    if not stretches:
+    reports_positions = bool(np.ptp(track.poses[:, :2], axis=0).any())
+    if not stretches or (not reports_positions and len(stretches) > _STRAIGHT):
         return []
     times, apart = _pairs(scans)
     if not len(times):

@@ -116,7 +116,7 @@ def among_furrows(scan, truth, rng):
 
 def verdicts_of(scans):
     solver = followed(scans)
-    return {verdict.name: verdict for verdict in refitted_verdicts(solver, solved(solver))}
+    return {verdict.name: verdict for verdict in refitted_verdicts(solver.solution, solved(solver))}
 
 
 @pytest.fixture(scope="module")

@@ -1,0 +1,58 @@
+"""Fits of a run that believe its odometry less, or another one."""
+
+from dataclasses import dataclass, replace
+from typing import Optional
+
+import numpy as np
+
+from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
+from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
+from mlsm_manager.joint_solver.normal_equations import YAW, State
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.scan_matching.scan import Track
+
+
+@dataclass(frozen=True)
+class OdometryErrors:
+    """What the odometry was wrong by at the nodes of a run, by a fit that lets it err.
+
+    times: (n,) s. yaws: (n,) rad as reported. headings: (n,) rad, added to these. scales: (n,) true over reported
+    distances, minus 1; zeros where none are reported. places: (n, 2) m, the path of that fit in map.
+    """
+
+    times: np.ndarray
+    yaws: np.ndarray
+    headings: np.ndarray
+    scales: np.ndarray
+    places: np.ndarray
+
+
+def freed_errors(run: Solution) -> Optional[OdometryErrors]:
+    """Return what the odometry of a run that is fitted was wrong by; None where its model cannot be freed."""
+    model = run.odometry.freed
+    if model is None:
+        return None
+    freed = replace(run, parameters=replace(run.parameters, odometry=model), state=_for_model(run.state, model))
+    nodes = fit_of(freed).state.nodes
+    reported = run.log.node_poses(np.arange(len(nodes)))
+    tells = not np.isinf(model.distance_deviation)
+    scales = nodes[:, SCALE] if tells else np.zeros(len(nodes))
+    places = reported[:, :2] + nodes[:, :2]
+    return OdometryErrors(run.log.node_times.copy(), reported[:, YAW], nodes[:, YAW], scales, places)
+
+
+def fit_with(run: Solution, track: Track) -> BatchResult:
+    """Return the fit of a run, from where it is, if its odometry had reported `track`."""
+    log = run.log.since(0, OdometryLog.of(track))
+    nodes = run.state.nodes.copy()
+    numbers = np.arange(len(nodes))
+    nodes[:, : YAW + 1] += run.log.node_poses(numbers) - log.node_poses(numbers)
+    return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
+
+
+def _for_model(state: State, model: OdometryModel) -> State:
+    """Return a state with the unknowns of `model`: those that it has besides begin at zero."""
+    nodes = np.zeros((len(state.nodes), model.width))
+    nodes[:, : state.nodes.shape[1]] = state.nodes
+    return State(nodes, state.run.copy())

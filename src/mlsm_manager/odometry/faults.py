@@ -1,0 +1,129 @@
+"""What may be wrong with an odometry: a compass that drifts, steps or errs by the heading, distances that change."""
+
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import Callable, Dict, List, Tuple
+
+import numpy as np
+
+from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import composed, inverse
+
+# rad and relative: a marina's unbroken compass errs by 3 degrees with the heading, a DVL by three times 1 percent.
+_USUAL_HEADING, _USUAL_LENGTH = np.radians(4.0), 0.04
+_DAMPING = 1.0  # nodes' worth against harmonics that the headings of a run do not tell apart
+_SIDE = 0.15  # of the run, at both ends, in which nothing tells a change from what holds all along
+
+
+class FaultKind(Enum):
+    """What is wrong; sizes are those of what has to be added to the heading, or the factor of distances."""
+
+    DRIFT = "the compass drifts"
+    STEP = "the compass stepped"
+    CIRCLE = "the compass errs by the heading"
+    LENGTH = "all reported distances are wrong"
+    DISTANCES = "reported distances changed"
+
+
+_OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
+_ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
+
+
+@dataclass(frozen=True)
+class MotionFault:
+    """begin: s, of a drift, a step or a change; NaN where it holds all along.
+
+    sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; or the
+    logarithm of a factor.
+    """
+
+    kind: FaultKind
+    begin: float
+    sizes: Tuple[float, ...]
+
+    def times(self, factor: float) -> "MotionFault":
+        """Return one that is so many times as large."""
+        return replace(self, sizes=tuple(factor * size for size in self.sizes))
+
+    @property
+    def text(self) -> str:
+        """What is wrong and by how much."""
+        size = float(np.linalg.norm(self.sizes))
+        if self.kind in _OF_DISTANCES:
+            return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
+        if self.kind is FaultKind.DRIFT:
+            return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
+        if self.kind is FaultKind.STEP:
+            return f"the compass stepped by {-np.degrees(self.sizes[0]):+.0f} deg"
+        return f"the compass errs by up to {np.degrees(size):.0f} deg by the heading: iron beside it"
+
+    def is_beyond(self, end: float) -> bool:
+        """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
+        size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind is FaultKind.DRIFT else 1.0)
+        return size > (_USUAL_LENGTH if self.kind in _OF_DISTANCES else _USUAL_HEADING)
+
+    def mended(self, track: Track) -> Track:
+        """Return T_odom_base without the fault; positions are reckoned anew, as the vehicle did from its heading."""
+        steps = composed(inverse(track.poses[:-1]), track.poses[1:])
+        errors = _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
+        if self.kind in _OF_DISTANCES:
+            steps[:, :2] *= np.exp(errors[1:, np.newaxis])
+            return Track(track.times, integrated(track.poses[0], steps))
+        yaws = track.poses[:, 2] + errors
+        steps[:, 2] = np.diff(yaws)
+        return Track(track.times, integrated(np.append(track.poses[0, :2], yaws[0]), steps))
+
+
+def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
+    """Return poses (m, 3) from `start` (3,) on by `steps` (m - 1, 3), each in the vehicle's frame."""
+    yaws = start[2] + np.append(0.0, np.cumsum(steps[:, 2]))
+    moves = (steps[:, 0] + 1j * steps[:, 1]) * np.exp(1j * yaws[:-1])
+    places = complex(*start[:2]) + np.append(0.0, np.cumsum(moves))
+    return np.column_stack([places.real, places.imag, yaws])
+
+
+_COLUMNS: Dict[FaultKind, Callable[[np.ndarray, np.ndarray, float], np.ndarray]] = {
+    FaultKind.DRIFT: lambda times, _, begin: np.maximum(times - begin, 0.0)[:, np.newaxis],
+    FaultKind.STEP: lambda times, _, begin: (times > begin).astype(float)[:, np.newaxis],
+    FaultKind.LENGTH: lambda times, _, __: np.ones((len(times), 1)),
+    FaultKind.DISTANCES: lambda times, _, begin: (times > begin).astype(float)[:, np.newaxis],
+    FaultKind.CIRCLE: lambda _, yaws, __: np.column_stack(
+        [np.cos(yaws), np.sin(yaws), np.cos(2.0 * yaws), np.sin(2.0 * yaws)]
+    ),
+}
+"""Of each kind what one unit of its sizes adds to headings (m,) reported at `times` (m,), (m, k)."""
+
+
+def likely_faults(times: np.ndarray, yaws: np.ndarray, headings: np.ndarray, scales: np.ndarray) -> List[MotionFault]:
+    """Return the fault of each kind that explains most of what an odometry was wrong by. Needs the past only.
+
+    times: (n,) s. yaws: (n,) rad, as reported. headings: (n,) rad, what a fit that lets the odometry err added to
+    these. scales: (n,) true over reported distances, minus 1, by the same fit.
+    """
+    logs, found = np.log1p(np.maximum(scales, -0.9)), []
+    for kind in FaultKind:
+        values = logs if kind in _OF_DISTANCES else headings
+        tried = [_explained(kind, times, yaws, values, float(begin)) for begin in _begins(times, kind)]
+        found.append(min(tried, key=lambda one: one[0])[1])
+    return found
+
+
+def _begins(times: np.ndarray, kind: FaultKind) -> np.ndarray:
+    if kind in _ALL_ALONG:
+        return np.array([np.nan])
+    first, last = np.quantile(times, [0.0 if kind is FaultKind.DRIFT else _SIDE, 1.0 - _SIDE])
+    return times[(times >= first) & (times <= last)]
+
+
+def _explained(
+    kind: FaultKind, times: np.ndarray, yaws: np.ndarray, values: np.ndarray, begin: float
+) -> Tuple[float, MotionFault]:
+    """Return what is left of values (n,), and the fault; besides it a value that holds all along is no fault."""
+    columns = _COLUMNS[kind](times, yaws, begin)
+    count = columns.shape[1]
+    if kind is not FaultKind.LENGTH:
+        columns = np.column_stack([columns, np.ones(len(times))])
+    damping = np.diag(np.full(columns.shape[1], _DAMPING if kind is FaultKind.CIRCLE else 0.0))
+    sizes = np.linalg.solve(columns.T @ columns + damping, columns.T @ values)
+    left = float(((values - columns @ sizes) ** 2).sum())
+    return left, MotionFault(kind, begin, tuple(sizes[:count].tolist()))

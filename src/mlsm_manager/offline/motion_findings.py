@@ -1,0 +1,124 @@
+"""What the echoes of a whole run say against its odometry, and the run with that mended."""
+
+from dataclasses import dataclass, field, replace
+from typing import List, NamedTuple
+
+import numpy as np
+
+from mlsm_manager.joint_solver.batch_solver import BatchResult
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
+from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.odometry.faults import MotionFault, likely_faults
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.course import course_causes, course_of
+from node_support.geometry import composed, inverse, rotated, transformed
+
+# A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
+# scale, and its mean. Beyond, faults are tried.
+_HEADING, _SCALE, _LENGTH = np.radians(1.6), 0.06, 0.06
+_NATS = 5.0  # by which a run must fit better without a fault; unbroken recordings gain less than 3 by any
+_LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
+_FAULTS = 3  # at most, one after the other
+_FEWEST = 15  # nodes: fewer do not tell a change from noise
+
+
+@dataclass(frozen=True)
+class MotionFindings:
+    """The run as it is known once its odometry is doubted.
+
+    run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one.
+    apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its nodes.
+    """
+
+    run: Solution
+    fit: BatchResult
+    track: Track
+    causes: List[Cause] = field(default_factory=list)
+    apart: List[np.ndarray] = field(default_factory=list)
+
+    def spread(self, times: np.ndarray) -> np.ndarray:
+        """Return what these paths add to the covariances of the position at `times` (k,) [s], (k, 2, 2) m^2."""
+        added = np.zeros((len(times), 2, 2))
+        for one in self.apart:
+            beside = np.stack([np.interp(times, self.fit.node_times, axis) for axis in one.T], axis=-1)
+            added += np.einsum("na,nb->nab", beside, beside)
+        return added
+
+    def with_course(self, path: Track) -> "MotionFindings":
+        """Return the findings with what T_map_base says of the sonar's mount."""
+        course, places = course_of(path), _places(self.run)
+        gone = places - places[0]
+        aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
+        return replace(self, causes=[*self.causes, *course_causes(course)], apart=[*self.apart, aside])
+
+    def placed(self, scan: Scan, reported: Track) -> Scan:
+        """Return a scan that was placed by `reported` as this odometry places it."""
+        if self.track is reported:
+            return scan
+        moves = composed(self.track.at(scan.times), inverse(reported.at(scan.times)))
+        return replace(scan, points=transformed(moves, scan.points), track=self.track)
+
+
+class _Trial(NamedTuple):
+    fault: MotionFault
+    track: Track
+    fit: BatchResult
+
+
+def motion_findings(run: Solution, fit: BatchResult, track: Track) -> MotionFindings:
+    """Return what speaks against the odometry `track` of a run that is fitted as `fit` says, and the run without it.
+
+    Each fault is taken out of the odometry and the run fitted again; the one with which echoes agree best is named.
+    What a fit finds besides that lets the odometry err makes the position uncertain.
+    """
+    found = MotionFindings(run, fit, track)
+    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST:
+        return found
+    first = places = _places(run)
+    for _ in range(_FAULTS + 1):
+        errors = freed_errors(found.run)
+        if errors is None:
+            return found
+        places = errors.places
+        if len(found.causes) == _FAULTS or not _errs(errors):
+            break
+        best = _best(found, errors)
+        gain = best.fit.log_likelihood - found.fit.log_likelihood
+        if gain < _NATS or not best.fault.is_beyond(errors.times[-1]):
+            break
+        found = _without(found, best, gain)
+    others = [places, first] if found.causes else [places] if _errs(errors) else []
+    return replace(found, apart=[other - _places(found.run) for other in others])
+
+
+def _places(run: Solution) -> np.ndarray:
+    return run.node_places(np.arange(len(run.state.nodes)))
+
+
+def _errs(errors: OdometryErrors) -> bool:
+    scales = np.log1p(np.maximum(errors.scales, -0.9))
+    return bool(errors.headings.std() > _HEADING or scales.std() > _SCALE or abs(scales.mean()) > _LENGTH)
+
+
+def _best(found: MotionFindings, errors: OdometryErrors) -> _Trial:
+    faults = likely_faults(errors.times, errors.yaws, errors.headings, errors.scales)
+    best = max((_tried(found, fault) for fault in faults), key=_likelihood)
+    return max([best, *(_tried(found, best.fault.times(factor)) for factor in _LARGER)], key=_likelihood)
+
+
+def _tried(found: MotionFindings, fault: MotionFault) -> _Trial:
+    track = fault.mended(found.track)
+    return _Trial(fault, track, fit_with(found.run, track))
+
+
+def _likelihood(trial: _Trial) -> float:
+    return trial.fit.log_likelihood
+
+
+def _without(found: MotionFindings, trial: _Trial, gain: float) -> MotionFindings:
+    log = found.run.log.since(0, OdometryLog.of(trial.track))
+    run = replace(found.run, log=log, state=trial.fit.state)
+    cause = Cause(trial.fault.text, gain, trial.fault.begin)
+    return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

@@ -1,0 +1,61 @@
+"""Whether a vehicle goes where it looks: if it does not, the sonar or the heading may be turned against it."""
+
+from typing import List, NamedTuple
+
+import numpy as np
+
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import Cause
+from node_support.geometry import rotated, wrapped
+
+_SECONDS, _GONE = 10.0, 1.0  # s of a stretch, and m in it from which on it has a direction
+_FEWEST = 10  # stretches
+_AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
+_STRAFES = np.radians(20.0)  # deviation of the course, beyond which the vehicle has no usual one; ahead: 5 to 13 deg
+_NAMED = 2.0  # deviations
+_LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes back
+
+
+class CourseFound(NamedTuple):
+    """turn: rad, counter-clockwise, of the sonar against the vehicle. deviation: rad."""
+
+    turn: float
+    deviation: float
+
+    @property
+    def unexplained(self) -> float:
+        """What the deviation does not explain of the turn, rad."""
+        return float(np.sqrt(max(self.turn**2 - self.deviation**2, 0.0)))
+
+
+NOT_TOLD = CourseFound(0.0, np.inf)
+
+
+def course_of(path: Track) -> CourseFound:
+    """Return what a path T_map_base tells of the sonar's turn, if the vehicle usually goes ahead; needs the past only.
+
+    Echoes tell the motion against the sonar. A vehicle that seems to go to the right, however its odometry's own
+    sensor is mounted, has a sonar that is turned to the left.
+    """
+    times = np.arange(path.times[0], path.times[-1], _SECONDS)
+    poses = path.at(times)
+    moves = rotated(np.diff(poses[:, :2], axis=0), -(poses[:-1, 2] + poses[1:, 2]) / 2.0)
+    moves = moves[np.hypot(*moves.T) > _GONE]
+    if len(moves) < _FEWEST:
+        return NOT_TOLD
+    angles = np.arctan2(moves[:, 1], moves[:, 0])
+    middle = float(np.median(angles))
+    spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
+    if spread > _STRAFES or abs(middle) > _LARGEST:
+        return NOT_TOLD
+    return CourseFound(-middle, float(np.hypot(1.25 * spread / np.sqrt(len(angles)), _AHEAD)))
+
+
+def course_causes(found: CourseFound) -> List[Cause]:
+    """Return that the sonar is turned, where the course shows it."""
+    size = abs(found.turn) / found.deviation
+    if size < _NAMED:
+        return []
+    angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(found.deviation):.0f} deg"
+    text = f"the sonar is turned by {angle} against tf, if the vehicle usually goes where its heading points"
+    return [Cause(text, 0.5 * size**2)]

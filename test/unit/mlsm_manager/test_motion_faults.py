@@ -1,0 +1,89 @@
+"""What is wrong with an odometry all along is found from what echoes correct of it, named, and taken out."""
+
+import numpy as np
+import pytest
+from benchmarks import fault_makers as broken
+from made_recordings import SECONDS, touring
+
+from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
+from mlsm_manager.offline.bag_mapping import mapped_bag
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.course import course_causes, course_of
+
+WHOLE, MIDDLE = touring(), SECONDS / 2.0
+START = WHOLE.track.times[0]
+NODES = np.arange(START, START + SECONDS, 10.0)
+
+DRIFT = MotionFault(FaultKind.DRIFT, START + 100.0, (-0.001,))
+STEP = MotionFault(FaultKind.STEP, START + 100.0, (0.2,))
+CIRCLE = MotionFault(FaultKind.CIRCLE, np.nan, (0.02, 0.1, -0.05, 0.03))
+LENGTH = MotionFault(FaultKind.LENGTH, np.nan, (0.1,))
+DISTANCES = MotionFault(FaultKind.DISTANCES, START + 100.0, (-0.4,))
+
+
+@pytest.mark.parametrize("fault", [DRIFT, STEP, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
+def test_a_fault_is_found_from_what_mends_it(fault):
+    yaws = WHOLE.track.at(NODES)[:, 2]
+    mended = fault.mended(WHOLE.track)
+    headings = mended.at(NODES)[:, 2] - yaws
+    lengths = np.hypot(*np.diff(mended.poses[:, :2], axis=0).T) / np.hypot(*np.diff(WHOLE.track.poses[:, :2], axis=0).T)
+    scales = np.interp(NODES, WHOLE.track.times[1:], lengths) - 1.0
+    found = {one.kind: one for one in likely_faults(NODES, yaws, headings, scales)}[fault.kind]
+    np.testing.assert_allclose(found.sizes, fault.sizes, atol=0.1 * np.abs(fault.sizes).max())
+    np.testing.assert_allclose(found.begin, fault.begin, atol=10.0)
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (DRIFT, "the compass drifts by +3.4 deg per minute"),
+        (STEP, "the compass stepped by -11 deg"),
+        (LENGTH, "reported distances are 0.90 times the true ones"),
+        (DISTANCES, "reported distances are 1.49 times the true ones"),
+    ],
+)
+def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
+    assert fault.text == said
+
+
+def mapped(recording):
+    return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", "--refine"]))
+
+
+@pytest.mark.parametrize(
+    ("recording", "said"),
+    [
+        (broken.odometry_scaled(WHOLE, 0.5, at=MIDDLE), "reported distances are 0."),
+        (broken.compass_drifts(WHOLE, 60.0, 6.0), "the compass drifts by +"),
+        (broken.mount_turned(WHOLE, 12.0), "the sonar is turned by 1"),
+    ],
+)
+def test_what_echoes_correct_is_named_first(recording, said):
+    findings = mapped(recording).findings
+    assert findings.trust.causes[0].text.startswith(said)
+    assert findings.trust.line.startswith("trust: DOUBTFUL")
+
+
+def test_a_path_is_fitted_without_the_fault():
+    found = mapped(broken.odometry_scaled(WHOLE, 0.5, at=MIDDLE))
+    apart = np.hypot(*(found.run.best - WHOLE.track.at(found.run.times))[:, :2].T)
+    assert apart.mean() < 1.5  # m; 3 without
+
+
+def test_nothing_is_named_where_nothing_is_wrong():
+    assert mapped(WHOLE).findings.trust.causes == []
+
+
+@pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1)])
+def test_a_sonar_is_turned_where_the_vehicle_never_goes_ahead(turn, named):
+    poses = WHOLE.track.poses + np.radians([0.0, 0.0, turn])
+    found = course_of(Track(WHOLE.track.times, poses))
+    assert np.degrees(found.turn) == pytest.approx(turn, abs=1.0)
+    assert len(course_causes(found)) == named
+
+
+def test_a_vehicle_that_strafes_tells_nothing_of_the_mount():
+    yaws = WHOLE.track.poses[:, 2] + 2.0 * np.sin(WHOLE.track.times / 17.0)
+    path = Track(WHOLE.track.times, np.column_stack([WHOLE.track.poses[:, :2], yaws]))
+    assert course_causes(course_of(path)) == []
