@@ -3,7 +3,7 @@
 Each row: the recording and the fault; distance [m] from the path of the unbroken recording, in the mean of the live and
 the refined path, and the refined one's largest; "stated": median of the stated deviation [m]; "covered": share of the
 refined path within 2.5 of these; the cause that is named first, with the second that it names; the trust line.
-A row is "SILENT" where the path is off by more than the unbroken run is (or 1 m) while the run is called fine.
+A row is "SILENT" where the path is off by more than the unbroken run's stated deviation while the run is called fine.
 """
 
 import re
@@ -28,7 +28,6 @@ from recordings.reader import Request
 
 _HEADING = np.array([0.0, 0.0, 1.0])
 _COVERS = 2.5  # stated deviations
-_HELD = 1.0  # m from the unbroken run's path, about what that is from the truth
 SOURCES = ("marina", "harbour", "marina compass", "harbour compass")
 _COMPASS = " compass"
 
@@ -151,10 +150,11 @@ def outcome(found: MappedBag, whole: MappedBag) -> Outcome:
     refined = distance(found.run.best, found.run.times, whole, whole.run.best)
     trust = found.findings.trust
     stated = np.interp(found.run.times, trust.times, trust.deviations)
-    wrong = refined.mean() > _HELD and not trust.line.startswith("trust: DOUBTFUL")
+    held = float(np.median(whole.findings.trust.deviations))
+    wrong = refined.mean() > held and not trust.line.startswith("trust: DOUBTFUL")
     return Outcome(
         live.mean(), refined.mean(), refined.max(), float(np.median(stated)),
-        float(np.mean(refined <= np.maximum(_COVERS * stated, _HELD))), _first_cause(trust), trust.line, wrong,
+        float(np.mean(refined <= _COVERS * stated)), _first_cause(trust), trust.line, wrong,
     )  # fmt: skip
 
 

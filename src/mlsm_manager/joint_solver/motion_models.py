@@ -209,9 +209,8 @@ class DvlFactors(OdometryModel):
     @property
     def freed(self) -> "ThrusterFactors":
         own = {field.name: getattr(self._parameters, field.name) for field in fields(DvlOdometry)}
-        own.update(compass=self._parameters.compass.freed, scale_deviation=_FREED_SCALE)
-        still = {"current_deviation": HELD_DEVIATION, "current_walk": 0.0}
-        return ThrusterFactors(ThrusterOdometry(**own, scale_walk=_FREED_SCALE_WALK, **still))
+        still = {"scale_walk": 0.0, "current_deviation": HELD_DEVIATION, "current_walk": 0.0}
+        return ThrusterFactors(ThrusterOdometry(**own, **still)).freed
 
     @property
     def calibrated(self) -> Dict[str, int]:
@@ -309,6 +308,11 @@ class ThrusterFactors(DvlFactors):
     def __init__(self, parameters: ThrusterOdometry) -> None:
         super().__init__(parameters)
         self._own = parameters
+
+    @property
+    def freed(self) -> "ThrusterFactors":
+        scale = {"scale_deviation": _FREED_SCALE, "scale_walk": _FREED_SCALE_WALK}
+        return ThrusterFactors(replace(self._own, compass=self._own.compass.freed, **scale))
 
     def first_node(self) -> np.ndarray:
         return np.append(super().first_node(), [0.0, 0.0])

@@ -20,6 +20,7 @@ class FaultKind(Enum):
 
     DRIFT = "the compass drifts"
     STEP = "the compass stepped"
+    SLIP = "the head slipped"
     CIRCLE = "the compass errs by the heading"
     LENGTH = "all reported distances are wrong"
     DISTANCES = "reported distances changed"
@@ -53,8 +54,8 @@ class MotionFault:
             return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
         if self.kind is FaultKind.DRIFT:
             return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
-        if self.kind is FaultKind.STEP:
-            return f"the compass stepped by {-np.degrees(self.sizes[0]):+.0f} deg"
+        if self.kind in (FaultKind.STEP, FaultKind.SLIP):
+            return f"the head slipped by {abs(np.degrees(self.sizes[0])):.0f} deg, or the compass stepped,"
         return f"the compass errs by up to {np.degrees(size):.0f} deg by the heading: iron beside it"
 
     def is_beyond(self, end: float) -> bool:
@@ -63,13 +64,18 @@ class MotionFault:
         return size > (_USUAL_LENGTH if self.kind in _OF_DISTANCES else _USUAL_HEADING)
 
     def mended(self, track: Track) -> Track:
-        """Return T_odom_base without the fault; positions are reckoned anew, as the vehicle did from its heading."""
+        """Return T_odom_base without the fault; positions are reckoned anew, as the vehicle did from its heading.
+
+        After a slip of the head the heading is that of the sonar.
+        """
         steps = composed(inverse(track.poses[:-1]), track.poses[1:])
         errors = _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
         if self.kind in _OF_DISTANCES:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])
             return Track(track.times, integrated(track.poses[0], steps))
         yaws = track.poses[:, 2] + errors
+        if self.kind is FaultKind.SLIP:
+            return Track(track.times, np.column_stack([track.poses[:, :2], yaws]))
         steps[:, 2] = np.diff(yaws)
         return Track(track.times, integrated(np.append(track.poses[0, :2], yaws[0]), steps))
 
@@ -82,11 +88,16 @@ def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.column_stack([places.real, places.imag, yaws])
 
 
+def _after(times: np.ndarray, _: np.ndarray, begin: float) -> np.ndarray:
+    return (times > begin).astype(float)[:, np.newaxis]
+
+
 _COLUMNS: Dict[FaultKind, Callable[[np.ndarray, np.ndarray, float], np.ndarray]] = {
     FaultKind.DRIFT: lambda times, _, begin: np.maximum(times - begin, 0.0)[:, np.newaxis],
-    FaultKind.STEP: lambda times, _, begin: (times > begin).astype(float)[:, np.newaxis],
+    FaultKind.STEP: _after,
+    FaultKind.SLIP: _after,
     FaultKind.LENGTH: lambda times, _, __: np.ones((len(times), 1)),
-    FaultKind.DISTANCES: lambda times, _, begin: (times > begin).astype(float)[:, np.newaxis],
+    FaultKind.DISTANCES: _after,
     FaultKind.CIRCLE: lambda _, yaws, __: np.column_stack(
         [np.cos(yaws), np.sin(yaws), np.cos(2.0 * yaws), np.sin(2.0 * yaws)]
     ),

@@ -17,8 +17,8 @@ from node_support.geometry import composed, inverse, rotated, transformed
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
-_HEADING, _SCALE, _LENGTH = np.radians(1.6), 0.06, 0.06
-_NATS = 5.0  # by which a run must fit better without a fault; unbroken recordings gain less than 3 by any
+_HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
+_NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _FAULTS = 3  # at most, one after the other
 _FEWEST = 15  # nodes: fewer do not tell a change from noise

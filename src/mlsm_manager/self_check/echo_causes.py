@@ -30,7 +30,7 @@ class EchoFindings(NamedTuple):
 def echo_findings(scans: Sequence[Scan], sonar_in_base: np.ndarray) -> EchoFindings:
     """Return what the scans of a run tell of mounts, stamps and head. sonar_in_base: (2,) m."""
     pairs = ScanPairs(scans, sonar_in_base)
-    if not pairs.tell:
+    if not pairs.tell or not _reports_positions(scans):
         return EchoFindings([], AS_TOLD)
     best, causes = _turned(pairs), []
     turn = pairs.evidence(best)
@@ -43,6 +43,11 @@ def echo_findings(scans: Sequence[Scan], sonar_in_base: np.ndarray) -> EchoFindi
     causes += _delayed(pairs, base)
     causes += [] if told else [*_shifted(pairs, base), *_slipped(pairs, base)]
     return EchoFindings(causes, best if told else AS_TOLD)
+
+
+def _reports_positions(scans: Sequence[Scan]) -> bool:
+    """Return whether the odometry knows more than the heading: without, scans do not lie on each other anyway."""
+    return any(np.ptp(scan.track.poses[:, :2], axis=0).any() for scan in scans)
 
 
 def _turned(pairs: ScanPairs) -> Hypothesis:

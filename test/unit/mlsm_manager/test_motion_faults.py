@@ -38,7 +38,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
     ("fault", "said"),
     [
         (DRIFT, "the compass drifts by +3.4 deg per minute"),
-        (STEP, "the compass stepped by -11 deg"),
+        (STEP, "the head slipped by 11 deg, or the compass stepped,"),
         (LENGTH, "reported distances are 0.90 times the true ones"),
         (DISTANCES, "reported distances are 1.49 times the true ones"),
     ],
