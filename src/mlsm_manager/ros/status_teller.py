@@ -32,7 +32,7 @@ _COLORS = {
     PositionState.UNKNOWN: ColorRGBA(1.0, 0.3, 0.25, 1.0),
 }
 _WHITE = ColorRGBA(0.9, 0.92, 0.95, 1.0)
-_SHARE = 12.0  # of how far the sonar hears: the height of a letter, from which all else follows
+_SHARE = 20.0  # of how far the sonar hears: the height of a letter, from which all else follows
 _MOST = 2.5  # m, of a letter: larger ones hide the map
 _LINE, _VEHICLE, _ABOVE = 0.08, 2.0, 1.5  # letters: width of a line, length of the vehicle's arrow, height over it
 _ASIDE = (-6.0, -7.0)  # letters from the vehicle, where scale bar and north arrow begin
