@@ -37,13 +37,14 @@ def prefix(tmp_path_factory):
 
 def _copy_compiled_loops(modules):
     """Spare the installed programs half a minute: numba takes what it compiled for a file of the same time and size."""
-    for cache in (ROOT / "src").rglob("__pycache__"):
-        installed = modules / cache.parent.relative_to(ROOT / "src")
-        for loop in cache.glob("*.nb[ci]"):
-            (installed / "__pycache__").mkdir(exist_ok=True)
-            shutil.copy(str(loop), str(installed / "__pycache__"))
-            source = f"{loop.name.split('.')[0]}.py"
-            shutil.copystat(str(cache.parent / source), str(installed / source))
+    for loop in (ROOT / "src").rglob("__pycache__/*.nb[ci]"):
+        source = loop.parent.parent / f"{loop.name.split('.')[0]}.py"
+        # What was compiled for a file that is gone stays in its folder.
+        if source.is_file():
+            installed = modules / source.relative_to(ROOT / "src")
+            (installed.parent / "__pycache__").mkdir(exist_ok=True)
+            shutil.copy(str(loop), str(installed.parent / "__pycache__"))
+            shutil.copystat(str(source), str(installed))
 
 
 def _environment():
