@@ -31,7 +31,7 @@ class _Server(Server):
         self.config.update({field.name: values[field.name] for field in self._parameters.tunable_fields()})
 
     def _copy_to_parameter_server(self) -> None:
-        """Write what differs: each value is a call to the master, and some nodes have a hundred."""
+        """Write what differs: each value is a call to the master, and nodes have up to 15."""
         held = rospy.get_param(self.ns.rstrip("/"), {}) or {}
         for field in self._parameters.tunable_fields():
             folder = f"{EXPERT}/" if describe(field).expert else ""
