@@ -17,8 +17,8 @@ from mlsm_manager.scan_matching.scan import Track
 class OdometryErrors:
     """What the odometry was wrong by at the nodes of a run, by a fit that lets it err.
 
-    times: (n,) s. yaws: (n,) rad as reported. headings: (n,) rad, added to these. scales: (n,) true over reported
-    distances, minus 1; zeros where none are reported. places: (n, 2) m, the path of that fit in map.
+    times: (n,) s. yaws: (n,) rad as reported. headings: (n,) rad, added to these. scales: (n,) true distances over
+    those that the run found, minus 1; zeros where none are reported. places: (n, 2) m, the path of that fit in map.
     """
 
     times: np.ndarray
@@ -36,8 +36,9 @@ def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     freed = replace(run, parameters=replace(run.parameters, odometry=model), state=_for_model(run.state, model))
     nodes = fit_of(freed).state.nodes
     reported = run.log.node_poses(np.arange(len(nodes)))
-    tells = not np.isinf(model.distance_deviation)
-    scales = nodes[:, SCALE] if tells else np.zeros(len(nodes))
+    scales = np.zeros(len(nodes))
+    if not np.isinf(model.distance_deviation):
+        scales = (1.0 + nodes[:, SCALE]) / (1.0 + run.state.nodes[:, SCALE]) - 1.0
     places = reported[:, :2] + nodes[:, :2]
     return OdometryErrors(run.log.node_times.copy(), reported[:, YAW], nodes[:, YAW], scales, places)
 

@@ -109,7 +109,7 @@ def likely_faults(times: np.ndarray, yaws: np.ndarray, headings: np.ndarray, sca
     """Return the fault of each kind that explains most of what an odometry was wrong by. Needs the past only.
 
     times: (n,) s. yaws: (n,) rad, as reported. headings: (n,) rad, what a fit that lets the odometry err added to
-    these. scales: (n,) true over reported distances, minus 1, by the same fit.
+    these. scales: (n,) true distances over those that the run found, minus 1, by the same fit.
     """
     logs, found = np.log1p(np.maximum(scales, -0.9)), []
     for kind in FaultKind:
