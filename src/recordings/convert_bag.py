@@ -1,9 +1,9 @@
-"""The program convert_bag: writes a recording as a bag of ROS 1 that our nodes play and map_bag reads."""
+"""The program convert_bag: writes a recording as a bag of ROS 1 that our nodes play, or as an MCAP file of ROS 2."""
 
 import argparse
 import sys
 from pathlib import Path
-from typing import Any, Iterator, List, Tuple
+from typing import Any, Iterator, List, Tuple, Union
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from node_support.parameter_files import assigned_values
 from node_support.parameters import ParameterError
 from recordings.bags.bag import RecordingError
 from recordings.bags.bag_writer import BagWriter
+from recordings.bags.mcap_writer import McapWriter
 from recordings.motion.frame_tree import Link
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import MotionSource
@@ -23,6 +24,8 @@ from sonar_processing.beams.beam import Beam
 _BEAMS = f"/{topics.BEAMS}"
 _ODOMETRY = f"/{topics.ODOMETRY}"
 _TRUTH = f"/{topics.GROUND_TRUTH}"
+_MCAP = ".mcap"
+_Writer = Union[BagWriter, McapWriter]
 _Stamped = Tuple[int, str, Any]  # ns, topic and message
 
 
@@ -44,7 +47,8 @@ def convert_bag(arguments: List[str]) -> str:
     Raises ParameterError, RecordingError and OSError.
     """
     options = _parser().parse_args(arguments)
-    check_output(options.out, [options.recording], options.overwrite, ".bag")
+    ending = _MCAP if options.out.suffix == _MCAP else ".bag"
+    check_output(options.out, [options.recording], options.overwrite, ending)
     request = request_of(options, ReadingParameters.from_mapping(assigned_values(options.set)))
     content = read(options.recording, request)
     if content.motion.source is MotionSource.UNSAID:
@@ -57,12 +61,11 @@ def convert_bag(arguments: List[str]) -> str:
 
 
 def _parser() -> argparse.ArgumentParser:
-    parser = CommandLine(
-        "convert_bag", description="Write a recording of any kind as a bag of ROS 1 with /sonar/raw, /odom and tf."
-    )
+    description = "Write beams, odometry and tf of any recording as a bag of ROS 1, or as an MCAP file of ROS 2."
+    parser = CommandLine("convert_bag", description=description)
     parser.add_argument("recording", type=Path, help="a bag of ROS 1 or ROS 2, or a log or table of beams")
-    parser.add_argument("out", type=Path, help="bag to write (.bag)")
-    parser.add_argument("--overwrite", action="store_true", help="replace a bag that exists")
+    parser.add_argument("out", type=Path, help="file to write: .bag for ROS 1, .mcap for ROS 2")
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     parser.add_argument(
         "--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="mounting and angles"
     )
@@ -72,7 +75,8 @@ def _parser() -> argparse.ArgumentParser:
 
 def write_converted(path: Path, content: Content, request: Request) -> None:
     """Write beams, odometry, transforms and truth, whole or not at all. Raises OSError."""
-    with whole_file(path) as temporary, BagWriter(temporary) as bag:
+    writer = McapWriter if path.suffix == _MCAP else BagWriter
+    with whole_file(path) as temporary, writer(temporary) as bag:
         messages = [*_beams(bag, content.recorded.beams), *_motion(bag, content, request), *_truth(bag, content)]
         messages.sort(key=lambda one: one[0])
         start = messages[0][0]
@@ -81,7 +85,7 @@ def write_converted(path: Path, content: Content, request: Request) -> None:
             bag.write(topic, message, stamp_ns)
 
 
-def _beams(bag: BagWriter, beams: List[Beam]) -> Iterator[_Stamped]:
+def _beams(bag: _Writer, beams: List[Beam]) -> Iterator[_Stamped]:
     for beam in beams:
         message = _stamped(bag, "underwater_map_construction/SonarScanLine", beam.stamp_ns, beam.frame_id)
         message.angle, message.sensorAngle = beam.angle, beam.sensor_angle
@@ -91,7 +95,7 @@ def _beams(bag: BagWriter, beams: List[Beam]) -> Iterator[_Stamped]:
         yield beam.stamp_ns, _BEAMS, message
 
 
-def _motion(bag: BagWriter, content: Content, request: Request) -> Iterator[_Stamped]:
+def _motion(bag: _Writer, content: Content, request: Request) -> Iterator[_Stamped]:
     tracks, names = content.motion.tree.tracks, request.motion
     for link, track in tracks.items():
         if not track.is_fixed:
@@ -102,11 +106,11 @@ def _motion(bag: BagWriter, content: Content, request: Request) -> Iterator[_Sta
         yield from _odometry(bag, _ODOMETRY, odometry, names.odom_frame, names.base_frame)
 
 
-def _truth(bag: BagWriter, content: Content) -> Iterator[_Stamped]:
+def _truth(bag: _Writer, content: Content) -> Iterator[_Stamped]:
     return _odometry(bag, _TRUTH, content.truth, "map", "") if content.truth is not None else iter(())
 
 
-def _odometry(bag: BagWriter, topic: str, track: PoseTrack, frame: str, child: str) -> Iterator[_Stamped]:
+def _odometry(bag: _Writer, topic: str, track: PoseTrack, frame: str, child: str) -> Iterator[_Stamped]:
     for index in range(len(track)):
         stamp_ns = int(track.stamps_ns[index])
         message = _stamped(bag, "nav_msgs/Odometry", stamp_ns, frame)
@@ -115,18 +119,18 @@ def _odometry(bag: BagWriter, topic: str, track: PoseTrack, frame: str, child: s
         yield stamp_ns, topic, message
 
 
-def _fixed_links(bag: BagWriter, content: Content, stamp_ns: int) -> Any:
+def _fixed_links(bag: _Writer, content: Content, stamp_ns: int) -> Any:
     fixed = [(link, track) for link, track in content.motion.tree.tracks.items() if track.is_fixed]
     return _transforms(bag, [_transform(bag, link, track, 0, stamp_ns) for link, track in fixed])
 
 
-def _transforms(bag: BagWriter, transforms: List[Any]) -> Any:
+def _transforms(bag: _Writer, transforms: List[Any]) -> Any:
     message = bag.make("tf2_msgs/TFMessage")
     message.transforms = transforms
     return message
 
 
-def _transform(bag: BagWriter, link: Link, track: PoseTrack, index: int, stamp_ns: int) -> Any:
+def _transform(bag: _Writer, link: Link, track: PoseTrack, index: int, stamp_ns: int) -> Any:
     message = _stamped(bag, "geometry_msgs/TransformStamped", stamp_ns, link[0])
     message.child_frame_id = link[1]
     _fill(message.transform.translation, message.transform.rotation, track, index)
@@ -138,7 +142,7 @@ def _fill(place: Any, turn: Any, track: PoseTrack, index: int) -> None:
     turn.x, turn.y, turn.z, turn.w = track.rotations[index]
 
 
-def _stamped(bag: BagWriter, kind: str, stamp_ns: int, frame: str) -> Any:
+def _stamped(bag: _Writer, kind: str, stamp_ns: int, frame: str) -> Any:
     message = bag.make(kind)
     message.header.stamp, message.header.frame_id = bag.time(stamp_ns), frame
     return message

@@ -11,9 +11,10 @@ from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
 from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
+from mlsm_manager.offline.mcap_file import write_mcap
 from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text, replay_values
-from mlsm_manager.offline.run_files import REPORT, errors_of, write_run, write_summary, write_trajectory
+from mlsm_manager.offline.run_files import MCAP, PICTURE, REPORT, errors_of, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.run_reports import mission_of, summary_lines, summary_of
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.report.mission import Mission
@@ -22,6 +23,7 @@ from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import OLD_KEYS, ParameterError
 from recordings.bags.bag import RecordingError
+from recordings.bags.mcap_writer import mcap_writer
 from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import ReadingParameters, add_reading_arguments, request_of
 from recordings.survey import report, survey
@@ -62,6 +64,8 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     start = time.monotonic()
     for bag in options.bags:
         bag.stat()
+    if options.mcap:
+        mcap_writer()  # Before the work, not after it
     recording = read_recording(options.bags[0], options.request)
     for note in recording.notes:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
@@ -71,7 +75,10 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     errors = errors_of(mapped.run, mapped.recording)
     summary = summary_of(mapped, errors, time.monotonic() - start)
     write_summary(options.out, summary)
-    _write_report(options.out, mission_of(mapped, errors))
+    mission = mission_of(mapped, errors)
+    if options.mcap:
+        write_mcap(options.out / MCAP, mission, options.out / PICTURE)
+    _write_report(options.out, mission)
     return summary
 
 
@@ -135,6 +142,9 @@ def _parser() -> CommandLine:
         help="map every recording by itself, those in folders too, on all cores; goes on after a bad one, keeps maps "
         "that are there, and writes index.html",
     )  # fmt: skip
+    parser.add_argument(
+        "--mcap", action="store_true", help="write map.mcap too: standard messages of ROS 2 for Foxglove"
+    )
     parser.add_argument("--inspect", action="store_true", help="say what a bag holds, and write nothing")
     _add_solving_arguments(parser)
     parser.add_argument(

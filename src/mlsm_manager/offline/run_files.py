@@ -20,6 +20,8 @@ from recordings.bags.bag import RecordingError
 
 REFINED = "refined"
 REPORT = "report.html"
+PICTURE = "map.png"
+MCAP = "map.mcap"
 LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
 COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
@@ -67,7 +69,7 @@ def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
         level = np.pad(recording.truth.positions, ((0, 0), (0, 1)), mode="constant")
         _write_tum(folder / "truth.tum", recording.truth.times, level)
     known, uncertainty = trajectories_of(run, recording), None if run.trust is None else run.trust.uncertainty
-    draw_map(folder / "map.png", name, run.blocks, [], [*known, *run.further], known[-1], uncertainty)
+    draw_map(folder / PICTURE, name, run.blocks, [], [*known, *run.further], known[-1], uncertainty)
 
 
 def write_summary(folder: Path, summary: Dict[str, Any]) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
-from mlsm_manager.offline.run_files import REFINED, REPORT, trajectories_of
+from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, trajectories_of
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.verdict import counted
@@ -57,8 +57,7 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     if "trust" in summary:
         lines.append(summary["trust"])
     files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]
-    if (options.out / REPORT).exists():
-        files.append(REPORT)
+    files += [name for name in (REPORT, MCAP) if (options.out / name).exists()]
     return [*lines, f"in {options.out}: {' '.join(files)}"]
 
 

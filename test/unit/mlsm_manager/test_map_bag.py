@@ -13,6 +13,7 @@ from map_bag_runs import BASIN, refused, run, summary_of
 from programs import ROOT
 
 from mlsm_manager.surface_map.map_file import Layer, read_map
+from recordings.bags.bag import Bag
 
 pytestmark = pytest.mark.long
 pytest.importorskip("tf2_py")
@@ -141,7 +142,7 @@ def test_parameters_of_a_file_are_taken_and_held(tmp_path):
 def twice(tmp_path_factory):
     """Return the folder of a run with the same recording twice."""
     folder = tmp_path_factory.mktemp("twice")
-    done = run(BASIN, BASIN, "--out", folder)
+    done = run(BASIN, BASIN, "--out", folder, *(["--mcap"] if find_spec("mcap") else []))
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -153,6 +154,24 @@ def test_a_second_recording_is_found_in_the_map_of_the_first_and_adds_to_it(twic
     first, second = (np.loadtxt(str(twice / name), delimiter=",", skiprows=1) for name in TRAJECTORIES)
     assert np.hypot(*(first - second)[-20:, 4:6].T).max() < 0.5
     assert read_map(twice / "map.mlsm").shown.count.sum() > 1.8 * summary["scans"] * 50
+
+
+def test_an_mcap_file_holds_the_mission_in_messages_that_bring_their_types(twice):
+    reader = pytest.importorskip("mcap.reader")
+    with (twice / "map.mcap").open("rb") as file:
+        held = reader.make_reader(file).get_summary()
+    kinds = {held.schemas[one.schema_id].name.replace("/msg/", "/") for one in held.channels.values()}
+    assert kinds == {
+        "sensor_msgs/PointCloud2", "nav_msgs/OccupancyGrid", "sensor_msgs/CompressedImage", "nav_msgs/Path",
+        "nav_msgs/Odometry", "tf2_msgs/TFMessage", "diagnostic_msgs/DiagnosticArray",
+    }  # fmt: skip
+    assert {one.encoding for one in held.schemas.values()} == {"ros2msg"}
+    with Bag(twice / "map.mcap") as bag:
+        assert bag.topics["/scan"].count == summary_of(twice)["scans"]
+        (blocks,) = [message for _, message in bag.messages("/map/blocks")]
+        assert blocks.width == summary_of(twice)["blocks"]
+        covariances = [message.pose.covariance[[0, 7]] for _, message in bag.messages("/pose")]
+        assert np.all(np.array(covariances) > 0.0)
 
 
 def test_the_report_shows_the_way_of_each_recording(twice):

@@ -64,12 +64,13 @@ def test_what_is_missing_stands_in_place_of_a_command(tmp_path):
     assert "start with" not in told
 
 
-def test_a_converted_bag_holds_the_same_recording(tmp_path):
-    ros2 = write_mcap(BASIN, tmp_path / "basin.mcap")
-    told = convert_bag([str(ros2), str(tmp_path / "out.bag"), "--truth", "/ground_truth"])
-    assert told == f"{tmp_path / 'out.bag'}: 1202 beams; motion: poses"
+@pytest.mark.parametrize("ending", [".bag", ".mcap"])
+def test_a_converted_bag_holds_the_same_recording(tmp_path, ending):
+    ros2, out = write_mcap(BASIN, tmp_path / "basin.mcap"), tmp_path / f"out{ending}"
+    told = convert_bag([str(ros2), str(out), "--truth", "/ground_truth"])
+    assert told == f"{out}: 1202 beams; motion: poses"
     before = read_recording(BASIN, Request(truth="/ground_truth"))
-    after = read_recording(tmp_path / "out.bag", Request(truth="/ground_truth"))
+    after = read_recording(out, Request(truth="/ground_truth"))
     np.testing.assert_allclose(after.track.poses, before.track.poses, rtol=0.0, atol=1e-9)
     assert np.array_equal(after.truth.positions, before.truth.positions)
     for one, other in zip(after.beams, before.beams):
