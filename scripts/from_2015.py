@@ -30,9 +30,8 @@ goes over it. Without `thesis:=true` the defaults hold; the tables below say why
 
 ![A bag of 2015 under thesis:=true](pictures/from_2015.png)
 
-*A bag with `avora_msgs` on `/charle/sonar`, simulated, and the yaml files of 2015 but for that of `Wall2DDetector`,
-whose 0.1 m find a thick wall three times. Red: map. Yellow: `debug_cloud`. Blue: the cleaned cloud of the same scan,
-as corrected so far. Pink: walls.*
+*A simulated bag with `avora_msgs` on `/charle/sonar` and the five yaml files of 2015, by the two commands above.
+Red: map. Yellow: `debug_cloud`. Blue: the cleaned cloud of the same scan, as corrected so far. Pink: a wall.*
 
 That your bag makes a map can be tested; what fails says how far its beams came:
 

@@ -39,7 +39,7 @@ PUBLISHED = ((1.348, 0.001, 0.313), (0.851, 0.781, 0.188), (-1.197, 0.618, 0.025
 """The corrections, x and y, and errors [m] of figures 7.7 to 7.9 of the thesis."""
 THESIS_SEEDS = 10
 """Runs with thesis:=true, whose scans have a hundred times as many points."""
-_WORD = "`thesis:=true`"
+WORD = "`thesis:=true`"
 _DISPLACED = np.array([0.3, -0.2, np.radians(5.0)])
 """x y [m] and yaw by which a still scan is put beside its place."""
 AT_REST = (2, 4, 6)
@@ -94,7 +94,7 @@ def make(pictures: Pictures) -> str:
         kind: [session_scans(maker, seed, track) for seed in range(THESIS_SEEDS)] for kind, maker in makers.items()
     }
     found = {f"`{one.value}`": fixes(sessions[_SHARP][0], matching_estimator(one, ODOMETRY)) for one in MatcherName}
-    found[_WORD] = fixes(by_chain[_THESIS][0], thesis_estimator())
+    found[WORD] = fixes(by_chain[_THESIS][0], thesis_estimator())
     return joined(
         prose("""The vehicle makes the moves of the thesis in the basin: 4 m on x, 3 m on y and -8 m on x as the
         odometry sees them, and 30 % more in truth. After each move the vehicle rests for a scan, which is matched
@@ -108,7 +108,7 @@ def make(pictures: Pictures) -> str:
         noise ({THESIS_SEEDS} runs with `thesis:=true`): how many were accepted, and how far the positions were off,
         median and 95 % (of all matches where none was accepted):"""),
         table(
-            ["", *(f"`{name.value}`" for name in MatcherName), _WORD],
+            ["", *(f"`{name.value}`" for name in MatcherName), WORD],
             [
                 [
                     str(kind), *(_summary(runs, partial(matching_estimator, name, ODOMETRY)) for name in MatcherName),
@@ -118,15 +118,14 @@ def make(pictures: Pictures) -> str:
             ],
         ),
         prose(f"""The static matching of the thesis (6.5.6): a still scan that is put beside its place by 0.3 m on
-        x, -0.2 m on y and 5 degrees is matched with the map of another one. Median and greatest of
-        {THESIS_SEEDS} runs; the thesis gives no number
-        ("the expected results", 7.4):"""),
+        x, -0.2 m on y and 5 degrees is matched with the map of another one. Median and greatest of {THESIS_SEEDS} runs;
+        the thesis gives no number ("the expected results", 7.4):"""),
         table(["", "", "off by", "heading", "error"], _static_rows()),
     )  # fmt: skip
 
 
 def _static_rows() -> List[List[str]]:
-    rows = {_WORD: thesis_estimator, f"{_WORD} with cells of 0.3 m, the code's default": fine_estimator}
+    rows = {WORD: thesis_estimator, f"{WORD} with cells of 0.3 m, the code's default": fine_estimator}
     return [_static_row(kind, *row) for kind in (_SHARP, _THESIS) for row in rows.items()]
 
 

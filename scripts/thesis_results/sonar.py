@@ -8,11 +8,16 @@ import yaml
 from benchmarks.harness import ROOT, recorded_beams
 from matplotlib.axes import Axes
 
+from imagenex_852_driver.emulated_852 import Emulated852
+from imagenex_852_driver.line.parameters import HeadSettings
+from imagenex_852_driver.protocol.reply import head_angle
+from imagenex_852_driver.protocol.reply_parser import ReplyParser
 from node_support.geometry import pose_matrix
 from sonar_processing.beams.beam import Beam
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
 from sonar_simulator.rays.ray_caster import RayCaster
-from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
+from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters, WorldEchoes
+from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import STRONGEST, Pictures, Turn, draw_turn, draw_world, new_figure, to_scale
@@ -41,6 +46,13 @@ _VIEWS = (
     View("tank", (0.0, 0.0, -1.0), 10.0),
 )
 _BEAMS = 120
+_PLACE_852, _REACH_852 = (-20.0, -20.0, -2.0), 50.0
+_SETTINGS_852 = {
+    "(a) gain too high": {"max_range": 20, "start_gain_db": 36},
+    "(b) tuned": {"max_range": 30, "start_gain_db": 20},
+    "(c) tuned": {"max_range": 50, "start_gain_db": 20},
+}
+"""Of the head, beside 850 kHz (4.3.2); 20 dB is the gain at which the emulated head's echoes are as the model's."""
 
 
 def make_simulated(pictures: Pictures) -> str:
@@ -71,6 +83,40 @@ def make_simulated(pictures: Pictures) -> str:
             Left: the world from above. Figure 7.1(d) of the thesis shows a scan of `laser_cone`.""",
         ),
     )
+
+
+def make_852(pictures: Pictures) -> str:
+    """Return the section of an Imagenex 852 that is emulated byte by byte."""
+    world = load_world(ROOT / "worlds/basin.sdf").world
+    figure, (axes,) = new_figure(18.0, 4.6, 1, 1 + len(_SETTINGS_852))
+    for cell, (title, changes) in zip(axes, _SETTINGS_852.items()):
+        settings = HeadSettings(frequency_khz=850, **changes)
+        draw_turn(cell, _turn_of_852(world, settings))
+        to_scale(cell, f"{title}: {settings.max_range} m, gain {settings.start_gain_db} dB", settings.max_range)
+    model = make_echo_model("laser_cone", {"max_range": _REACH_852})
+    sonar = Sonar(RayCaster(world), SonarParameters().pattern(), model, np.random.default_rng(1))
+    angles = np.arange(_BEAMS) * 2.0 * math.pi / _BEAMS
+    poses = np.repeat(pose_matrix(_PLACE_852)[np.newaxis], _BEAMS, axis=0)
+    image = draw_turn(axes[-1], Turn(angles, sonar.pings(poses, angles), _REACH_852))
+    to_scale(axes[-1], f"(d) the simulator's laser_cone: {_REACH_852:g} m", _REACH_852)
+    figure.colorbar(image, ax=axes[-1], shrink=0.6, label="echo strength")
+    return joined(
+        prose(f"""The thesis shows its Imagenex 852 with a gain that is too high (a) and tuned (b, c). At hand is no
+        recording of it before a wall; this head is emulated: {_BEAMS} switch commands of 27 bytes go to it, and
+        its replies are read by the parser of `imagenex_852_driver`. It hears the basin with the pulse of 0.15 m of a
+        real head, 5 m before the long wall; `laser_cone` (d) has that of the thesis, 1 m."""),
+        pictures.save("imagenex_852", figure, "One turn each from one place. Compare with figure 7.1 of the thesis."),
+    )
+
+
+def _turn_of_852(world: World, settings: HeadSettings) -> Turn:
+    """Return what an emulated 852 replies during a turn, as a driver reads it."""
+    place = pose_matrix(_PLACE_852)
+    head, parser, command = Emulated852(WorldEchoes(world, lambda: place, 1)), ReplyParser(), settings.command()
+    sent = (head.receive(command.encode(), float(second)) for second in range(_BEAMS))
+    replies = [found.reply for pieces in sent for piece in pieces for found in parser.feed(piece.data)]
+    strengths = np.array([np.frombuffer(reply.echoes, np.uint8) for reply in replies])
+    return Turn(np.array([head_angle(reply.head_position) for reply in replies]), strengths, settings.max_range)
 
 
 def make_recorded(pictures: Pictures) -> str:

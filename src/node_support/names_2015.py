@@ -121,8 +121,7 @@ KEYS: List[Key] = [
         "only for `estimator: THESIS`; iterations end when the points stand still, or with a moving scan when the "
         "error rises. The yaml of 2015 has 10: a still scan that is 5 degrees off needs 40 to 150"),
     Key("MLSM_core", "errorThreshold", 0.3, "mlsm_core", "",
-        "it only ended the iterations, which end by themselves here (see above); `error_threshold` is the "
-        "greatest error of a match that is accepted"),
+        "it only ended the iterations; here `error_threshold` is the greatest error of a match that is accepted"),
     Key("MLSM_core", "nSamples", 5, "mlsm_core", "n_samples", "only for `estimator: THESIS`"),
     Key("MLSM_core", "sampleStep", 0.25, "mlsm_core", "sample_step", "as in the yaml of 2015"),
     Key("MLSM_core", "fastUpdate", False, "mlsm_core", "", "it was read and not used"),
