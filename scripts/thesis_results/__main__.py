@@ -38,11 +38,11 @@ def main() -> None:
     parser.add_argument("chosen", nargs="*", metavar="CHAPTER", help=f"chapters ({', '.join(chapters)}) or sections "
                         f"({', '.join(words)})")  # fmt: skip
     chosen: List[str] = parser.parse_args().chosen
-    unknown = set(chosen) - {*words, *chapters}
+    unknown = set(chosen) - set().union(*(section.names for section in SECTIONS))
     if unknown:
         parser.error(f"{', '.join(sorted(unknown))}: must be among {', '.join([*chapters, *words])}")
     for section in SECTIONS:
-        if not chosen or section.word in chosen or any(section.chapter.startswith(chapter) for chapter in chosen):
+        if not chosen or section.names & set(chosen):
             _write(section)
 
 

@@ -6,7 +6,7 @@ import re
 import subprocess
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Callable, Dict, Mapping, Sequence, Tuple
+from typing import Callable, Dict, Mapping, Sequence, Set, Tuple
 from xml.etree import ElementTree as ET
 
 import matplotlib as mpl
@@ -43,6 +43,11 @@ class Section:
     title: str
     make: Callable[..., str]
     recordings: Tuple[str, ...] = ()
+
+    @property
+    def names(self) -> Set[str]:
+        """What chooses it on the command line: its word, its chapter, or the chapter that this is a part of."""
+        return {self.word, self.chapter, self.chapter.split(".")[0]}
 
     @property
     def heading(self) -> str:

@@ -24,8 +24,8 @@ def serialized(message: genpy.Message) -> bytes:
     return buffer.getvalue()
 
 
-def with_old_types(source: Path, target: Path) -> None:
-    """Copy a bag, with every message of this package under its old type."""
+def with_old_types(source: Path, target: Path, beams: str = "/sonar/raw") -> None:
+    """Copy a bag, with every message of this package under its old type, and its beams on the topic `beams`."""
     old_types: Dict[str, Any] = {}
     with rosbag.Bag(str(source)) as recorded, rosbag.Bag(str(target), "w") as written:
         for topic, message, time in recorded.read_messages():
@@ -34,4 +34,4 @@ def with_old_types(source: Path, target: Path) -> None:
                 if name not in old_types:
                     old_types[name] = old_type(type(message))
                 message = old_types[name]().deserialize(serialized(message))
-            written.write(topic, message, time)
+            written.write(beams if topic == "/sonar/raw" else topic, message, time)

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""play_bag.launch maps a recording of 2015 by itself, whatever else it holds, and though the mapping stands still."""
+"""play_bag.launch maps a recording of 2015 with its yaml files and thesis:=true, though the mapping stands still."""
 
 import os
 import signal
@@ -18,7 +18,16 @@ from old_bag import with_old_types
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import PointCloud2
 
+from mlsm_manager.migrate_yaml import migrated_text
+from underwater_map_construction.msg import Wall
+
 BAG = TEST_DATA / "basin.bag"
+BEAMS = "/charle/sonar"
+FILES = {
+    "SonarToCloud": {"sonarSubscribeTopic": BEAMS, "velSubscribeTopic": "/cmd_vel", "dispersedPoints": 10},
+    "MLSM_core": {"resolution": 0.6, "maxIterations": 10, "nSamples": 2, "sampleStep": 0.1},
+}
+"""Parameters as the yaml files of 2015 have them, by the names of their nodes."""
 STOP = 2.0  # s: as a busy machine stops a process
 
 
@@ -32,11 +41,14 @@ class PlayBag(unittest.TestCase):
     def setUpClass(cls) -> None:
         cls.maps, cls.clocks = Inbox("/MLSM/cloud", PointCloud2), Inbox("/clock", Clock)
         cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
+        cls.matched, cls.walls = Inbox("/debug_cloud", PointCloud2), Inbox("/sonar/walls/coeff", Wall)
         playback = ExitStack()
         cls.addClassCleanup(playback.close)
-        old_bag = Path(playback.enter_context(TemporaryDirectory())) / "old.bag"
-        with_old_types(BAG, old_bag)
-        arguments = (f"bag:={old_bag}", "rate:=12", "matching:=true", "rviz:=false")
+        folder = Path(playback.enter_context(TemporaryDirectory()))
+        with_old_types(BAG, folder / "old.bag", BEAMS)
+        (folder / "ours.yaml").write_text(migrated_text(FILES))
+        files = f"bag:={folder / 'old.bag'}", f"parameters:={folder / 'ours.yaml'}"
+        arguments = (*files, f"beams:={BEAMS}", "thesis:=true", "rate:=12", "matching:=true", "rviz:=false")
         playback.enter_context(launched("play_bag.launch", *arguments))
         with rosbag.Bag(str(BAG)) as bag:
             cls.beams = bag.get_message_count("/sonar/raw")
@@ -47,6 +59,8 @@ class PlayBag(unittest.TestCase):
     def test_a_map_grows_and_scans_are_matched(self) -> None:
         self.fixes.wait_for_number(2)
         self.assertEqual(self.maps.wait_for(lambda cloud: cloud.width > 300).header.frame_id, "map")
+        self.assertEqual(self.matched.wait_for_number(2)[-1].header.frame_id, "map")
+        self.walls.wait_for(lambda wall: wall.distance > 1.0)
 
     def test_every_beam_is_placed_though_the_mapping_stands_still_for_two_seconds(self) -> None:
         self.diagnostics.wait_for("sonar_to_cloud", "beams placed", self.beams)
