@@ -2,6 +2,7 @@
 
 import base64
 import json
+from dataclasses import dataclass
 from enum import Enum
 from html import escape
 from pathlib import Path
@@ -40,6 +41,42 @@ class Light(Enum):
     GREY = "not measured"
 
 
+@dataclass(frozen=True)
+class _Quantity:
+    """What a client reads of a calibrated quantity.
+
+    factor: from its own unit to `unit`. more, less: what a positive and what a negative value means.
+    """
+
+    what: str
+    factor: float
+    unit: str
+    digits: int
+    more: str
+    less: str
+
+    def told(self, value: float) -> str:
+        """Return in words what was found."""
+        return f"{self.number(value)} {self.more if value >= 0.0 else self.less}"
+
+    def number(self, value: float) -> str:
+        """Return the amount with its unit."""
+        return f"{abs(value) * self.factor:.{self.digits}f} {self.unit}"
+
+
+_QUANTITIES = {
+    "range_scale_error": _Quantity(
+        "ranges of the sonar", 100.0, "%", 1, "longer than the sonar says", "shorter than the sonar says"
+    ),
+    "sonar_delay": _Quantity("beams", 1.0, "s", 2, "later than their stamps", "earlier than their stamps"),
+    "odometry_scale": _Quantity(
+        "distances of the odometry", 100.0, "%", 1, "longer than the odometry says", "shorter than the odometry says"
+    ),
+    "odometry_direction": _Quantity(
+        "direction of motion", float(np.degrees(1.0)), "degrees", 1, "to the left of what the odometry says",
+        "to the right of what the odometry says",
+    ),
+}  # fmt: skip
 _LIGHT_COLORS = {Light.GREEN: "#2e8540", Light.AMBER: "#e0a526", Light.RED: "#c0392b", Light.GREY: "#999999"}
 
 
@@ -97,10 +134,10 @@ def _calibration(mission: Mission) -> str:
     if not mission.calibration:
         return "<p>Nothing was calibrated.</p>"
     rows = [
-        (escape(name.replace("_", " ")), f"{value:+.4f}", f"{deviation:.4f}")
-        for name, (value, deviation) in mission.calibration.items()
+        (quantity.what, quantity.told(value), f"± {quantity.number(deviation)}")
+        for quantity, (value, deviation) in ((_QUANTITIES[name], found) for name, found in mission.calibration.items())
     ]
-    return _table(("quantity", "found", "standard deviation"), rows)
+    return _table(("", "in truth", "standard deviation"), rows)
 
 
 def _rejected(mission: Mission) -> str:

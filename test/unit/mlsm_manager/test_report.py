@@ -3,6 +3,7 @@
 import base64
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -75,6 +76,18 @@ class TestPage:
 
     def test_rejected_scans_are_listed_with_the_reason(self, page_of):
         assert "<td>14</td><td>too few points</td>" in page_of(mission(rejections=["too few points"]))
+
+    @pytest.mark.parametrize(
+        ("name", "value", "told"),
+        [
+            ("range_scale_error", -0.03, "ranges of the sonar</td><td>3.0 % shorter than the sonar says"),
+            ("sonar_delay", 0.98, "beams</td><td>0.98 s later than their stamps"),
+            ("odometry_scale", 0.012, "distances of the odometry</td><td>1.2 % longer than the odometry says"),
+            ("odometry_direction", -0.08, "direction of motion</td><td>4.6 degrees to the right of what"),
+        ],
+    )
+    def test_the_calibration_is_told_in_units_and_words(self, page_of, name, value, told):
+        assert f"<td>{told}" in page_of(replace(mission(), calibration={name: (value, 0.01)}))
 
     def test_distances_from_the_truth_are_told_where_there_is_one(self, page_of):
         page = page_of(mission(errors={"dead_reckoning": {"mean": 6.29, "sd": 3.0, "max": 12.8}}))
