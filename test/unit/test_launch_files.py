@@ -4,8 +4,10 @@ from pathlib import Path
 
 import pytest
 from roslaunch.arg_dump import get_args
+from roslaunch.config import load_config_default
 
-LAUNCH_FILES = sorted((Path(__file__).resolve().parents[2] / "launch").glob("*.launch"))
+LAUNCH = Path(__file__).resolve().parents[2] / "launch"
+LAUNCH_FILES = sorted(LAUNCH.glob("*.launch"))
 REQUIRED = {"play_bag": {"bag"}}
 
 
@@ -24,3 +26,25 @@ def test_only_what_must_be_given_is_listed_as_required(launch_file):
     """roslaunch lists every argument as required whose default is empty."""
     name, arguments = launch_file
     assert {key for key, (_, default) in arguments.items() if not default} == REQUIRED.get(name, set())
+
+
+def parameters(name, **arguments):
+    """Return the parameters that a launch file sets, by their full names."""
+    words = [f"{key}:={value}" for key, value in arguments.items()]
+    config = load_config_default([(str(LAUNCH / f"{name}.launch"), words)], port=None, verbose=False)
+    return {key: one.value for key, one in config.params.items()}
+
+
+@pytest.mark.parametrize("processes", ["one", "many"])
+@pytest.mark.parametrize("name", ["vehicle", "mapping", "play_bag"])
+def test_every_node_that_looks_up_the_sonar_gets_its_frame(name, processes):
+    bag = {"bag": "/none.bag"} if name == "play_bag" else {}
+    found = parameters(name, sonar_frame="ping360_link", processes=processes, **bag)
+    for node in ("mlsm_core", "line_detector", "circle_detector"):
+        assert found[f"/{node}/sonar_frame"] == "ping360_link"
+
+
+def test_a_recording_is_played_with_the_shapes_estimator_and_odometry_that_are_asked_for():
+    found = parameters("play_bag", bag="/none.bag", shapes="false", estimator="THESIS", odometry="heading")
+    assert found["/mapping/detectors"] == []
+    assert (found["/mlsm_core/estimator"], found["/mlsm_core/odometry"]) == ("THESIS", "HEADING")
