@@ -44,7 +44,8 @@ Topic names are relative, so that a namespace (`ROS_NAMESPACE`, `<group ns=...>`
 also publishes `/diagnostics`. `yaml/<node>_default.yaml` holds every parameter with its meaning and default.
 
 Parameters marked * can be changed with dynamic_reconfigure while the node runs. A value that is not allowed is
-refused, and the old value stays.
+refused, and the old value stays. `dynparam set` does not say so where it is typed: the node's log says why, and
+`rosrun dynamic_reconfigure dynparam get NODE` shows what holds.
 
 Parameters named `expert/...` are hardly ever changed. They stand under the key `expert` in yaml files and on the
 parameter server, each with the reason for its default. Keys of older versions are taken over, or left out where they

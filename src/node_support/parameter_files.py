@@ -14,9 +14,10 @@ def read_values(path: Path) -> Dict[str, Any]:
         values = yaml.safe_load(path.read_text(encoding="utf-8"))
     except OSError as error:
         raise ParameterError(f"{path}: {error.strerror}") from error
-    except (UnicodeDecodeError, yaml.YAMLError) as error:
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
+        # The library raises ValueError for dates that do not exist, RecursionError for what is nested too deeply.
         raise ParameterError(f"{path}: not yaml: {' '.join(str(error).split())}") from error
-    if not isinstance(values, Mapping):
+    if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
         raise ParameterError(f"{path}: must hold lines of KEY: VALUE")
     return dict(values)
 

@@ -110,6 +110,9 @@ class ParameterSet:
         if not isinstance(experts, Mapping):
             raise ParameterError(f"{EXPERT} = {experts!r}: must be keys and values")
         given = {**experts, **{key: value for key, value in values.items() if key != EXPERT}}
+        for key in given:
+            if not isinstance(key, str):
+                raise ParameterError(f"{key!r} = {given[key]!r}: no such parameter; names are words")
         found, remarks = {key: value for key, value in given.items() if key in known}, []
         for key in [key for key in given if key not in known]:
             if RENAMED.get(key) in known:

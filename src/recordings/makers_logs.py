@@ -9,6 +9,7 @@ import numpy as np
 from imagenex_852_driver.log_file import LogReader, timed
 from imagenex_852_driver.protocol.reply import head_angle as imagenex_angle
 from node_support.errors import RefusedInput
+from node_support.headers import check_stamp
 from ping360_driver.ping_viewer_log import NoLogError, PingViewerLog
 from ping360_driver.protocol.messages import MessageError, MessageId, MessageStream, PingMessage
 from ping360_driver.protocol.replies import Beam as HeadBeam
@@ -152,7 +153,8 @@ def _beam_messages(log: PingViewerLog, stream: MessageStream) -> Iterator[Tuple[
 
 
 def _beam_of(found: HeadBeam, time: float) -> Beam:
-    """Return what the head sent at `time` [s]. Raises RefusedInput where it holds no echoes."""
+    """Return what the head sent at `time` [s]. Raises RefusedInput where it holds no echoes, or at no time of ROS."""
     stamp = max(round(time * 1e9), 1)
+    check_stamp(stamp)
     resolution = bin_length(found.pulse.sample_period, USUAL_SPEED_OF_SOUND)
     return Beam(stamp, _FRAME, ping360_angle(found.angle), np.frombuffer(found.echoes, dtype=np.uint8), resolution)

@@ -18,7 +18,7 @@ from ping360_driver.protocol.messages import MessageError, MessageId
 from ping360_driver.protocol.replies import Beam as HeadBeam
 from ping360_driver.protocol.replies import beam as head_beam
 from recordings.bags.bag import RecordingError
-from recordings.motion.pose_track import PoseTrack
+from recordings.motion.pose_track import LATEST_NS, PoseTrack
 
 _MAGIC = b"\x89MCAP0\r\n"
 _ROS2 = b"ros2"
@@ -73,7 +73,7 @@ def vehicle_headings(path: Path) -> Optional[PoseTrack]:
     stamps, rotations = [], []
     for _, time_ns, content in _messages(path, "VehicleData"):
         angles = [content.get(name) for name in ("roll", "pitch", "yaw")]
-        if all(isinstance(angle, (int, float)) for angle in angles):
+        if time_ns < LATEST_NS and all(isinstance(angle, (int, float)) for angle in angles):
             stamps.append(time_ns)
             rotations.append(quaternion_of(pose_matrix((0.0, 0.0, 0.0), angles)))
     if not stamps:
@@ -106,7 +106,6 @@ def _messages(path: Path, name: str) -> Iterator[Tuple[str, int, Dict[str, Any]]
 
 def _records(path: Path) -> Iterator[Tuple[str, int, bytes]]:
     try:
-        from mcap.exceptions import McapError
         from mcap.records import Channel, Message
         from mcap.stream_reader import StreamReader
     except ImportError:
@@ -119,7 +118,8 @@ def _records(path: Path) -> Iterator[Tuple[str, int, bytes]]:
                     channels[record.id] = record.topic
                 elif isinstance(record, Message):
                     yield channels[record.channel_id], record.log_time, record.data
-    except (McapError, KeyError, struct.error):
-        return
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from None
+    except Exception:
+        # The library raises almost any error where the file is damaged or was cut off.
+        return

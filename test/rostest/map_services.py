@@ -83,6 +83,13 @@ class MapServices(unittest.TestCase):
         self.assertTrue(answer.success, answer.message)
         self.assertEqual([self._blocks_around(place) for place in (0.0, 5.0, 9.0)], [1, 1, 0])
 
+    def test_a_region_without_inside_is_refused_and_the_largest_is_the_whole_map(self) -> None:
+        region = rospy.ServiceProxy("/mlsm_core/get_region", GetRegion)
+        for low, high in ((1e300, -1e300), (float("nan"), 1.0)):
+            with self.assertRaisesRegex(rospy.ServiceException, "must be numbers, low not above high"):
+                region(Point(low, 0.0, 0.0), Point(high, 1.0, 1.0))
+        self.assertGreater(region(Point(-1e300, -1e300, -1e300), Point(1e300, 1e300, 1e300)).cloud.width, 0)
+
     def _blocks_around(self, place: float) -> int:
         """Return how many blocks get_region finds within a metre of a place on the diagonal."""
         region = rospy.ServiceProxy("/mlsm_core/get_region", GetRegion)

@@ -10,6 +10,7 @@ import numpy as np
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, inverse, matrices, transformed
+from node_support.headers import DAY
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
@@ -24,6 +25,7 @@ from sonar_processing.scans.polar_scan import PolarScan
 
 # s of odometry around the end of a scan: the slowest turn of a head, and the largest sonar_delay.
 _BEFORE, _AFTER = 60.0, 10.0
+_DAY_NS = round(DAY * 1e9)
 
 
 @dataclass(frozen=True)
@@ -177,16 +179,18 @@ def read_recording(path: Path, request: Request) -> Recording:
     if not stamps.size:
         # A vehicle that never moves may have fixed transforms only.
         stamps = np.unique(recorded.stamps_ns)
-    track = _track(tree, stamps, path, request)
+    track = _track(tree, stamps, np.sort(recorded.stamps_ns), path, request)
     placed, unplaced = _placed(recorded, tree, path, request)
     known = content.truth
     truth = None if known is None else Truth(known.stamps_ns * 1e-9, known.translations[:, :2])
     return Recording(placed, recorded.refused + unplaced, track, truth, content.notes)
 
 
-def _track(tree: FrameTree, stamps: np.ndarray, path: Path, request: Request) -> Track:
+def _track(tree: FrameTree, stamps: np.ndarray, near_ns: np.ndarray, path: Path, request: Request) -> Track:
+    """Return T_odom_base at those of `stamps` [ns] that are within a day of `near_ns`; others are damaged."""
     frames = request.motion.odom_frame, request.motion.base_frame
     poses, known = tree.poses(*frames, stamps)
+    known &= (stamps >= near_ns[0] - _DAY_NS) & (stamps <= near_ns[-1] + _DAY_NS)
     if np.count_nonzero(known) < 2:
         reason = tree.why_not(*frames, stamps) or "a single stamp"
         raise RecordingError(f"{path}: no odometry, tf from {frames[1]} to {frames[0]}: {reason}")

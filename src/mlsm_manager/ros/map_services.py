@@ -70,6 +70,9 @@ class MapServices:
 
     def _get_region(self, request: srv.GetRegionRequest) -> srv.GetRegionResponse:
         low, high = (np.array([corner.x, corner.y, corner.z]) for corner in (request.low, request.high))
+        if not (low <= high).all():
+            corners = f"low {low.tolist()}, high {high.tolist()}"
+            raise rospy.ServiceException(f"{corners}: must be numbers, low not above high")
         free = self._localiser.free.in_box(low, high) if self._parameters.cloud_free else None
         cloud = map_cloud(
             self._localiser.region(low, high), free, rospy.Time.now().to_nsec(), self._parameters.map_frame

@@ -48,9 +48,12 @@ class MultiLevelSurfaceMap:
     def in_box(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return a copy of the blocks whose mean lies between `low` and `high`, (2,) x y or (3,) x y z [m].
 
+        None where a corner is no number or `low` is above `high`.
         The blocks come in the order in which `blocks` has them. The cost is that of the cells in the box.
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
+        if not (low <= high).all():
+            return self._store.blocks(np.empty(0, dtype=np.int64), self.resolution)
         first, last = cells_of(np.clip([low, high], -self.limit, self.limit), self.resolution)
         return self._in_cells(first, last).in_box(low, high)
 

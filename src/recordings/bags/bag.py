@@ -21,6 +21,14 @@ from recordings.bags.message_types import defined_in, ros2_types
 _LONE_FILES = (".mcap", ".db3")
 _METADATA, _INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
 _NEWEST_VERSION = 8  # of metadata that rosbags 0.9.23 reads; ROS 2 Jazzy writes 9
+_PACKED = (
+    (b"\x1f\x8b", "gzip", "gunzip --keep"),
+    (b"BZh", "bzip2", "bunzip2 --keep"),
+    (b"PK\x03\x04", "zip", "unzip"),
+    (b"\xfd7zXZ", "xz", "unxz --keep"),
+    (b"\x28\xb5\x2f\xfd", "zstd", "zstd -d"),
+)
+"""First bytes, program and command of packed files."""
 _TopicCount = Tuple[str, str, int]
 
 
@@ -48,6 +56,8 @@ class Bag:
         with _in_one_line(path), ExitStack() as stack:
             self._reader = _reader(path, stack)
             stack.enter_context(self._reader)
+            self.topics = _topics(self._reader.connections)
+            """All topics by their names."""
             self._open = stack.pop_all()
 
     def __enter__(self) -> "Bag":
@@ -60,17 +70,6 @@ class Bag:
     def is_ros2(self) -> bool:
         """Whether it was recorded with ROS 2."""
         return isinstance(self._reader, Ros2Reader)
-
-    @property
-    def topics(self) -> Dict[str, Topic]:
-        """All topics by their names."""
-        topics: Dict[str, Topic] = {}
-        for connection in self._reader.connections:
-            before = topics[connection.topic].count if connection.topic in topics else 0
-            topics[connection.topic] = Topic(
-                connection.topic, connection.msgtype.replace("/msg/", "/"), before + connection.msgcount
-            )
-        return topics
 
     def messages(self, topic: str) -> Iterator[Tuple[int, Any]]:
         """Yield (time of recording [ns], message) of one topic, in the order of these times; none without the topic.
@@ -105,6 +104,14 @@ class Bag:
         if key not in self._stores:
             self._stores[key] = defined_in(connection.msgdef, connection.msgtype)
         return self._stores[key]
+
+
+def _topics(connections: Iterable[Connection]) -> Dict[str, Topic]:
+    topics: Dict[str, Topic] = {}
+    for one in connections:
+        before = topics[one.topic].count if one.topic in topics else 0
+        topics[one.topic] = Topic(one.topic, one.msgtype.replace("/msg/", "/"), before + one.msgcount)
+    return topics
 
 
 def missing_topic(topic: str, bags: Iterable[Bag]) -> RecordingError:
@@ -215,11 +222,28 @@ def _in_one_line(path: Path) -> Iterator[None]:
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     except Exception as error:
-        if "not indexed" in str(error):
-            advice = f"not indexed, the recording was cut off; run: rosbag reindex {path}"
-            raise RecordingError(f"{path}: {advice}") from None
+        advice = _advice(path, str(error))
+        if advice:
+            raise RecordingError(f"{path}: {advice}{_files_instead(path)}") from None
         detail = " ".join(str(error).split()) or type(error).__name__
         raise RecordingError(f"{path}: not a bag, or damaged: {detail}{_files_instead(path)}") from None
+
+
+def _advice(path: Path, error: str) -> str:
+    """Return what a file is that rosbags refused with `error`, and how to get at its messages; empty: not known."""
+    if path.is_dir():
+        is_whole = (path / _METADATA).exists()
+        return "" if is_whole else f"no {_METADATA}, the recording was not ended; run: ros2 bag reindex {path}"
+    with path.open("rb") as file:
+        start = file.read(8)
+    for magic, packer, unpack in _PACKED:
+        if start.startswith(magic):
+            return f"packed with {packer}; unpack it first: {unpack} {path}"
+    if any(sign in error for sign in ("not indexed", "index looks damaged")):
+        return f"not indexed, the recording was cut off; run: rosbag reindex {path}"
+    if "end magic" in error:
+        return f"the recording was cut off; run: mcap recover {path} -o recovered.mcap"
+    return ""
 
 
 def _files_instead(path: Path) -> str:

@@ -8,7 +8,7 @@ import numpy as np
 
 from recordings.bags.bag import RecordingError
 from recordings.motion.frame_tree import FrameTree
-from recordings.motion.pose_track import PoseTrack
+from recordings.motion.pose_track import FARTHEST, PoseTrack
 from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, linked
 
 COLUMNS = {
@@ -23,6 +23,7 @@ COLUMNS = {
 }
 """Columns that are read, by the names in the first line; others are left out."""
 
+_GREATEST = {"time": 2.0**31}  # s: from there on ROS 1 has no stamps
 _SUFFIXES = (".csv", ".txt", ".tsv")
 _HEADINGS = ("yaw", "yaw_deg", "heading_deg")
 
@@ -95,6 +96,6 @@ def _number(path: Path, line: int, row: List[str], index: int, name: str) -> flo
         value = float(text)
     except ValueError:
         value = np.nan
-    if not np.isfinite(value):
+    if not abs(value) <= _GREATEST.get(name, FARTHEST):
         raise RecordingError(f"{path}, line {line}: {name} = {text!r}, must be a number")
     return value

@@ -6,6 +6,8 @@ import numpy as np
 
 from node_support.geometry import quaternion_of, rotation_matrices
 
+FARTHEST = 1e8  # m from the origin: beyond all coordinates of maps; what is farther was never measured
+LATEST_NS = 2**31 * 10**9  # from there on ROS has no stamps
 _NORMS = (0.5, 2.0)  # of quaternions; a norm outside says that something else than a rotation was written
 
 
@@ -25,12 +27,16 @@ class PoseTrack:
     def sorted_from(cls, stamps_ns: np.ndarray, translations: np.ndarray, rotations: np.ndarray) -> "PoseTrack":
         """Return the track of n poses in any order; of several with one stamp the first counts, as in tf2.
 
-        Those that are not finite or no rotation are left out; the track may then be empty.
+        Those that are farther than `FARTHEST`, at no time of ROS, not finite or no rotation are left out; the track
+        may then be empty.
         """
         rotations = _normalized(np.asarray(rotations, dtype=np.float64).reshape(-1, 4))
         translations = np.asarray(translations, dtype=np.float64).reshape(-1, 3)
-        valid = np.isfinite(rotations).all(axis=1) & np.isfinite(translations).all(axis=1)
-        kept, first = np.unique(np.asarray(stamps_ns, dtype=np.int64)[valid], return_index=True)
+        with np.errstate(invalid="ignore"):
+            valid = np.isfinite(rotations).all(axis=1) & (np.abs(translations) <= FARTHEST).all(axis=1)
+        stamps_ns = np.asarray(stamps_ns, dtype=np.int64)
+        valid &= (stamps_ns > -LATEST_NS) & (stamps_ns < LATEST_NS)
+        kept, first = np.unique(stamps_ns[valid], return_index=True)
         return cls(kept, translations[valid][first], rotations[valid][first])
 
     @classmethod

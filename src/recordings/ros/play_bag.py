@@ -93,6 +93,8 @@ class BagPlayer:
                 return
             self._publishers[played.topic].publish(played.message)
             self._health.count("messages")
+        seconds = self._messages[-1].time - start
+        rospy.loginfo("%s has ended after %.0f s; the map stays, Ctrl-C ends it", self._options.bag, seconds)
         self._ended.wait(LAST_MESSAGES_ARRIVE)
         rospy.signal_shutdown("the bag has ended")
 

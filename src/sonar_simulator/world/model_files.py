@@ -8,12 +8,13 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from sonar_simulator.world.primitives import Mesh
-from sonar_simulator.world.world import MissingPackageError, WorldError
+from sonar_simulator.world.world import FARTHEST, MissingPackageError, WorldError
 
 PATH_VARIABLES = (
     "GAZEBO_MODEL_PATH", "SDF_PATH", "GAZEBO_RESOURCE_PATH", "GZ_SIM_RESOURCE_PATH", "IGN_GAZEBO_RESOURCE_PATH",
 )  # fmt: skip
 _HOME_MODELS = "~/.gazebo/models"
+_GREATEST = 1e30  # of a file's own unit: what is greater overflows when it is squared, or has done so already
 _NEWEST = (1, 7)  # Newest version of SDF that is read
 
 
@@ -110,7 +111,9 @@ def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
     except ImportError as error:
         raise MissingPackageError("reads meshes", "trimesh pycollada", error) from error
     try:
-        scene = trimesh.load(str(path), force="scene", process=False)
+        # numpy's warnings are of numbers that are refused below.
+        with np.errstate(all="ignore"):
+            scene = trimesh.load(str(path), force="scene", process=False)
     except OSError as error:
         raise WorldError(f"{path}: {error.strerror or error}") from error
     except Exception as error:
@@ -122,9 +125,18 @@ def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
         T_scene_node, name = scene.graph[node]
         geometry = scene.geometry[name]
         if len(getattr(geometry, "faces", ())):
-            corners = np.asarray(geometry.vertices) @ T_scene_node[:3, :3].T + T_scene_node[:3, 3]
+            corners = _corners(path, geometry.vertices) @ T_scene_node[:3, :3].T + T_scene_node[:3, 3]
             parts.append((name, corners, np.asarray(geometry.faces)))
     return parts
+
+
+def _corners(path: Path, vertices: np.ndarray) -> np.ndarray:
+    corners = np.asarray(vertices, dtype=np.float64)
+    if corners.ndim != 2 or corners.shape[1] != 3:
+        raise WorldError(f"{path}: a vertex has {corners.shape[-1]} coordinates, must have 3")
+    if not (np.abs(corners) < _GREATEST).all():
+        raise WorldError(f"{path}: a vertex is not finite")
+    return corners
 
 
 def _to_metres_z_up(path: Path) -> np.ndarray:
@@ -157,6 +169,6 @@ def _checked(path: Path, vertices: np.ndarray, faces: np.ndarray) -> Mesh:
         raise WorldError(f"{path}: no triangle in it")
     if faces.max() >= len(vertices) or faces.min() < 0:
         raise WorldError(f"{path}: a triangle names a vertex that is not there")
-    if not np.isfinite(vertices).all():
-        raise WorldError(f"{path}: a vertex is not finite")
+    if not (np.abs(vertices) <= FARTHEST).all():
+        raise WorldError(f"{path}: a vertex is farther than {FARTHEST:g} m from the origin")
     return vertices, faces

@@ -10,7 +10,15 @@ import numpy as np
 
 from node_support.geometry import pose_matrix
 from sonar_simulator.world.model_files import load_mesh, resolve
-from sonar_simulator.world.world import DEFAULT_MATERIAL, MATERIALS, Colour, Material, Shape, material_of_reflection
+from sonar_simulator.world.world import (
+    DEFAULT_MATERIAL,
+    FARTHEST,
+    MATERIALS,
+    Colour,
+    Material,
+    Shape,
+    material_of_reflection,
+)
 
 _SCOPE_ITSELF = ("", "__model__", "__root__", "world")
 _NAMED = ("model", "link", "frame", "joint", "include")
@@ -64,13 +72,13 @@ def own_pose(element: Element) -> np.ndarray:
 
 
 def numbers(element: Element, count: int) -> Tuple[float, ...]:
-    """Return the numbers in an element's text. Raises ValueError unless they are `count` finite numbers."""
+    """Return the numbers in an element's text. Raises ValueError unless they are `count` ones up to `FARTHEST`."""
     words = (element.text or "").split()
     try:
         found = tuple(float(word) for word in words)
     except ValueError:
         found = ()
-    if len(found) != count or not all(math.isfinite(number) for number in found):
+    if len(found) != count or not all(abs(number) <= FARTHEST for number in found):
         raise ValueError(f"<{element.tag}> is {' '.join(words)!r}, must be {count} number{'s' * (count > 1)}")
     return found
 

@@ -23,6 +23,8 @@ class MissingPackageError(WorldError):
         super().__init__(f"{reason}: it {purpose}; install it: {sys.executable} -m pip install {package}")
 
 
+FARTHEST = 1e6
+"""m from the origin: no surface may be farther, for rays are cast with float32."""
 Colour = Tuple[float, float, float, float]
 
 

@@ -1,5 +1,6 @@
 """Bags of every kind give the same messages, and damaged ones one line."""
 
+import gzip
 import shutil
 from itertools import islice
 from pathlib import Path
@@ -160,6 +161,19 @@ def test_a_folder_of_ros_2_jazzy_is_read(tmp_path):
     (folder / "metadata.yaml").write_text(yaml.safe_dump(metadata))
     with Bag(folder) as bag:
         assert sum(1 for _ in bag.messages("/sonar/raw")) == bag.topics["/sonar/raw"].count > 0
+
+
+def test_what_cannot_be_opened_says_how_to_get_at_its_messages(tmp_path):
+    folder, mcap = write_sqlite_bag(BASIN, tmp_path / "folder"), write_mcap(BASIN, tmp_path / "cut.mcap")
+    (folder / "metadata.yaml").unlink()
+    mcap.write_bytes(mcap.read_bytes()[:-5000])
+    (tmp_path / "packed.bag.gz").write_bytes(gzip.compress(BASIN.read_bytes()))
+    (tmp_path / "cut.bag").write_bytes(BASIN.read_bytes()[:60_000])
+    said = {path.name: refusal(path) for path in tmp_path.iterdir()}
+    assert f"run: ros2 bag reindex {folder}; a file of it may open by itself: {folder}/folder.db3" in said["folder"]
+    assert f"the recording was cut off; run: mcap recover {mcap} -o recovered.mcap" in said["cut.mcap"]
+    assert "packed with gzip; unpack it first: gunzip --keep" in said["packed.bag.gz"]
+    assert "the recording was cut off; run: rosbag reindex" in said["cut.bag"]
 
 
 def test_a_folder_that_is_damaged_is_refused_with_the_file_that_may_open(tmp_path):

@@ -1,0 +1,1 @@
+"""Damaged files of every kind that is read, and the programs that read them."""
