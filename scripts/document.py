@@ -22,6 +22,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameter_text import default_yaml, markdown_table, start_up_yaml
 from node_support.parameters import EXPERT, ParameterSet, config_name
+from node_support.thin_queue import ThinLinkParameters
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
 from sonar_processing.filters.stage_table import STAGES
@@ -107,6 +108,7 @@ LIVE_NODES: Dict[str, Type[ParameterSet]] = {
 START_UP_NODES: Dict[str, Type[ParameterSet]] = {
     "sonar_simulator": SimulatorParameters,
     "gazebo_sonar": gazebo_beams.GazeboSonarParameters,
+    "thin_link": ThinLinkParameters,
 }
 """Nodes that read their parameters only when they start."""
 
@@ -116,7 +118,7 @@ def generated() -> Dict[Path, str]:
     texts = {
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, parameters) for name, parameters in LIVE_NODES.items()
     }
-    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS}
+    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS, "thin_link": {}}
     for name, parameters in START_UP_NODES.items():
         texts[ROOT / f"yaml/{name}_default.yaml"] = start_up_yaml(name, parameters, groups[name])
     for kind in OdometryKind:

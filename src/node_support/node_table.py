@@ -240,6 +240,24 @@ NODES: Dict[str, NodeDescription] = {
             _serves("~get_region", "GetRegion", "returns the blocks in a box, as they are on `MLSM/cloud`"),
         ),
     ),
+    "thin_link": NodeDescription(
+        "Sends fixes, the map and little else to a topside behind a link of few bytes a second, each as the newest "
+        "there is. See [a thin link](tutorial_at_sea.md#a-thin-link).",
+        (
+            _subscribes(topics.MATCHED_POSE, "geometry_msgs/PoseWithCovarianceStamped", "fixes"),
+            _publishes(f"thin/{topics.MATCHED_POSE}", "geometry_msgs/PoseWithCovarianceStamped", "each fix, at once"),
+            _subscribes(topics.MAP_MARKERS, "visualization_msgs/MarkerArray", "tiles of the map that changed"),
+            _publishes(
+                f"thin/{topics.MAP_MARKERS}", "visualization_msgs/MarkerArray", "the same, at the pace of the link"
+            ),
+            _subscribes(topics.MATCHED_PATH, "nav_msgs/Path", "all fixes"),
+            _publishes(f"thin/{topics.MATCHED_PATH}", "nav_msgs/Path", "about a hundred of them, now and then"),
+            _subscribes(topics.IMAGE, "sensor_msgs/Image", "the sonar's beams as a picture"),
+            _publishes(f"thin/{topics.IMAGE}", "sensor_msgs/Image", "a picture of few pixels, now and then"),
+            _subscribes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "what every node tells of itself"),
+            _publishes("thin/diagnostics", "diagnostic_msgs/DiagnosticArray", "the same, now and then"),
+        ),
+    ),
     "thesis_topics": NodeDescription(
         "Offers topics and a service under their names of 2015; `thesis:=true` starts it. See "
         "[from 2015](from_2015.md#topics).",

@@ -4,12 +4,12 @@
 import shutil
 import unittest
 from pathlib import Path
-from typing import List
+from typing import Dict, List, Set, Tuple
 
 import numpy as np
 import rospy
 from geometry_msgs.msg import Point
-from graph import Inbox, run
+from graph import Inbox, run, wait_until
 from messages import publisher, still_cloud
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap
@@ -20,6 +20,19 @@ from visualization_msgs.msg import Marker, MarkerArray
 from mlsm_manager.surface_map.map_file import read_map
 from underwater_map_construction.msg import StampedIntensityCloud
 from underwater_map_construction.srv import GetRegion, LoadMap, SaveMap
+
+
+def shown(arrays: List[MarkerArray]) -> Set[Tuple[float, float, float]]:
+    """Return the places of the blocks that rviz shows after these messages."""
+    markers: Dict[Tuple[str, int], Marker] = {}
+    for marker in (marker for array in arrays for marker in array.markers):
+        if marker.action == Marker.DELETEALL:
+            markers.clear()
+        elif marker.action == Marker.DELETE:
+            markers.pop((marker.ns, marker.id), None)
+        else:
+            markers[marker.ns, marker.id] = marker
+    return {(point.x, point.y, point.z) for marker in markers.values() for point in marker.points}
 
 
 class MapServices(unittest.TestCase):
@@ -53,6 +66,15 @@ class MapServices(unittest.TestCase):
         self.assertAlmostEqual(min(bottoms), 0.0, places=5)
         self.assertEqual(sum(len(marker.points) for marker in horizontal), 1)
         self.assertNotEqual(vertical[0].color, horizontal[0].color)
+
+    def test_the_thin_link_shows_the_same_blocks_also_after_another_map_and_to_who_comes_late(self) -> None:
+        whole, thin = Inbox("/MLSM/Markers", MarkerArray), Inbox("/thin/MLSM/Markers", MarkerArray)
+        wait_until(lambda: shown(thin.messages) == shown(whole.messages) != set(), told="not the same blocks")
+        rospy.ServiceProxy("/mlsm_core/reset_map", Trigger)()
+        wait_until(lambda: shown(thin.messages) == shown(whole.messages) == set(), told="not empty")
+        whole.close()
+        thin.close()
+        self.setUpClass()
 
     def test_map_to_odom_comes_steadily_and_never_twice_with_one_stamp(self) -> None:
         """20 times a second, as soon as the machine lets two seconds pass at that rate."""
