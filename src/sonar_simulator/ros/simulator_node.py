@@ -3,7 +3,7 @@
 import itertools
 import math
 import threading
-from typing import Iterable, Iterator
+from typing import Iterator
 
 import numpy as np
 import rospy
@@ -27,7 +27,6 @@ START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still abo
 _WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
 _LISTENER_TIME = 0.5  # s: who subscribes to the beams has told the master its other topics within this time
 _LONGEST_START = 10.0  # s: who is not connected by then has ended
-_REST = 5.0  # s of the clock after the last beam: transforms of it arrive, and no node yet misses the next turn
 _LONGEST_WAIT = 10.0  # s: of the wall clock for echoes that are overdue; who needs longer has ended
 
 
@@ -104,14 +103,9 @@ class Simulator:
         while self._play(moments, pace):
             self._publisher.publish_progress(self._now / simulation.duration)
         self._publisher.publish_progress(1.0)
-        first = math.floor(self._now * rate) + 1
-        ticks: Iterable[int] = itertools.count(first)
-        if self._true_sonar is None:
-            # Nobody is heard any more; a clock that goes on would make every node warn of that.
-            ticks = range(first, first + math.ceil(_REST * rate))
         name = self.health.name
         rospy.loginfo("%s: the moves have ended after %.0f s; the map stays, Ctrl-C ends it", name, self._now)
-        rest = (simulation.moment(tick / rate) for tick in ticks)
+        rest = (simulation.moment(tick / rate) for tick in itertools.count(math.floor(self._now * rate) + 1))
         while self._play(rest, pace):
             pass
 
