@@ -18,12 +18,13 @@ ALLOWED = {
     "node_support": set(),
     "autopilot_link": {"node_support", "sonar_driver"},
     "dead_reckoning": {"node_support"},
+    "georeferencing": {"node_support"},
     "sonar_driver": {"node_support"},
     "imagenex_852_driver": {"node_support", "sonar_driver"},
     "ping360_driver": {"node_support", "sonar_driver"},
     "sonar_processing": {"node_support"},
     "recordings": {"dead_reckoning", "imagenex_852_driver", "node_support", "ping360_driver", "sonar_processing"},
-    "mlsm_manager": {"node_support", "recordings", "sonar_processing"},
+    "mlsm_manager": {"georeferencing", "node_support", "recordings", "sonar_processing"},
     "sonar_simulator": {"node_support", "recordings", "sonar_processing"},
 }
 ROS_NAMES = {

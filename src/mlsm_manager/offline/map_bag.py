@@ -7,6 +7,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, Dict, List
 
+from georeferencing.chart_files import write_chart
+from georeferencing.origin import Origin
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
@@ -18,6 +20,7 @@ from mlsm_manager.offline.run_files import MCAP, PICTURE, REPORT, errors_of, wri
 from mlsm_manager.offline.run_reports import mission_of, summary_lines, summary_of
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.report.mission import Mission
+from node_support.errors import RefusedInput
 from node_support.files import make_folder, write_whole
 from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
@@ -87,6 +90,8 @@ def _write_results(mapped: MappedBag, options: Namespace) -> None:
     write_run(options.out, mapped.title, mapped.run, mapped.recording)
     for number, session in enumerate(mapped.sessions, start=2):
         write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
+    if options.origin is not None:
+        write_chart(options.out, mapped.title, options.origin, mapped.run.times, mapped.run.best)
     live = live_text(mapped.parameters, options.odom_frame, options.base_frame, options.chain)
     write_whole(options.out / "live.yaml", live.encode())
 
@@ -150,12 +155,24 @@ def _parser() -> CommandLine:
     parser.add_argument(
         "--parameters", type=Path, metavar="FILE", help="yaml file, such as a live.yaml; --set overrides it"
     )
+    parser.add_argument(
+        "--origin", type=_origin, metavar="PLACE",
+        help="write the path for charts: where the map's origin is and its x axis points, in degrees, clockwise from "
+        'north, 90 where it is left out: "41.2, 3.1, azimuth 12"',
+    )  # fmt: skip
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
     parser.add_argument(
         "--scheduler", metavar="ADDRESS", help="with --each: a running Dask cluster whose workers map the recordings"
     )
     return parser
+
+
+def _origin(text: str) -> Origin:
+    try:
+        return Origin.parsed(text)
+    except RefusedInput as refused:
+        raise argparse.ArgumentTypeError(str(refused)) from refused
 
 
 def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:

@@ -5,6 +5,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
+from georeferencing.chart_files import CHART_FILES
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
@@ -57,7 +58,7 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     if "trust" in summary:
         lines.append(summary["trust"])
     files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]
-    files += [name for name in (REPORT, MCAP) if (options.out / name).exists()]
+    files += [name for name in (REPORT, MCAP, *CHART_FILES) if (options.out / name).exists()]
     return [*lines, f"in {options.out}: {' '.join(files)}"]
 
 

@@ -1,0 +1,1 @@
+"""Where the map lies on the Earth, and the files of charts."""
