@@ -16,7 +16,7 @@ _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not t
 _SLIP_TOLD = np.radians(15.0)  # what half a run's scans tell to three deviations
 _NATS, _SLIP_NATS = 12.0, 6.0  # evidence from which on a cause is named; of a slip both sides must agree besides
 _ARM_NATS = 5.0  # an arm shows only in turns; no unbroken run had 5 nats for one above a metre
-_ONE_SIDE = 8  # pairs of scans before and after a slip
+_ONE_SIDE = 8  # scans before and after a slip that begin a pair: of fewer an unbroken run has had a slip by chance
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 
 
@@ -96,10 +96,15 @@ def _slipped(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
     common, best = table[int(table.mean(axis=1).argmin())], None
     for moment in np.unique(times[:, 1]):
         sides = times[:, 1] <= moment, times[:, 0] >= moment - 1.0
-        if min(np.count_nonzero(side) for side in sides) < _ONE_SIDE:
+        scans = [len(np.unique(times[side, 0])) for side in sides]
+        if min(scans) < _ONE_SIDE:
             continue
         rows = [int(table[:, side].mean(axis=1).argmin()) for side in sides]
-        nats = [evidence_of(common[side] - table[row, side]).nats for row, side in zip(rows, sides)]
+        # Pairs that share a scan tell the same: what counts is the number of scans.
+        nats = [
+            evidence_of(common[side] - table[row, side]).nats * number / np.count_nonzero(side)
+            for row, side, number in zip(rows, sides, scans)
+        ]
         slip = float(turns[rows[1]] - turns[rows[0]])
         if abs(slip) > _SLIP_TOLD and (best is None or sum(nats) > best.nats):
             best = _Slip(float(sum(nats)), float(moment), slip)
