@@ -4,7 +4,7 @@
 import unittest
 
 import numpy as np
-from graph import Diagnostics, Inbox, run, wait_for_links
+from graph import Diagnostics, Inbox, rows, run, wait_for_links
 from messages import publisher, still_cloud
 from sensor_msgs.msg import PointCloud2
 
@@ -101,7 +101,7 @@ class BadClouds(unittest.TestCase):
     def test_7_a_good_cloud_still_goes_all_the_way(self) -> None:
         self.map.wait_for_link()
         self.inputs["thresholder"].publish(still_cloud(wall() + np.float32([100, 0, 0, 0])))
-        self.map.wait_for(lambda cloud: np.any(np.frombuffer(cloud.data, np.float32).reshape(-1, 7)[:, 0] > 99.0))
+        self.map.wait_for(lambda cloud: np.any(rows(cloud)[:, 0] > 99.0))
 
     def test_8_ten_scans_in_a_row_that_lose_every_point_are_noticed(self) -> None:
         """Otsu times 1.4 lies above the strongest echo here."""

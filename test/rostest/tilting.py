@@ -6,7 +6,7 @@ import unittest
 
 import numpy as np
 import rospy
-from graph import PATIENCE, Diagnostics, Inbox, run
+from graph import PATIENCE, Diagnostics, Inbox, rows, run
 from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float64, UInt32
 
@@ -35,8 +35,7 @@ def whole_scans(beams: Inbox) -> list:
 
 def points_on_floor(cloud: PointCloud2) -> int:
     """Return how many points of a map are within 0.5 m of the floor."""
-    points = np.frombuffer(cloud.data, np.float32).reshape(-1, 7)
-    return np.count_nonzero(np.abs(points[:, 2] - FLOOR) < 0.5)
+    return np.count_nonzero(np.abs(rows(cloud)[:, 2] - FLOOR) < 0.5)
 
 
 def sent(commands: Inbox) -> list:

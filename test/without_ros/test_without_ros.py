@@ -42,7 +42,7 @@ def test_every_core_can_be_imported(tmp_path):
 
 def test_a_simulated_bag_becomes_a_map_that_can_be_looked_at(bag, tmp_path):
     told = run("map_bag", bag, "--out", "map", "--no-calibrate", "--truth", "/ground_truth", folder=tmp_path)
-    assert "3 scans" in told
+    assert "4 scans" in told
     assert json.loads((tmp_path / "map/summary.json").read_text())["corrected"]["mean"] < 0.3
     assert "blocks" in run("map_tool", "info", "map/map.mlsm", folder=tmp_path)
 

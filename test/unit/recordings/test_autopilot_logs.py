@@ -120,7 +120,7 @@ def dataflash():
         out += b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, lengths[number], name, pack, fields)
     for second, yaw in enumerate(YAWS):
         micros = (second + 1) * 10**6
-        out += b"\xa3\x95\x81" + struct.pack("<Qhhh", micros, 0, 0, round(np.degrees(yaw) * 100))
+        out += b"\xa3\x95\x81" + struct.pack("<Qhhh", micros, 0, 0, round(float(np.degrees(yaw)) * 100))
         out += b"\xa3\x95\x82" + struct.pack("<QBfff", micros, 0, second, 2.0 * second, 3.0)
         out += b"\xa3\x95\x82" + struct.pack("<QBfff", micros, 1, 99.0, 99.0, 99.0)
     return out
