@@ -1,8 +1,9 @@
 """A Dask cluster that runs jobs: checked before the first, and watched while they run."""
 
+import logging
 import platform
 import time
-from concurrent.futures import Future
+from concurrent.futures import CancelledError, Future
 from pathlib import Path
 from typing import Any, Callable, Dict, Tuple
 
@@ -15,6 +16,7 @@ TIMEOUT = 10.0
 """s: a cluster in the same network answers within a second, a busy one within a few."""
 PATIENCE = 30.0
 """s without any worker after which none is expected to come back: a worker that is started anew needs a few."""
+_LOGS = ("distributed.client", "distributed.utils", "asyncio")
 
 
 class Cluster:
@@ -27,6 +29,9 @@ class Cluster:
         except ImportError:
             raise RecordingError("--scheduler needs Dask; install it with: apt install python3-distributed") from None
         self._address, self._seen = address, time.monotonic()
+        # A lost scheduler is told in one line; Dask's threads would add pages.
+        for name in _LOGS:
+            logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         try:
             self._client = Client(address, timeout=TIMEOUT)
         except (OSError, ValueError) as error:
@@ -42,8 +47,11 @@ class Cluster:
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self._executor.shutdown(wait=False)
-        self._client.close()
+        try:
+            self._executor.shutdown(wait=False)
+            self._client.close()
+        except (OSError, CancelledError):
+            pass  # the scheduler is lost
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Run a function of a module, by its name, on any worker."""
@@ -51,8 +59,12 @@ class Cluster:
 
     def check(self, kept: str) -> None:
         """Raise RecordingError, which says what is `kept`, where no worker has been there for long."""
-        running = self._client.status == "running"
-        if running and self._client.scheduler_info()["workers"]:
+        try:
+            running = self._client.status == "running"
+            has_workers = running and bool(self._client.scheduler_info()["workers"])
+        except (OSError, CancelledError):
+            running, has_workers = False, False
+        if has_workers:
             self._seen = time.monotonic()
         elif not running or time.monotonic() - self._seen > PATIENCE:
             lost = "all workers are lost" if running else "the scheduler is lost"

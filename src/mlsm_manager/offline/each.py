@@ -99,7 +99,7 @@ def map_each(
         try:
             while running:
                 done, running = wait(running, _LOOK, FIRST_COMPLETED)
-                if isinstance(workers, Cluster) and not done:
+                if isinstance(workers, Cluster) and (not done or any(one.cancelled() for one in done)):
                     workers.check(f"{len(outcomes)} of {len(jobs)} recordings are done and stay")
                 for one in done:
                     outcome = one.result()

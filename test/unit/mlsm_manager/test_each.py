@@ -104,6 +104,14 @@ def test_a_cluster_without_workers_ends_in_one_line_and_says_what_stays(tmp_path
             check_for_a_minute(workers)
 
 
+@pytest.mark.long
+def test_a_lost_scheduler_ends_in_one_line_and_says_what_stays(tmp_path, cluster):
+    with Cluster(cluster.scheduler_address, tmp_path) as workers:
+        cluster.close()
+        with pytest.raises(RecordingError, match="the scheduler is lost; 3 of 5 stay, and the same command goes on"):
+            check_for_a_minute(workers)
+
+
 def check_for_a_minute(workers):
     for _ in range(600):
         workers.check("3 of 5 stay")
