@@ -96,15 +96,10 @@ def _slipped(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
     common, best = table[int(table.mean(axis=1).argmin())], None
     for moment in np.unique(times[:, 1]):
         sides = times[:, 1] <= moment, times[:, 0] >= moment - 1.0
-        scans = [len(np.unique(times[side, 0])) for side in sides]
-        if min(scans) < _ONE_SIDE:
+        if min(len(np.unique(times[side, 0])) for side in sides) < _ONE_SIDE:
             continue
         rows = [int(table[:, side].mean(axis=1).argmin()) for side in sides]
-        # Pairs that share a scan tell the same: what counts is the number of scans.
-        nats = [
-            evidence_of(common[side] - table[row, side]).nats * number / np.count_nonzero(side)
-            for row, side, number in zip(rows, sides, scans)
-        ]
+        nats = [evidence_of(common[side] - table[row, side], times[side, 0]).nats for row, side in zip(rows, sides)]
         slip = float(turns[rows[1]] - turns[rows[0]])
         if abs(slip) > _SLIP_TOLD and (best is None or sum(nats) > best.nats):
             best = _Slip(float(sum(nats)), float(moment), slip)

@@ -108,13 +108,16 @@ class ScanPairs:
 
     def evidence(self, hypothesis: Hypothesis, other: Hypothesis = AS_TOLD) -> Evidence:
         """Return what speaks for a hypothesis against another."""
-        return evidence_of(self.distances(other) - self.distances(hypothesis))
+        return evidence_of(self.distances(other) - self.distances(hypothesis), self.times[:, 0])
 
 
-def evidence_of(gains: np.ndarray) -> Evidence:
-    """Return what the gains (p,) [m] of pairs tell: half the squared mean over its standard error."""
+def evidence_of(gains: np.ndarray, begins: np.ndarray) -> Evidence:
+    """Return what the gains (p,) [m] of pairs tell: half the squared mean over its standard error.
+
+    begins: (p,) s, of the first scan of each pair. Pairs that share it tell the same: the number of scans counts.
+    """
     gain = float(gains.mean())
-    noise = max(float(gains.std()) / np.sqrt(len(gains)), _LEAST_NOISE)
+    noise = max(float(gains.std()) / np.sqrt(len(np.unique(begins))), _LEAST_NOISE)
     return Evidence(0.5 * (max(gain, 0.0) / noise) ** 2, gain)
 
 

@@ -13,6 +13,7 @@ from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.standing import standing_causes
 
 _NEWEST = 30  # scans that are compared: with 20 an unbroken marina was once said to have a slipping head
+_FEWEST = 15  # scans: of ten, unbroken tours have been said to have the sonar upside down
 _BETWEEN = 5  # scans between two looks: a look takes most of a second of a core
 _MOST_PLACES = 20000  # four days of scans of 16 s
 
@@ -43,7 +44,7 @@ class LiveCauses:
     def look(self) -> None:
         """Look for causes in the newest scans, if there are enough new ones since the last look."""
         with self._lock:
-            if self._new < _BETWEEN:
+            if self._new < _BETWEEN or len(self._scans) < _FEWEST:
                 return
             self._new, scans, places = 0, list(self._scans), self._places
         found = [*echo_findings(scans, self.sonar_in_base).causes, *standing_causes(scans, _track(scans))]
