@@ -16,7 +16,7 @@ from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
 
 pytestmark = pytest.mark.long
-dear = pytest.mark.newest_only("dear; the first loop is looked for and found with every version")
+dear = pytest.mark.newest_only("slow; the first loop is looked for and found with every version")
 
 RETURNED = slice(26, None)  # nodes of the scans after the deaf ones
 RESUMED = 20  # scans

@@ -19,7 +19,7 @@ from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
-pytestmark = pytest.mark.newest_only("dear; the checks and the solver are tested with every version")
+pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested with every version")
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START = WHOLE.track.times[0]

@@ -14,7 +14,7 @@ from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_va
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; the search over places is tested with every version")]
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the search over places is tested with every version")]
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
 
 

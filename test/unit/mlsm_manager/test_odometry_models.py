@@ -15,7 +15,7 @@ from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_va
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; the solver and its parts are tested with every version")]
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the solver and its parts are tested with every version")]
 
 STEP = 1e-6
 TIMES = np.array([0.0, 14.0, 28.0])

@@ -109,7 +109,7 @@ def test_speed_is_found_from_posts(with_posts):
     assert with_posts.estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
 
 
-@pytest.mark.newest_only("dear; the tests above follow the same canal")
+@pytest.mark.newest_only("slow; the tests above follow the same canal")
 @pytest.mark.parametrize("post_confidence", [0.0, 1.0])
 def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(post_confidence):
     """Nothing tells the way along it, so the deviation is that of a speed which nobody knows."""

@@ -9,7 +9,7 @@ from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
 from mlsm_manager.scan_matching.scan import MatchStatus, Track
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("dear; joint sessions are resumed with every version")]
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; joint sessions are resumed with every version")]
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
 
