@@ -9,6 +9,7 @@ from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predic
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.headline import FEWEST_MATCHED
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health, Level
@@ -29,12 +30,14 @@ class PositionState(IntEnum):
 class PlaceNow(NamedTuple):
     """time: s, of what is told. age: s since the end of the scan of the newest fix. overdue: s since two more should
     have come. covariance: (3, 3) of the pose, propagated to now by the odometry's errors, with what causes add to it.
+    fixes: how many there were.
     """
 
     time: float
     age: float
     overdue: float
     covariance: np.ndarray
+    fixes: int
 
     @property
     def deviation(self) -> float:
@@ -51,12 +54,14 @@ class FixAge:
     def clear(self) -> None:
         """Forget the fixes, because time jumped or the map is gone."""
         self._fixes = UsualInterval()
+        self._count = 0
         self._fixed_at: Optional[float] = None
         self._believed: Optional[Tuple[float, np.ndarray]] = None
 
     def learn_fix(self, time: float) -> None:
         """Learn that the scan that ended at `time` [s] was matched."""
         self._fixes.take(time)
+        self._count += 1
         self._fixed_at = time
 
     def learn_odometry(self, time: float, pose: np.ndarray) -> None:
@@ -77,7 +82,7 @@ class FixAge:
             belief = predicted(belief, track, time, errors)
         covariance = belief.covariance[POSE, POSE].copy()
         covariance[POSITION, POSITION] += added
-        return PlaceNow(time, time - self._fixed_at, self._fixes.overdue(time), covariance)
+        return PlaceNow(time, time - self._fixed_at, self._fixes.overdue(time), covariance, self._count)
 
 
 def doubts_of(
@@ -122,12 +127,15 @@ def _clause(cause: Cause, time: float) -> str:
 
 
 def report_place(health: Health, place: PlaceNow) -> None:
-    """Show how old and how good the position is; warn after two missed turns, and louder where it is lost."""
+    """Show how old and how good the position is; warn after two missed turns, and louder where it is lost.
+
+    The first fixes leave the odometry's errors open: until they are known, an unknown position is no problem.
+    """
     health.show("age of the newest fix [s]", f"{place.age:.1f}")
     health.show("deviation of the position now [m]", f"{place.deviation:.2f}")
     if place.overdue > 0.0:
         detail = f"the newest is {place.age:.0f} s old; does the sonar's head turn, and are echoes heard?"
         health.problem("seconds without a new fix", f"{detail} The position is known to {place.deviation:.1f} m")
-    if place.deviation > LARGEST_DEVIATION:
+    if place.deviation > LARGEST_DEVIATION and place.fixes >= FEWEST_MATCHED:
         detail = f"its deviation is {place.deviation:.1f} m, must be at most {LARGEST_DEVIATION:g} m"
         health.problem("seconds in which the position is not known", detail, level=Level.ERROR)

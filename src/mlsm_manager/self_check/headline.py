@@ -8,7 +8,7 @@ from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Answer, Verdict, counted
 
 _WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
-_FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds
+FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds
 
 
 def headline(
@@ -29,7 +29,7 @@ def headline(
     if wrong or doubtful:
         said = "; ".join([*wrong, *(one.text for one in doubtful)])
         return f"trust: DOUBTFUL: {said}{mended}; at best {within}"
-    reason = f"{counted(matched, 'scan')} matched, {_FEWEST_MATCHED} needed" if matched < _FEWEST_MATCHED else ""
+    reason = f"{counted(matched, 'scan')} matched, {FEWEST_MATCHED} needed" if matched < FEWEST_MATCHED else ""
     if not reason and not by_answer[Answer.FINE]:
         reason = assumed or f"none of {len(verdicts)} checks had enough data"
     if reason:

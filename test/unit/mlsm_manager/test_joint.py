@@ -231,6 +231,15 @@ def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
     assert health.report().level is Level.ERROR
 
 
+def test_a_position_that_the_first_fixes_leave_open_is_no_problem():
+    place = PlaceNow(100.0, 10.0, 0.0, 18.0 * np.eye(3), 2)
+    health = Health("mlsm_core", lambda line: None)
+    report_place(health, place)
+    assert health.report().level is Level.OK
+    report_place(health, place._replace(fixes=3))
+    assert health.report().level is Level.ERROR
+
+
 @pytest.mark.parametrize(
     ("variance", "is_lost", "is_provisional", "doubts", "state"),
     [
@@ -242,7 +251,7 @@ def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
     ],
 )
 def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lost, is_provisional, doubts, state):
-    place = PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3))
+    place = PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3), 5)
     found, text = position_state(place, is_lost, is_provisional, doubts)
     assert found is state
     assert all(doubt in text for doubt in doubts) or state is PositionState.UNKNOWN
@@ -267,7 +276,7 @@ SMEARED = Verdict("scans on the map", 0.2, 0.5, "scans beside the map", more_is_
     ],
 )
 def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes, verdicts, silent, said):
-    place = None if overdue is None else PlaceNow(100.0, 30.0, overdue, np.eye(3))
+    place = None if overdue is None else PlaceNow(100.0, 30.0, overdue, np.eye(3), 5)
     doubts = doubts_of(place, causes, verdicts, silent)
     assert doubts == said
     assert all(doubt in position_state(place, False, False, doubts)[1] for doubt in said)
