@@ -118,6 +118,8 @@ def position_state(
         return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
+    if place.fixes < FEWEST_MATCHED:
+        return PositionState.PROVISIONAL, f"position provisional: fixes so far {place.fixes}, needed {FEWEST_MATCHED}"
     return PositionState.GOOD, f"position good, {place.deviation:.1f} m"
 
 

@@ -231,11 +231,14 @@ def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
     assert health.report().level is Level.ERROR
 
 
-def test_a_position_that_the_first_fixes_leave_open_is_no_problem():
+def test_the_first_fixes_are_provisional_and_what_they_leave_open_is_no_problem():
     place = PlaceNow(100.0, 10.0, 0.0, 18.0 * np.eye(3), 2)
     health = Health("mlsm_core", lambda line: None)
     report_place(health, place)
     assert health.report().level is Level.OK
+    known = place._replace(covariance=0.1 * np.eye(3))
+    states = [position_state(known._replace(fixes=fixes), False, False, [])[0] for fixes in (2, 3)]
+    assert states == [PositionState.PROVISIONAL, PositionState.GOOD]
     report_place(health, place._replace(fixes=3))
     assert health.report().level is Level.ERROR
 
