@@ -154,6 +154,7 @@ class MasterWatch:
     def _does_not_know_us(self) -> bool:
         try:
             status, _, uri = self._master.lookupNode(rospy.get_name(), rospy.get_name())
-        except (OSError, xmlrpc.client.Error):
+        except Exception:
+            # A master that is killed while it answers leaves half an answer, and that almost any error.
             return False
         return status != _SUCCESS or uri != rospy.get_node_uri()
