@@ -9,7 +9,7 @@ from setuptools import find_packages, setup
 HERE = Path(__file__).resolve().parent
 NAME = "underwater_map_construction"
 # What the simulator needs beside the modules; node_support/files.py finds it.
-SHARED = ("package.xml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*")
+SHARED = ("package.xml", "migration/names_2015.yaml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*")
 
 
 def shared_files():

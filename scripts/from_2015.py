@@ -11,7 +11,7 @@ from node_support.parameters import EXPERT, ParameterSet, describe
 _INTRODUCTION = """\
 # Coming from the package of 2015
 
-*Written by `scripts/document` from `src/node_support/names_2015.py`, the parameter dataclasses and
+*Written by `scripts/document` from `migration/names_2015.yaml`, the parameter dataclasses and
 `yaml/thesis.yaml`; do not edit.*
 
 For those who ran the stack of the thesis: your bags, your parameter files, your topics.
