@@ -11,11 +11,15 @@ import pytest
 import yaml
 
 ROOT = Path(__file__).resolve().parents[2]
-ROWS = [
-    line.split()
-    for line in (ROOT / "scripts" / "dependencies.txt").read_text().splitlines()
-    if line and not line.startswith("#")
-]
+
+
+def _rows(text):
+    """Return the words of each dependency, without the first line, which ends a comment."""
+    return [line.split() for line in text.splitlines()[1:] if line and not line.startswith("#")]
+
+
+RUNNING, TESTING = map(_rows, (ROOT / "scripts/dependencies.txt").read_text().split("## Only with --all", 1))
+ROWS = RUNNING + TESTING
 CHANGES_THE_SYSTEM = ["apt-get", "sudo", "pip", "catkin_make"]
 
 
@@ -31,10 +35,10 @@ def checkout(tmp_path):
     return tmp_path / "checkout"
 
 
-def _dry_run(checkout, distro):
+def _dry_run(checkout, distro, *options):
     """Return what a dry run prints; it must end well."""
     path = os.pathsep.join([str(checkout.parent / "bin"), os.environ["PATH"]])
-    command = ["bash", str(checkout / "scripts" / "bootstrap"), "--dry-run", "--distro", distro]
+    command = ["bash", str(checkout / "scripts" / "bootstrap"), "--dry-run", "--distro", distro, *options]
     return subprocess.run(
         command, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, check=True, text=True
     ).stdout.splitlines()
@@ -48,13 +52,18 @@ def _installed(lines):
 @pytest.mark.parametrize(("distro", "column"), [("debian", 1), ("ubuntu", 2)])
 def test_a_dry_run_names_every_package_of_its_column_venv_and_build_and_changes_nothing(checkout, distro, column):
     before = sorted(checkout.rglob("*"))
-    lines = _dry_run(checkout, distro)
+    lines = _dry_run(checkout, distro, "--all")
     assert _installed(lines) == {row[column] for row in ROWS if row[column] != "-"}
     assert any("-m venv --system-site-packages" in line for line in lines)
     assert any("catkin_make --directory" in line for line in lines)
     assert ("+ source /opt/ros/noetic/setup.bash" in lines) == (distro == "ubuntu")
     assert sorted(checkout.rglob("*")) == before
     assert not (checkout.parent / "called").exists()
+
+
+def test_without_all_what_only_tests_and_docs_need_is_left_out(checkout):
+    assert _installed(_dry_run(checkout, "debian")) == {row[1] for row in RUNNING if row[1] != "-"}
+    assert {"chromium", "python3-open3d", "python3-sphinx", "python3-pytest"} <= {row[1] for row in TESTING}
 
 
 def test_on_ubuntu_ros_comes_from_noetic(checkout):
