@@ -19,25 +19,25 @@ Fault = Callable[[Recording], Recording]
 _LOUDEST = 127  # the sonars' own largest strength
 
 
-def _odometry(recording: Recording, poses: np.ndarray) -> Recording:
+def with_odometry(recording: Recording, poses: np.ndarray) -> Recording:
     """Return a recording of which the odometry said `poses` (m, 3)."""
     return recording.with_track(Track(recording.track.times, poses))
 
 
-def _after(recording: Recording, at: float) -> np.ndarray:
+def after(recording: Recording, at: float) -> np.ndarray:
     """Return which poses (m,) are `at` seconds or more after the first one."""
     return recording.track.times - recording.track.times[0] >= at
 
 
-def _steps(poses: np.ndarray) -> np.ndarray:
+def steps_of(poses: np.ndarray) -> np.ndarray:
     return composed(inverse(poses[:-1]), poses[1:])
 
 
 def odometry_restarts(recording: Recording, at: float) -> Recording:
     """Let the odometry begin again at zero."""
-    poses, after = recording.track.poses.copy(), _after(recording, at)
-    poses[after] = composed(inverse(poses[after][:1]), poses[after])
-    return _odometry(recording, poses)
+    poses, later = recording.track.poses.copy(), after(recording, at)
+    poses[later] = composed(inverse(poses[later][:1]), poses[later])
+    return with_odometry(recording, poses)
 
 
 def odometry_jumps(recording: Recording, at: float, size: float, every: float = np.inf, seed: int = 1) -> Recording:
@@ -46,27 +46,27 @@ def odometry_jumps(recording: Recording, at: float, size: float, every: float = 
     last = recording.seconds
     for moment in np.arange(at, last, every) if np.isfinite(every) else [at]:
         angle = rng.uniform(-np.pi, np.pi)
-        poses[_after(recording, moment), :2] += size * np.array([np.cos(angle), np.sin(angle)])
-    return _odometry(recording, poses)
+        poses[after(recording, moment), :2] += size * np.array([np.cos(angle), np.sin(angle)])
+    return with_odometry(recording, poses)
 
 
 def odometry_glitches(recording: Recording, at: float, size: float, samples: int = 1) -> Recording:
     """Let some poses lie `size` metres beside the others, which go on as before."""
-    poses, first = recording.track.poses.copy(), int(np.argmax(_after(recording, at)))
+    poses, first = recording.track.poses.copy(), int(np.argmax(after(recording, at)))
     poses[first : first + samples, 0] += size
-    return _odometry(recording, poses)
+    return with_odometry(recording, poses)
 
 
 def odometry_freezes(recording: Recording, at: float, seconds: float = np.inf, goes_on: bool = True) -> Recording:
     """Let the pose stay for some seconds; then it goes on from there (`goes_on`), or where the vehicle is by then."""
-    poses, after = recording.track.poses, _after(recording, at) & ~_after(recording, at + seconds)
+    poses, stands = recording.track.poses, after(recording, at) & ~after(recording, at + seconds)
     if not goes_on:
         frozen = poses.copy()
-        frozen[after] = frozen[np.argmax(after)]
-        return _odometry(recording, frozen)
-    steps = _steps(poses)
-    steps[after[1:]] = 0.0
-    return _odometry(recording, integrated(poses[0], steps))
+        frozen[stands] = frozen[np.argmax(stands)]
+        return with_odometry(recording, frozen)
+    steps = steps_of(poses)
+    steps[stands[1:]] = 0.0
+    return with_odometry(recording, integrated(poses[0], steps))
 
 
 def odometry_missing(recording: Recording, at: float, seconds: float) -> Recording:
@@ -81,46 +81,46 @@ def odometry_missing(recording: Recording, at: float, seconds: float) -> Recordi
 
 def odometry_scaled(recording: Recording, factor: float, at: float = 0.0) -> Recording:
     """Let reported distances be `factor` times as long from a moment on."""
-    steps = _steps(recording.track.poses)
-    steps[_after(recording, at)[1:], :2] *= factor
-    return _odometry(recording, integrated(recording.track.poses[0], steps))
+    steps = steps_of(recording.track.poses)
+    steps[after(recording, at)[1:], :2] *= factor
+    return with_odometry(recording, integrated(recording.track.poses[0], steps))
 
 
 def dvl_turned(recording: Recording, degrees: float) -> Recording:
     """Let the DVL be mounted turned: reported moves are turned against the vehicle, headings are not."""
-    steps = _steps(recording.track.poses)
+    steps = steps_of(recording.track.poses)
     moves = (steps[:, 0] + 1j * steps[:, 1]) * np.exp(1j * np.radians(degrees))
     steps[:, :2] = np.column_stack([moves.real, moves.imag])
-    return _odometry(recording, integrated(recording.track.poses[0], steps))
+    return with_odometry(recording, integrated(recording.track.poses[0], steps))
 
 
-def _compass(recording: Recording, error: np.ndarray, positions_follow: bool = True) -> Recording:
+def with_compass_error(recording: Recording, error: np.ndarray, positions_follow: bool = True) -> Recording:
     """Add `error` (m,) [rad] to the heading; `positions_follow`: positions are integrated with the wrong heading."""
     poses = recording.track.poses + error[:, np.newaxis] * [0.0, 0.0, 1.0]
     if not positions_follow:
-        return _odometry(recording, poses)
-    steps = _steps(recording.track.poses)
+        return with_odometry(recording, poses)
+    steps = steps_of(recording.track.poses)
     steps[:, 2] = np.diff(poses[:, 2])
-    return _odometry(recording, integrated(poses[0], steps))
+    return with_odometry(recording, integrated(poses[0], steps))
 
 
 def compass_steps(recording: Recording, at: float, degrees: float, positions_follow: bool = True) -> Recording:
     """Let the heading step once."""
-    return _compass(recording, np.radians(degrees) * _after(recording, at), positions_follow)
+    return with_compass_error(recording, np.radians(degrees) * after(recording, at), positions_follow)
 
 
 def compass_drifts(recording: Recording, at: float, degrees_per_minute: float) -> Recording:
     """Let the heading drift from a moment on."""
     since = np.maximum(recording.track.times - recording.track.times[0] - at, 0.0)
-    return _compass(recording, np.radians(degrees_per_minute) * since / 60.0)
+    return with_compass_error(recording, np.radians(degrees_per_minute) * since / 60.0)
 
 
 def compass_deviates(recording: Recording, degrees: float, times: int = 1) -> Recording:
     """Let the heading err as a sine of itself, `times` in a circle: hard iron 1, soft iron 2."""
-    return _compass(recording, np.radians(degrees) * np.sin(times * recording.track.poses[:, 2]))
+    return with_compass_error(recording, np.radians(degrees) * np.sin(times * recording.track.poses[:, 2]))
 
 
-def _mounted(recording: Recording, T_sonar_told: np.ndarray) -> Recording:
+def mounted(recording: Recording, T_sonar_told: np.ndarray) -> Recording:
     """Let tf tell another mount: T_base_told = T_base_sonar * T_sonar_told (4, 4)."""
     beams = [replace(one, T_target_sonar=one.T_target_sonar @ T_sonar_told) for one in recording.beams]
     return replace(recording, beams=beams)
@@ -128,12 +128,12 @@ def _mounted(recording: Recording, T_sonar_told: np.ndarray) -> Recording:
 
 def mount_turned(recording: Recording, degrees: float) -> Recording:
     """Let the sonar be mounted turned counter-clockwise against what tf says."""
-    return _mounted(recording, matrices(np.array([[0.0, 0.0, -np.radians(degrees)]]))[0])
+    return mounted(recording, matrices(np.array([[0.0, 0.0, -np.radians(degrees)]]))[0])
 
 
 def mount_upside_down(recording: Recording) -> Recording:
     """Let the sonar hang the other way round than tf says."""
-    return _mounted(recording, np.diag([1.0, -1.0, -1.0, 1.0]))
+    return mounted(recording, np.diag([1.0, -1.0, -1.0, 1.0]))
 
 
 def mount_shifted(recording: Recording, metres: float) -> Recording:
@@ -148,7 +148,7 @@ def mount_shifted(recording: Recording, metres: float) -> Recording:
     return replace(recording, beams=beams)
 
 
-def _changed(
+def changed(
     recording: Recording, change: Callable[[Beam, int], Optional[Beam]], at: float = 0.0, seconds: float = np.inf
 ) -> Recording:
     """Return the recording with each beam of a stretch changed; those that become None are left out."""
@@ -171,7 +171,7 @@ def head_slips(recording: Recording, at: float, degrees: float, every: float = n
         times = 1 + ((beam.stamp_ns * 1e-9 - start) // every if np.isfinite(every) else 0)
         return replace(beam, angle=beam.angle + times * np.radians(degrees))
 
-    return _changed(recording, slipped, at)
+    return changed(recording, slipped, at)
 
 
 def head_stops(recording: Recording, at: float, seconds: float, tells: bool = True) -> Recording:
@@ -186,23 +186,23 @@ def head_stops(recording: Recording, at: float, seconds: float, tells: bool = Tr
         heard = recording.beams[same[np.argmin(np.abs(same - number))]].beam.intensities
         return replace(beam, intensities=heard, angle=stands if tells else beam.angle)
 
-    return _changed(recording, stood, at, seconds)
+    return changed(recording, stood, at, seconds)
 
 
 def head_reversed(recording: Recording) -> Recording:
     """Let the head turn the other way than it reports."""
-    return _changed(recording, lambda beam, _: replace(beam, angle=-beam.angle))
+    return changed(recording, lambda beam, _: replace(beam, angle=-beam.angle))
 
 
 def beams_stop(recording: Recording, at: float, seconds: float) -> Recording:
     """Leave out all beams of some seconds."""
-    return _changed(recording, lambda beam, _: None, at, seconds)
+    return changed(recording, lambda beam, _: None, at, seconds)
 
 
 def beams_missing(recording: Recording, share: float, seed: int = 1) -> Recording:
     """Leave out a random share of the beams."""
     rng = np.random.RandomState(seed)
-    return _changed(recording, lambda beam, _: None if rng.uniform() < share else beam)
+    return changed(recording, lambda beam, _: None if rng.uniform() < share else beam)
 
 
 def range_changed(recording: Recording, at: float, factor: float) -> Recording:
@@ -214,12 +214,12 @@ def range_changed(recording: Recording, at: float, factor: float) -> Recording:
         strengths = np.where(heard < len(bins), beam.intensities[np.minimum(heard, len(bins) - 1)], 0)
         return replace(beam, intensities=strengths.astype(np.uint8))
 
-    return _changed(recording, stretched, at)
+    return changed(recording, stretched, at)
 
 
 def range_told(recording: Recording, at: float, share: float) -> Recording:
     """Let the range setting become a share of itself, told by the messages."""
-    return _changed(recording, lambda beam, _: replace(
+    return changed(recording, lambda beam, _: replace(
         beam, intensities=beam.intensities[: int(share * len(beam.intensities))]
     ), at)  # fmt: skip
 
@@ -230,7 +230,7 @@ def gain_changed(recording: Recording, at: float, factor: float) -> Recording:
     def louder(beam: Beam, _: int) -> Beam:
         return replace(beam, intensities=np.minimum(beam.intensities * factor, _LOUDEST).astype(np.uint8))
 
-    return _changed(recording, louder, at)
+    return changed(recording, louder, at)
 
 
 def echoes_longer(recording: Recording, at: float, bins: int) -> Recording:
@@ -242,32 +242,32 @@ def echoes_longer(recording: Recording, at: float, bins: int) -> Recording:
             strengths[shift:] = np.maximum(strengths[shift:], beam.intensities[:-shift])
         return replace(beam, intensities=strengths)
 
-    return _changed(recording, longer, at)
+    return changed(recording, longer, at)
 
 
 def half_blind(recording: Recording) -> Recording:
     """Let half of the circle hear nothing."""
-    return _changed(recording, lambda beam, _: replace(
+    return changed(recording, lambda beam, _: replace(
         beam, intensities=beam.intensities * np.uint8(np.sin(beam.angle) > 0.0)
     ))  # fmt: skip
 
 
 def deaf(recording: Recording, at: float, seconds: float = np.inf) -> Recording:
     """Let the sonar hear nothing."""
-    return _changed(recording, lambda beam, _: replace(beam, intensities=np.zeros_like(beam.intensities)), at, seconds)
+    return changed(recording, lambda beam, _: replace(beam, intensities=np.zeros_like(beam.intensities)), at, seconds)
 
 
 def spikes(recording: Recording, share: float, at: float = 0.0, seed: int = 1) -> Recording:
     """Put a loud spike of two bins at a random range of a share of the beams."""
     rng = np.random.RandomState(seed)
-    return _changed(recording, lambda beam, _: _spiked(
+    return changed(recording, lambda beam, _: _spiked(
         beam, rng.randint(20, len(beam.intensities) - 2) if rng.uniform() < share else None
     ), at)  # fmt: skip
 
 
 def spiral(recording: Recording, at: float, bins_per_beam: float = 1.37) -> Recording:
     """Put an echo of another sonar into each beam, whose range moves evenly on from beam to beam."""
-    return _changed(recording, lambda beam, number: _spiked(
+    return changed(recording, lambda beam, number: _spiked(
         beam, 20 + int(bins_per_beam * number) % (len(beam.intensities) - 22)
     ), at)  # fmt: skip
 
@@ -281,18 +281,19 @@ def _spiked(beam: Beam, place: Optional[int]) -> Beam:
 
 
 def delayed(recording: Recording, seconds: float, growing: bool = False, at: float = 0.0) -> Recording:
-    """Let stamps be later than the pings by some seconds, from a moment on; growing: from 0 at the beginning to these.
+    """Let stamps be later than the pings by some seconds, from a moment on; growing: from 0 at the start to these."""
+    since = np.array([one.beam.stamp_ns for one in recording.beams]) * 1e-9 - recording.track.times[0]
+    return stamped(recording, seconds * (since / recording.seconds if growing else since >= at))
 
-    A late stamp places its beam where the vehicle is later.
-    """
+
+def stamped(recording: Recording, late: np.ndarray) -> Recording:
+    """Let stamps be later than the pings by `late` (n,) [s]: a late one places its beam where the vehicle is then."""
     track, beams = recording.track, []
-    for placed in recording.beams:
+    for placed, seconds in zip(recording.beams, late):
         time = placed.beam.stamp_ns * 1e-9
-        late = seconds * (time - track.times[0]) / recording.seconds if growing else seconds
-        late *= time - track.times[0] >= at
-        if not track.times[0] <= time + late <= track.times[-1]:
+        if not track.times[0] <= time + seconds <= track.times[-1]:
             continue
-        move = matrices(composed(track.at(np.array([time + late])), inverse(track.at(np.array([time])))))[0]
-        beam = replace(placed.beam, stamp_ns=round(1e9 * (time + late)))
+        move = matrices(composed(track.at(np.array([time + seconds])), inverse(track.at(np.array([time])))))[0]
+        beam = replace(placed.beam, stamp_ns=round(1e9 * (time + seconds)))
         beams.append(PlacedBeam(beam, move @ placed.T_target_sonar, placed.is_moving))
     return replace(recording, beams=beams)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from benchmarks.faults import faults
+from benchmarks.fault_rows import faults
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.offline.recording import Recording
@@ -10,13 +10,13 @@ from mlsm_manager.offline.recording import Recording
 pytestmark = pytest.mark.newest_only("about a benchmark")
 
 WHOLE = touring()
-FAULTS = {name: make for name, make in faults(SECONDS).items() if name != "nothing"}
+FAULTS = {name: make for name, (_, make) in faults(SECONDS).items() if name != "nothing"}
 
 
 def content(recording: Recording):
     """Return all that a fault may change, as one array."""
     beams = recording.beams
-    parts = [np.array([one.beam.stamp_ns * 1e-9, one.beam.angle, one.beam.intensities.size]) for one in beams]
+    parts = [np.array([one.beam.stamp_ns * 1e-9, one.beam.angle, one.beam.intensities.size * one.beam.range_resolution]) for one in beams]
     parts += [np.concatenate([one.T_target_sonar.ravel(), one.beam.intensities]) for one in beams]
     return np.concatenate([recording.track.poses.ravel(), *parts])
 
@@ -29,3 +29,10 @@ def test_it_changes_the_recording_and_leaves_the_original(name):
     assert np.array_equal(content(broken), content(again))
     assert np.array_equal(content(WHOLE), before)
     assert np.isfinite(content(broken)).all()
+
+
+def test_a_seed_draws_other_sizes_and_times():
+    usual, drawn, again = (faults(SECONDS, seed) for seed in (None, 1, 1))
+    assert list(drawn) == list(again)
+    assert len(drawn) == len(usual) == len(set(drawn))
+    assert not {name for name in drawn if " at " in name} & set(usual)

@@ -1,0 +1,160 @@
+"""Breaks recordings in rarer ways than fault_makers: one function for each; recording in, recording out."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from benchmarks.fault_makers import after, changed, mounted, stamped, steps_of, with_compass_error, with_odometry
+from mlsm_manager.odometry.faults import integrated
+from mlsm_manager.offline.recording import Recording
+from sonar_processing.beams.beam import Beam
+
+_FULL = 255
+
+
+def odometry_stalls(recording: Recording, seconds: float, every: float = 60.0) -> Recording:
+    """Let the pose stay for some seconds each minute; then it goes on from there."""
+    since = recording.track.times - recording.track.times[0]
+    steps = steps_of(recording.track.poses)
+    steps[(since[1:] % every) < seconds] = 0.0
+    return with_odometry(recording, integrated(recording.track.poses[0], steps))
+
+
+def odometry_noisy(recording: Recording, metres: float, seed: int = 1) -> Recording:
+    """Let positions tremble, each by itself."""
+    noise = metres * np.random.RandomState(seed).normal(size=recording.track.poses.shape) * [1.0, 1.0, 0.0]
+    return with_odometry(recording, recording.track.poses + noise)
+
+
+def odometry_drifts(recording: Recording, at: float, speed: float, seconds: float = np.inf) -> Recording:
+    """Let a current carry the vehicle that the odometry does not feel, as where a DVL has lost the bottom."""
+    since = np.clip(recording.track.times - recording.track.times[0] - at, 0.0, seconds)
+    return with_odometry(recording, recording.track.poses - speed * since[:, np.newaxis] * [0.8, 0.6, 0.0])
+
+
+def odometry_mirrored(recording: Recording) -> Recording:
+    """Let the odometry count z down: y and yaw have the other sign."""
+    return with_odometry(recording, recording.track.poses * [1.0, -1.0, -1.0])
+
+
+def odometry_late(recording: Recording, seconds: float) -> Recording:
+    """Let poses come with stamps that are late."""
+    track = recording.track
+    return with_odometry(recording, track.at(track.times - seconds))
+
+
+def compass_sticks(recording: Recording, at: float) -> Recording:
+    """Let the heading stay as it is from a moment on; positions are integrated with it."""
+    yaws, stuck = recording.track.poses[:, 2], after(recording, at)
+    return with_compass_error(recording, np.where(stuck, yaws[np.argmax(stuck)] - yaws, 0.0))
+
+
+def compass_noisy(recording: Recording, degrees: float, seed: int = 1) -> Recording:
+    """Let the heading tremble; positions are right."""
+    noise = np.radians(degrees) * np.random.RandomState(seed).normal(size=len(recording.track.times))
+    return with_compass_error(recording, noise, positions_follow=False)
+
+
+def compass_off(recording: Recording, degrees: float) -> Recording:
+    """Let the heading be wrong all along, and positions be right: true north for magnetic, or a mount."""
+    return with_compass_error(recording, np.full(len(recording.track.times), np.radians(degrees)), False)
+
+
+def mount_tilted(recording: Recording, degrees: float) -> Recording:
+    """Let the sonar's plane be tilted against what tf says."""
+    cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    T_sonar_told = np.eye(4)
+    T_sonar_told[:3, :3] = [[cos, 0.0, sin], [0.0, 1.0, 0.0], [-sin, 0.0, cos]]
+    return mounted(recording, T_sonar_told)
+
+
+def head_loses_steps(recording: Recording, degrees: float) -> Recording:
+    """Let the head turn less than it reports, by some degrees each minute."""
+    start, rate = recording.track.times[0], np.radians(degrees) / 60.0
+    return changed(recording, lambda beam, _: replace(beam, angle=beam.angle + rate * (beam.stamp_ns * 1e-9 - start)))
+
+
+def head_trembles(recording: Recording, degrees: float, seed: int = 1) -> Recording:
+    """Let each reported angle be wrong by itself."""
+    rng = np.random.RandomState(seed)
+    return changed(recording, lambda beam, _: replace(beam, angle=beam.angle + np.radians(degrees) * rng.normal()))
+
+
+def stamps_jitter(recording: Recording, seconds: float, seed: int = 1) -> Recording:
+    """Let each stamp be wrong by itself; beams keep their order."""
+    track, rng = recording.track, np.random.RandomState(seed)
+    true = np.array([one.beam.stamp_ns for one in recording.beams]) * 1e-9
+    told = np.sort(np.clip(true + seconds * rng.normal(size=len(true)), track.times[0], track.times[-1]))
+    return stamped(recording, told - true)
+
+
+def sound_faster(recording: Recording, factor: float) -> Recording:
+    """Let reported ranges be `factor` times the true ones: another speed of sound."""
+    return changed(recording, lambda beam, _: replace(beam, range_resolution=factor * beam.range_resolution))
+
+
+def ranges_offset(recording: Recording, metres: float) -> Recording:
+    """Let all echoes come from farther: a delay between ping and recording."""
+
+    def shifted(beam: Beam, _: int) -> Beam:
+        bins = round(metres / beam.range_resolution)
+        return replace(beam, intensities=np.append(np.zeros(bins, np.uint8), beam.intensities)[: len(beam.intensities)])
+
+    return changed(recording, shifted)
+
+
+def echoes_double(recording: Recording, share: float) -> Recording:
+    """Let each echo come again from twice as far, `share` as strong: by the surface, or by the hull."""
+
+    def doubled(beam: Beam, _: int) -> Beam:
+        again = beam.intensities[np.arange(len(beam.intensities)) // 2] * share
+        return replace(beam, intensities=np.maximum(beam.intensities, again).astype(np.uint8))
+
+    return changed(recording, doubled)
+
+
+def hull_heard(recording: Recording, metres: float) -> Recording:
+    """Let a third of the circle hear a part of the vehicle, or a boat that follows it, at one distance."""
+
+    def heard(beam: Beam, _: int) -> Beam:
+        if np.cos(beam.angle) < 0.5:
+            return beam
+        first, strengths = int(metres / beam.range_resolution), beam.intensities.copy()
+        strengths[first : first + 4] = max(int(strengths.max()), 100)
+        return replace(beam, intensities=strengths)
+
+    return changed(recording, heard)
+
+
+def noise_rises(recording: Recording, at: float, level: float, seed: int = 1) -> Recording:
+    """Let each bin tremble by `level`: the thrusters are heard."""
+    rng = np.random.RandomState(seed)
+
+    def noisy(beam: Beam, _: int) -> Beam:
+        noise = np.abs(level * rng.normal(size=len(beam.intensities)))
+        return replace(beam, intensities=np.minimum(beam.intensities + noise, _FULL).astype(np.uint8))
+
+    return changed(recording, noisy, at)
+
+
+def gain_fades(recording: Recording, factor: float) -> Recording:
+    """Let echoes grow weaker all along, to `factor` of their strength at the end."""
+    start, seconds = recording.track.times[0], recording.seconds
+
+    def faded(beam: Beam, _: int) -> Beam:
+        share = factor ** ((beam.stamp_ns * 1e-9 - start) / seconds)
+        return replace(beam, intensities=(beam.intensities * share).astype(np.uint8))
+
+    return changed(recording, faded)
+
+
+def bottom_lost(recording: Recording, at: float, seconds: float, speed: float = 0.3) -> Recording:
+    """Let the DVL lose the bottom for some seconds, in which a current carries the vehicle unfelt."""
+    return odometry_drifts(recording, at, speed, seconds)
+
+
+def positions_swapped(recording: Recording) -> Recording:
+    """Let x and y be swapped, as between east north up and north east down, and headings be right."""
+    steps = steps_of(recording.track.poses)
+    steps[:, :2] = steps[:, 1::-1]
+    return with_odometry(recording, integrated(recording.track.poses[0], steps))
