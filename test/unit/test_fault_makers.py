@@ -13,11 +13,14 @@ WHOLE = touring()
 FAULTS = {name: make for name, (_, make) in faults(SECONDS).items() if name != "nothing"}
 
 
+def _figures(beam):
+    return np.array([beam.stamp_ns * 1e-9, beam.angle, beam.intensities.size, beam.range_resolution])
+
+
 def content(recording: Recording):
     """Return all that a fault may change, as one array."""
-    beams = recording.beams
-    parts = [np.array([one.beam.stamp_ns * 1e-9, one.beam.angle, one.beam.intensities.size * one.beam.range_resolution]) for one in beams]
-    parts += [np.concatenate([one.T_target_sonar.ravel(), one.beam.intensities]) for one in beams]
+    parts = [_figures(one.beam) for one in recording.beams]
+    parts += [np.concatenate([one.T_target_sonar.ravel(), one.beam.intensities]) for one in recording.beams]
     return np.concatenate([recording.track.poses.ravel(), *parts])
 
 
