@@ -110,14 +110,22 @@ class Hypotheses:
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan; see LiveSolver.add. fix: in the map of `shown`."""
         self.switched = False
+        of_other = self._of_other(fix)
         self.shown.add(scan, fix)
         if self.other is not None:
             try:
-                self.other.add(scan)
+                self.other.add(scan, of_other)
                 self._weigh()
             except RefusedInput:
                 self.other = self.doubt = None
         return self.shown.estimates[-1]
+
+    def _of_other(self, fix: Optional[Fix]) -> Optional[Fix]:
+        """Return a fix for the other solver: whatever the odometry is, the scan lies as far from the one before it."""
+        if fix is None or self.other is None:
+            return None
+        apart = self.other.estimates[-1].T_map_base - self.shown.estimates[-1].T_map_base
+        return replace(fix, place=fix.place + apart[:2])
 
     def _weigh(self) -> None:
         """Show the solver that the echoes speak for, and say how uncertain the other one makes it."""
