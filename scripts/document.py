@@ -12,6 +12,7 @@ from typing import Dict, List, Type
 
 import yaml
 from from_2015 import from_2015_page
+from parameter_text import default_yaml, markdown_table, start_up_yaml
 
 from autopilot_link.parameters import AutopilotLinkParameters
 from dead_reckoning.parameters import DeadReckoningParameters
@@ -20,7 +21,6 @@ from imagenex_852_driver.line.parameters import DriverParameters
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, PROFILES, OdometryKind, Setting, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
-from node_support.parameter_text import default_yaml, markdown_table, start_up_yaml
 from node_support.parameters import EXPERT, ParameterSet, config_name
 from node_support.thin_queue import ThinLinkParameters
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters

@@ -23,7 +23,6 @@ from recordings.motion.pose_track import LATEST_NS, PoseTrack
 _MAGIC = b"\x89MCAP0\r\n"
 _ROS2 = b"ros2"
 _TOPIC = re.compile(r"/?(device_[^/]+)/(Ping360|VehicleData)")
-_Message = Tuple[str, int, Any]  # topic, ns, content
 
 
 def is_ping_viewer_next(path: Path) -> bool:

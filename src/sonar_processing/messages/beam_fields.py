@@ -1,11 +1,12 @@
 """What a message says of one beam, and what the readers of several types share."""
 
 from dataclasses import dataclass
-from typing import Sequence, Union
+from typing import Any, Sequence, Union
 
 import numpy as np
 
 from node_support.errors import RefusedInput
+from node_support.headers import stamp_ns
 
 USUAL_SPEED_OF_SOUND = 1500.0  # m/s, what drivers assume where a message does not say
 _SLOWEST, _FASTEST = 1300.0, 1700.0  # m/s, of any water; a message with another value was not filled in
@@ -27,6 +28,11 @@ class BeamFields:
     range_resolution: float
     sensor_angle: float = 0.0
     speed_of_sound: float = USUAL_SPEED_OF_SOUND
+
+    @classmethod
+    def of(cls, message: Any, angle: float, intensities: np.ndarray, resolution: float, **more: float) -> "BeamFields":
+        """Return a beam with stamp and frame of the header of `message`; more: of the fields that have a default."""
+        return cls(stamp_ns(message.header), message.header.frame_id, angle, intensities, resolution, **more)
 
     @property
     def travel_time_ns(self) -> int:

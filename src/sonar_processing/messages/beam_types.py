@@ -75,46 +75,28 @@ def sonar_scan_line(message: Any) -> List[BeamFields]:
         raise RefusedInput(
             "beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m; check the driver"
         )
-    return [
-        BeamFields(
-            stamp_ns(message.header),
-            message.header.frame_id,
-            message.angle,
-            strengths_of(message.intensities),
-            message.range_resolution,
-            message.sensorAngle,
-        )
-    ]
+    strengths, tilt = strengths_of(message.intensities), message.sensorAngle
+    return [BeamFields.of(message, message.angle, strengths, message.range_resolution, sensor_angle=tilt)]
 
 
 def sonar_echo(message: Any) -> List[BeamFields]:
     """Read a SonarEcho of ping360_sonar: `range` metres in `number_of_samples` bins."""
     strengths = strengths_of(message.intensities)
-    bins = message.number_of_samples or strengths.size
-    return [
-        BeamFields(
-            stamp_ns(message.header),
-            message.header.frame_id,
-            message.angle,
-            strengths,
-            message.range / max(bins, 1),
-            speed_of_sound=speed_of_sound_of(message.speed_of_sound),
-        )
-    ]
+    resolution = message.range / max(message.number_of_samples or strengths.size, 1)
+    speed = speed_of_sound_of(message.speed_of_sound)
+    return [BeamFields.of(message, message.angle, strengths, resolution, speed_of_sound=speed)]
 
 
 def sonar_ping_360(message: Any) -> List[BeamFields]:
     """Read a SonarPing360 of bluerobotics_sonar: `range` metres in the bins of `profile_data`."""
     strengths = strengths_of(message.profile_data)
-    resolution = message.range / max(strengths.size, 1)
-    return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle, strengths, resolution)]
+    return [BeamFields.of(message, message.angle, strengths, message.range / max(strengths.size, 1))]
 
 
 def scan_line(message: Any) -> List[BeamFields]:
     """Read a ScanLine of micron_driver_ros; a bin ends at its `distance`."""
     strengths = strengths_of([one.intensity for one in message.bins])
-    step = message.bin_distance_step
-    return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle, strengths, step)]
+    return [BeamFields.of(message, message.angle, strengths, message.bin_distance_step)]
 
 
 def point_cloud(message: Any) -> List[BeamFields]:
@@ -131,8 +113,7 @@ def point_cloud(message: Any) -> List[BeamFields]:
     resolution = float(np.linalg.norm(step))
     if not off <= _STRAIGHT * resolution:
         raise RefusedInput("beams refused", f"points lie {off:.2g} m beside equal steps on a line; must be one beam")
-    angle = math.atan2(step[1], step[0])
-    return [BeamFields(stamp_ns(message.header), message.header.frame_id, angle, strengths_of(strengths), resolution)]
+    return [BeamFields.of(message, math.atan2(step[1], step[0]), strengths_of(strengths), resolution)]
 
 
 def laser_scan(message: Any) -> List[BeamFields]:
@@ -162,7 +143,7 @@ def _bins_of_rays(message: Any) -> List[BeamFields]:
     """Return the beam whose bins the rays of a LaserScan are; raises RefusedInput for rays that are none."""
     resolution = length_of_bins(message.ranges, len(message.intensities))
     strengths = strengths_of(np.clip(message.intensities, 0, 255))
-    return [BeamFields(stamp_ns(message.header), message.header.frame_id, message.angle_min, strengths, resolution)]
+    return [BeamFields.of(message, message.angle_min, strengths, resolution)]
 
 
 def _echo_at(index: float) -> np.ndarray:

@@ -9,7 +9,6 @@ from typing import Any, List
 import numpy as np
 
 from node_support.errors import RefusedInput
-from node_support.headers import stamp_ns
 from sonar_processing.messages.beam_fields import BeamFields, length_of_bins, speed_of_sound_of
 
 _PIXELS = {0: np.dtype("u1"), 2: np.dtype("u2"), 4: np.dtype("u4")}  # DTYPE_ of SonarImageData that are not signed
@@ -23,9 +22,7 @@ def raw_sonar_image(message: Any) -> List[BeamFields]:
     strengths, speed = _only_beam(message.image), speed_of_sound_of(message.ping_info.sound_speed)
     padded = np.pad(strengths, (message.sample0, 0), mode="constant")
     resolution = speed / (2.0 * message.sample_rate)
-    angle = message.rx_angles[0]
-    header = message.header
-    return [BeamFields(stamp_ns(header), header.frame_id, angle, padded, resolution, speed_of_sound=speed)]
+    return [BeamFields.of(message, message.rx_angles[0], padded, resolution, speed_of_sound=speed)]
 
 
 def projected_sonar_image(message: Any) -> List[BeamFields]:
@@ -37,8 +34,7 @@ def projected_sonar_image(message: Any) -> List[BeamFields]:
     resolution = length_of_bins(message.ranges, strengths.size)
     padded = np.pad(strengths, (max(round(message.ranges[0] / resolution - 0.5), 0), 0), mode="constant")
     (direction,) = message.beam_directions
-    angle = math.atan2(-direction.y, direction.z)
-    return [BeamFields(stamp_ns(message.header), message.header.frame_id, angle, padded, resolution)]
+    return [BeamFields.of(message, math.atan2(-direction.y, direction.z), padded, resolution)]
 
 
 def _only_beam(image: Any) -> np.ndarray:
@@ -77,9 +73,6 @@ class TurningImage:
             # A beam that hears what it heard a turn ago.
             found = np.array([(self._column + self._step) % message.width])
         self._step, self._column = 1 if found[-1] >= self._column else -1, int(found[-1])
-        stamp, resolution = stamp_ns(message.header), self._reach / message.height
-        angles = 2.0 * math.pi * found / message.width
-        return [
-            BeamFields(stamp, message.header.frame_id, float(angle), image[::-1, column], resolution)
-            for angle, column in zip(angles, found)
-        ]
+        angles, resolution = 2.0 * math.pi * found / message.width, self._reach / message.height
+        columns = zip(angles, found)
+        return [BeamFields.of(message, float(angle), image[::-1, column], resolution) for angle, column in columns]
