@@ -26,8 +26,8 @@ TOGETHER = 3
 SPARE_TOGETHER = 2
 # The lowest there is: who waits for a message gets the processor at once.
 SPARE_PRIORITY = 19
-# Rostests that measure time or processor time; all others wait for what must come, however late.
-ALONE = ("imagenex_852_load", "ping360_load")
+# Rostests that measure processor time; all others wait for what must come, however late.
+MEASURING = ("imagenex_852_load", "ping360_load")
 # Rostests that take longest: those that begin last should be short.
 LONG = (
     "one_and_many_processes", "every_node", "vehicle_emulated", "silence", "thrusters_demo", "strafing_demo",
@@ -50,7 +50,7 @@ class Outcome:
 class Load(Enum):
     """What a step asks of the machine."""
 
-    ALONE = "measures processor time, or is quick: nothing else may run"
+    ALONE = "is quick: nothing else runs"
     WHOLE = "uses all processors or measures time: only SPARE ones may run beside it"
     SHARED = "mostly waits: some run at once"
     SPARE = "computes and measures no time: takes what all others leave"
@@ -81,7 +81,6 @@ def steps() -> List[Step]:
     return [
         Step("ruff check", ["ruff", "check", "--quiet", "."], load=Load.ALONE),
         Step("ruff format", ["ruff", "format", "--quiet", "--check", "."], load=Load.ALONE),
-        Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."], load=Load.ALONE),
         _pytest("unit tests", "test/unit", "-m", "not long", *IN_PARALLEL),
         _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
         *oldest_versions(),
@@ -89,6 +88,7 @@ def steps() -> List[Step]:
         _pytest("long tests", "test/unit", "-m", "long", load=Load.SPARE),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
         _pytest("documentation", "test/documentation", load=Load.SPARE),
+        Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."], load=Load.SPARE),
         _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),
         _pytest("installation", "test/installation", load=Load.SHARED),
         *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"), key=_by_length)),
@@ -107,7 +107,7 @@ def _by_length(test: Path) -> Tuple[bool, str]:
 
 def _rostest(test: Path) -> Step:
     command = ["rostest", "--results-filename=result.xml", str(test)]
-    load = Load.ALONE if test.stem in ALONE else Load.SHARED
+    load = Load.WHOLE if test.stem in MEASURING else Load.SHARED
     # Nodes of one name that run at once would save their maps in one file.
     variables = {"ROS_HOME": str(RESULTS / test.stem / "ros_home")}
     return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load, variables=variables)
