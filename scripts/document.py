@@ -34,6 +34,7 @@ from sonar_processing.shapes.lines import LineDetectorParameters
 from sonar_simulator import gazebo_beams
 from sonar_simulator.simulation.simulation import SimulatorParameters
 from sonar_simulator.simulation.simulation_setup import GROUPS
+from web_page.parameters import WebPageParameters
 
 ROOT = Path(__file__).resolve().parent.parent
 NODES_INTRODUCTION = """\
@@ -109,6 +110,7 @@ START_UP_NODES: Dict[str, Type[ParameterSet]] = {
     "sonar_simulator": SimulatorParameters,
     "gazebo_sonar": gazebo_beams.GazeboSonarParameters,
     "thin_link": ThinLinkParameters,
+    "web_page": WebPageParameters,
 }
 """Nodes that read their parameters only when they start."""
 
@@ -118,7 +120,7 @@ def generated() -> Dict[Path, str]:
     texts = {
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, parameters) for name, parameters in LIVE_NODES.items()
     }
-    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS, "thin_link": {}}
+    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS, "thin_link": {}, "web_page": {}}
     for name, parameters in START_UP_NODES.items():
         texts[ROOT / f"yaml/{name}_default.yaml"] = start_up_yaml(name, parameters, groups[name])
     for kind in OdometryKind:

@@ -52,6 +52,7 @@ def info_lines(path: Path, stored: StoredMap) -> List[str]:
     made = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(stored.made)) if stored.made else "at a time not known"
     lines = [f"{path}: frame {stored.frame}, made {made}"]
     lines += [f"  {layer.value}: {_layer_line(blocks)}" for layer, blocks in stored.layers.items()]
+    lines += [f"  mark: {mark.name!r} at {mark.x:.1f}, {mark.y:.1f} m" for mark in stored.marks]
     lines += [f"  calibration: {name} = {value}" for name, value in sorted(stored.calibration.items())]
     lines += [f"  with {name} {'x'.join(map(str, array.shape))}" for name, array in sorted(stored.arrays.items())]
     return lines

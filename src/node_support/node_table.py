@@ -190,6 +190,9 @@ NODES: Dict[str, NodeDescription] = {
                 "geometry_msgs/PoseWithCovarianceStamped",
                 'where somebody sees the vehicle, as rviz\'s "2D Pose Estimate"; the next scans are searched there',
             ),
+            _subscribes(
+                topics.SET_MARK, "visualization_msgs/Marker", "a place to name by the marker's text, or to delete"
+            ),
             _subscribes("tf", "", "`odom -> base_link`: dead reckoning"),
             _publishes(
                 topics.MAP_MARKERS,
@@ -226,6 +229,7 @@ NODES: Dict[str, NodeDescription] = {
             ),
             _publishes(topics.POSITION_STATUS, "PositionStatus", "how well the position is known now; latched"),
             _publishes(topics.MATCHED_PATH, "nav_msgs/Path", "all fixes; latched"),
+            _publishes(topics.MARKS, "visualization_msgs/MarkerArray", "the named places of the map; latched"),
             _publishes(
                 topics.MATCHED_SCAN, "sensor_msgs/PointCloud2", "the newest scan as matching undistorts and places it"
             ),
@@ -302,6 +306,19 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes("tf", "", "`base_link -> ` frames of compass and DVL: how they are mounted"),
             _publishes("tf", "", "`odom -> base_link` at each heading"),
             _publishes(topics.ODOMETRY, "nav_msgs/Odometry", "the same with the velocity"),
+        ),
+    ),
+    "web_page": NodeDescription(
+        "Shows map, vehicle, sonar and checks in any browser, live. See [web_page](web_page.md).",
+        (
+            _BEAMS_IN,
+            _subscribes("tf", "", "`map -> odom -> base_link -> sonar`: vehicle and sonar"),
+            _subscribes(topics.MATCHED_POSE, "geometry_msgs/PoseWithCovarianceStamped", "fixes"),
+            _subscribes(topics.POSITION_STATUS, "PositionStatus", "how well the position is known"),
+            _subscribes(topics.MAP_CLOUD, "sensor_msgs/PointCloud2", "the map"),
+            _subscribes(topics.MARKS, "visualization_msgs/MarkerArray", "the named places of the map"),
+            _subscribes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "what every node tells of itself"),
+            _publishes(topics.SET_MARK, "visualization_msgs/Marker", "a place that somebody named or deleted"),
         ),
     ),
     "autopilot_link": NodeDescription(

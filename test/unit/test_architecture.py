@@ -25,6 +25,7 @@ ALLOWED = {
     "sonar_processing": {"node_support"},
     "recordings": {"dead_reckoning", "imagenex_852_driver", "node_support", "ping360_driver", "sonar_processing"},
     "mlsm_manager": {"georeferencing", "node_support", "recordings", "sonar_processing"},
+    "web_page": {"georeferencing", "node_support", "sonar_processing"},
     "sonar_simulator": {"node_support", "recordings", "sonar_processing"},
 }
 ROS_NAMES = {

@@ -2,8 +2,9 @@
 
 import os
 import time
+from dataclasses import replace
 from pathlib import Path
-from typing import Callable
+from typing import Callable, Tuple
 
 import numpy as np
 import rospy
@@ -12,6 +13,7 @@ from std_srvs.srv import Trigger, TriggerRequest, TriggerResponse
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import ScanUpdate
+from mlsm_manager.ros.map_marks import MapMarks
 from mlsm_manager.ros.map_publisher import map_cloud
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.map_file import StoredMap
@@ -30,12 +32,14 @@ class MapServices:
         namespace: str,
         localiser: Localiser,
         parameters: MlsmCoreParameters,
+        marks: MapMarks,
         on_replaced: Callable[[], None],
         on_fix: Callable[[ScanUpdate], None],
     ) -> None:
         """`on_replaced` is called after the map was cleared or loaded, `on_fix` with the scan whose pose was found."""
         self._localiser = localiser
         self._parameters = parameters
+        self._marks = marks
         self._folder = MapFolder(parameters.map_directory)
         self._on_replaced = on_replaced
         self._on_fix = on_fix
@@ -47,7 +51,7 @@ class MapServices:
         rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
 
     def _save(self, request: srv.SaveMapRequest) -> srv.SaveMapResponse:
-        stored = stored_map(self._localiser, self._parameters)
+        stored = stored_map(self._localiser, self._parameters, self._marks)
         try:
             path = self._folder.save(request.name, stored, request.overwrite)
         except (OSError, ValueError) as error:
@@ -58,6 +62,7 @@ class MapServices:
         try:
             stored = self._folder.load(request.name)
             load_into(self._localiser, stored, self._parameters, same_odometry=False)
+            self._marks.replace(stored.marks)
         except ValueError as error:
             return srv.LoadMapResponse(False, f"{error}; the present map stays")
         self._on_replaced()
@@ -65,6 +70,7 @@ class MapServices:
 
     def _reset(self, _request: TriggerRequest) -> TriggerResponse:
         count = self._localiser.clear()
+        self._marks.replace(())
         self._on_replaced()
         return TriggerResponse(True, f"{count} blocks deleted")
 
@@ -95,9 +101,10 @@ def _left_out(turns: int) -> str:
     return f"; the {turns} turns of the head since the silence, which lay apart, are left out of it" if turns else ""
 
 
-def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, run: str = "") -> StoredMap:
+def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, marks: MapMarks, run: str = "") -> StoredMap:
     """Return the map as a file keeps it, made now."""
-    return localiser.stored(parameters.map_frame, parameters.calibration, time.time(), run)
+    stored = localiser.stored(parameters.map_frame, parameters.calibration, time.time(), run)
+    return replace(stored, marks=marks.all())
 
 
 def load_into(localiser: Localiser, stored: StoredMap, parameters: MlsmCoreParameters, same_odometry: bool) -> str:
@@ -113,15 +120,18 @@ def load_into(localiser: Localiser, stored: StoredMap, parameters: MlsmCoreParam
 class Autosave:
     """One file for each node in map_directory, and the last one of the run before under another name."""
 
-    def __init__(self, namespace: str, localiser: Localiser, parameters: MlsmCoreParameters, health: Health) -> None:
+    def __init__(
+        self, namespace: str, localiser: Localiser, parameters: MlsmCoreParameters, marks: MapMarks, health: Health
+    ) -> None:
         """Load what a node of this name saved in this run of roslaunch, and save from now on."""
         self._localiser = localiser
         self._parameters = parameters
+        self._marks = marks
         self._health = health
         self._folder = MapFolder(parameters.map_directory)
         self._name = rospy.resolve_name(namespace).strip("/").replace("/", ".") + ".autosave"
         self._run = _run_of_roslaunch()
-        self._saved_at = localiser.changes
+        self._saved_at = self._changes()
         if not self._resumed() and parameters.map:
             self._start_in(parameters.map)
         if parameters.autosave_period > 0.0:
@@ -130,16 +140,21 @@ class Autosave:
 
     def save_if_changed(self) -> None:
         """Write the map, unless it is empty or as it was when it was written last."""
-        changes = self._localiser.changes
+        changes = self._changes()
         if changes == self._saved_at or not self._localiser.block_count:
             return
         try:
-            self._folder.save(self._name, stored_map(self._localiser, self._parameters, self._run), overwrite=True)
+            self._folder.save(
+                self._name, stored_map(self._localiser, self._parameters, self._marks, self._run), overwrite=True
+            )
         except (OSError, ValueError) as error:
             self._health.problem("maps not saved", f"{error}; the map would be lost if the node were killed")
             return
         self._saved_at = changes
         self._health.count("maps saved")
+
+    def _changes(self) -> Tuple[int, int]:
+        return self._localiser.changes, self._marks.changes
 
     def _start_in(self, name: str) -> None:
         """Load the map that the user named. Raises ParameterError where that cannot be done."""
@@ -147,7 +162,9 @@ class Autosave:
         if path.is_absolute() and path.parent == self._folder.folder:
             name = path.name
         try:
-            load_into(self._localiser, self._folder.load(name), self._parameters, same_odometry=False)
+            stored = self._folder.load(name)
+            load_into(self._localiser, stored, self._parameters, same_odometry=False)
+            self._marks.replace(stored.marks)
         except ValueError as error:
             raise ParameterError(f"map = {self._parameters.map!r}: {error}") from None
         rospy.loginfo("%s: starts in %s, %d blocks", self._health.name, name, self._localiser.block_count)
@@ -166,10 +183,11 @@ class Autosave:
             self._health.problem("maps not resumed", f"{error}; a new map begins, the file is put aside")
             self._folder.put_aside(self._name)
             return False
+        self._marks.replace(stored.marks)
         if reason:
             detail = f"{reason}; its map is kept, and the vehicle is searched in it"
             self._health.problem("runs not resumed", detail)
-        self._saved_at = self._localiser.changes
+        self._saved_at = self._changes()
         rospy.loginfo("%s: goes on in the map of %d blocks", self._health.name, self._localiser.block_count)
         return True
 

@@ -21,6 +21,7 @@ from mlsm_manager.localisation.updates import (
     report_verdicts,
 )
 from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform, planar_pose
+from mlsm_manager.ros.map_marks import MapMarks
 from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import Autosave, MapServices
 from mlsm_manager.ros.odometry_track import OdometryTrack, planar
@@ -61,14 +62,15 @@ class MlsmCore:
         self._mounted = False
         self._steps_told = 0
         self._z_down = ZDownSigns()
-        self._autosave = Autosave(namespace, self._localiser, parameters, self.health)
+        marks = MapMarks(parameters.map_frame, self.health)
+        self._autosave = Autosave(namespace, self._localiser, parameters, marks, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
         self.status = StatusTeller(self._localiser, self._odometry, self._transform, parameters.map_frame, self.health)
         # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
         found = guarded(self.health, self._publish_found)
-        self._services = MapServices(namespace, self._localiser, parameters, self._after_replacing, found)
+        self._services = MapServices(namespace, self._localiser, parameters, marks, self._after_replacing, found)
         seen = guarded(self.health, self._expect)
         rospy.Subscriber(topics.SEEN_POSE, PoseWithCovarianceStamped, seen, queue_size=10)
         rospy.Service(topics.DYNAMIC_MAP, GetMap, lambda _request: GetMapResponse(self._map.grid()))

@@ -9,7 +9,7 @@ bytes.
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Any, Dict, Mapping
+from typing import Any, Dict, Mapping, Sequence
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.cell_index import cell_keys
 from node_support.files import write_whole
+from node_support.marks import Mark
 
 
 class MapFileError(ValueError):
@@ -53,6 +54,7 @@ class StoredMap:
     frame: of the map. layers: blocks by what they are for. calibration: parameters of sensor and vehicle that the scans
     were corrected with, by name. made: seconds since 1970, 0 when not known. arrays: anything else worth keeping with
     the map (keyframes, the vehicle's place), by name. run: which run of the graph made it, empty when not known.
+    marks: places that somebody named.
     """
 
     frame: str
@@ -61,6 +63,7 @@ class StoredMap:
     made: float = 0.0
     arrays: Mapping[str, np.ndarray] = field(default_factory=dict)
     run: str = ""
+    marks: Sequence[Mark] = ()
 
     def __len__(self) -> int:
         """Return the number of blocks that are occupied."""
@@ -94,6 +97,7 @@ def map_bytes(stored: StoredMap) -> bytes:
         "made": stored.made,
         "run": stored.run,
         "calibration": dict(stored.calibration),
+        "marks": [[mark.name, mark.x, mark.y, mark.z] for mark in stored.marks],
         "layers": {layer.value: _layer_words(blocks) for layer, blocks in stored.layers.items()},
     }
     arrays = {f"array/{name}": np.asarray(array) for name, array in stored.arrays.items()}
@@ -113,9 +117,11 @@ def map_of_bytes(data: bytes) -> StoredMap:
         }
         frame, made, run = str(words["frame"]), float(words["made"]), str(words["run"])
         calibration = dict(words["calibration"])
+        # Files of older versions have none.
+        marks = [Mark(*mark) for mark in words.get("marks", [])]
     except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
         raise ArrayFileError(f"holds no map ({error})") from None
-    return StoredMap(frame, layers, calibration, made, _named(arrays, "array"), run)
+    return StoredMap(frame, layers, calibration, made, _named(arrays, "array"), run, marks)
 
 
 def _named(arrays: Mapping[str, np.ndarray], group: str) -> Dict[str, np.ndarray]:

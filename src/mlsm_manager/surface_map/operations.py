@@ -7,6 +7,7 @@ import numpy as np
 from mlsm_manager.surface_map.blocks import BOTTOM, MEAN, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.map_file import StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.marks import Mark
 
 _WHOLE_TURNS = 1e-12
 """rad; a quarter turn that differs from pi / 2 by no more is one, so that its sine and cosine are exactly 0 and 1."""
@@ -70,7 +71,7 @@ def _together(first: Blocks, second: Blocks) -> MultiLevelSurfaceMap:
 
 
 def merged(first: StoredMap, second: StoredMap, T_first_second: LevelTransform) -> StoredMap:
-    """Return both maps as one, layer by layer, with frame, calibration and arrays of the first.
+    """Return both maps as one, layer by layer, with frame, calibration and arrays of the first, which keeps its marks.
 
     Raises ValueError when the resolutions of a layer differ.
     """
@@ -80,7 +81,13 @@ def merged(first: StoredMap, second: StoredMap, T_first_second: LevelTransform) 
             layers[layer] = merged_blocks(layers[layer], blocks, T_first_second)
         else:
             layers[layer] = moved(blocks, T_first_second)
-    return replace(first, layers=layers)
+    marks = {mark.name: mark for mark in [*(_moved_mark(mark, T_first_second) for mark in second.marks), *first.marks]}
+    return replace(first, layers=layers, marks=list(marks.values()))
+
+
+def _moved_mark(mark: Mark, T_new_old: LevelTransform) -> Mark:
+    x, y = T_new_old.rotation() @ (mark.x, mark.y) + (T_new_old.x, T_new_old.y)
+    return Mark(mark.name, float(x), float(y), mark.z + T_new_old.z)
 
 
 @dataclass(frozen=True)
@@ -129,4 +136,7 @@ def _tops(groups: np.ndarray, height: np.ndarray) -> np.ndarray:
 
 def cropped(stored: StoredMap, low: np.ndarray, high: np.ndarray) -> StoredMap:
     """Return the map with those blocks only whose mean lies from `low` to `high`, (2,) x y or (3,) x y z [m]."""
-    return replace(stored, layers={layer: blocks.in_box(low, high) for layer, blocks in stored.layers.items()})
+    layers = {layer: blocks.in_box(low, high) for layer, blocks in stored.layers.items()}
+    places = [np.array([mark.x, mark.y, mark.z][: len(low)]) for mark in stored.marks]
+    inside = [mark for mark, place in zip(stored.marks, places) if (low <= place).all() and (place <= high).all()]
+    return replace(stored, layers=layers, marks=inside)

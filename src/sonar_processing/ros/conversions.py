@@ -55,30 +55,25 @@ def cloud_from_message(message: StampedIntensityCloud) -> Cloud:
     )
 
 
-def points_from_message(message: PointCloud2) -> np.ndarray:
-    """Return (n, 4) float32 x y z intensity; raises RefusedInput when fields are missing or the data is too short."""
+def points_from_message(message: PointCloud2, wanted: Sequence[str] = POINT_FIELDS) -> np.ndarray:
+    """Return (n, len(wanted)) float32; raises RefusedInput when fields are missing or the data is too short."""
     offsets = {f.name: f.offset for f in message.fields if f.datatype == PointField.FLOAT32 and f.count <= 1}
-    missing = [name for name in POINT_FIELDS if name not in offsets]
+    missing = [name for name in wanted if name not in offsets]
     if missing:
         raise RefusedInput("clouds refused", f"no float32 field {', '.join(missing)}; check the publisher")
+    places = [offsets[name] for name in wanted]
     count, step = message.width * message.height, message.point_step
-    if (
-        message.is_bigendian
-        or step < max(offsets[name] for name in POINT_FIELDS) + 4
-        or len(message.data) != count * step
-    ):
+    if message.is_bigendian or step < max(places) + _FLOAT_BYTES or len(message.data) != count * step:
         raise RefusedInput(
             "clouds refused", f"{len(message.data)} bytes for {count} points of {step} bytes; check the publisher"
         )
     if count == 0:
-        return np.zeros((0, len(POINT_FIELDS)), dtype=np.float32)
-    if [offsets[name] for name in POINT_FIELDS] == [0, 4, 8, 12] and step == 16:
-        return np.frombuffer(message.data, dtype=np.float32).reshape(-1, 4)
-    row = np.dtype(
-        {"names": POINT_FIELDS, "formats": ["<f4"] * 4, "offsets": [offsets[n] for n in POINT_FIELDS], "itemsize": step}
-    )
+        return np.zeros((0, len(wanted)), dtype=np.float32)
+    if places == list(range(0, step, _FLOAT_BYTES)):
+        return np.frombuffer(message.data, dtype=np.float32).reshape(-1, len(wanted))
+    row = np.dtype({"names": wanted, "formats": ["<f4"] * len(wanted), "offsets": places, "itemsize": step})
     rows = np.frombuffer(message.data, dtype=row)
-    return np.column_stack([rows[name] for name in POINT_FIELDS])
+    return np.column_stack([rows[name] for name in wanted])
 
 
 def point_cloud(

@@ -24,6 +24,8 @@ from mlsm_manager.surface_map.map_file import (
     write_map,
 )
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from mlsm_manager.surface_map.operations import LevelTransform, cropped, merged
+from node_support.marks import Mark
 
 MUTATIONS = 1000
 
@@ -52,6 +54,28 @@ def test_means_and_deviations_are_kept_to_a_part_of_a_cell():
     assert np.abs(deviations[:, :2]).max() < 0.25 / 2**16
     assert np.abs(deviations[:, 2] / depth).max() < 2.0**-17
     np.testing.assert_allclose(np.sqrt(loaded.variance[:, 3]), np.sqrt(blocks.variance[:, 3]), rtol=2**-22)
+
+
+def test_marks_are_kept_and_files_without_any_can_be_read():
+    marks = [Mark("mooring block ⚓", 1.5, -2.25, -3.0), Mark("b", 0.0, 0.0)]
+    assert map_of_bytes(map_bytes(replace(stored_map(), marks=marks))).marks == marks
+    words, arrays = decoded(map_bytes(stored_map()))
+    del words["marks"]
+    assert map_of_bytes(encoded(words, arrays)).marks == []
+
+
+def test_a_map_with_a_mark_that_is_none_is_refused():
+    words, arrays = decoded(map_bytes(stored_map()))
+    with pytest.raises(ArrayFileError, match="printable"):
+        map_of_bytes(encoded({**words, "marks": [["", 0.0, 0.0, 0.0]]}, arrays))
+
+
+def test_marks_go_with_their_map_when_maps_are_merged_and_cropped():
+    first = replace(stored_map(), marks=[Mark("a", 1.0, 1.0)])
+    second = replace(stored_map(), marks=[Mark("a", 5.0, 5.0), Mark("b", 1.0, 0.0, -1.0)])
+    both = merged(first, second, LevelTransform(x=10.0, yaw=np.pi / 2.0))
+    assert {mark.name: mark for mark in both.marks} == {"a": Mark("a", 1.0, 1.0), "b": Mark("b", 10.0, 1.0, -1.0)}
+    assert cropped(both, np.array([0.0, 0.0]), np.array([2.0, 2.0])).marks == [Mark("a", 1.0, 1.0)]
 
 
 def test_what_was_loaded_is_saved_as_it_was():

@@ -1,0 +1,150 @@
+"""The bytes that a page gets and the texts that it may send; page/connection.js reads and writes the same.
+
+A binary message begins with 8 bytes: its kind, a number of 8 bits, one of 16 bits, and 4 bytes that depend on the kind.
+All numbers are little-endian; lists of wide numbers come first, so that each begins where its type may begin.
+"""
+
+import json
+import math
+import struct
+from dataclasses import dataclass
+from enum import IntEnum
+from typing import Any, Optional, Union
+
+import numpy as np
+
+from node_support.errors import RefusedInput
+from node_support.marks import Mark
+
+LONGEST_REQUEST = 1024  # bytes
+_TURN = 65536  # steps of an angle of 16 bits
+_KIND = "requests refused"
+
+
+class Kind(IntEnum):
+    """Of a binary message."""
+
+    TILE = 1
+    BEAM = 2
+    TRACK = 3
+    FIXES = 4
+
+
+@dataclass(frozen=True)
+class Hello:
+    """A page begins: what it has of which run, as it was told in `now`; nothing the first time."""
+
+    run: str
+    revision: int
+
+
+@dataclass(frozen=True)
+class SetMark:
+    """Somebody marks a place."""
+
+    mark: Mark
+
+
+@dataclass(frozen=True)
+class DeleteMark:
+    """Somebody deletes a mark."""
+
+    name: str
+
+
+Request = Union[Hello, SetMark, DeleteMark]
+
+
+def parsed(text: Union[str, bytes]) -> Request:
+    """Return what a page asks for; raises RefusedInput for anything else, whoever sent it."""
+    if not isinstance(text, str) or len(text) > LONGEST_REQUEST:
+        raise RefusedInput(_KIND, f"{len(text)} bytes, must be a text of at most {LONGEST_REQUEST}")
+    try:
+        asked = json.loads(text)
+        (verb,) = asked
+        given = asked[verb]
+        if verb == "hello":
+            return Hello(_word(given["run"]), _number(given["revision"]))
+        if verb == "mark":
+            return SetMark(Mark(given["name"], given["x"], given["y"]))
+        if verb == "delete":
+            return DeleteMark(_word(given["name"]))
+    except (ValueError, TypeError, KeyError, RecursionError) as error:
+        if isinstance(error, RefusedInput):
+            raise
+        raise RefusedInput(_KIND, f"{text[:80]!r}: {type(error).__name__}") from None
+    raise RefusedInput(_KIND, f"{verb[:80]!r}, must be hello, mark or delete")
+
+
+def _word(value: Any) -> str:
+    if not isinstance(value, str):
+        raise TypeError("must be a text")
+    return value
+
+
+def _number(value: Any) -> int:
+    if not isinstance(value, int):
+        raise TypeError("must be a whole number")
+    return value
+
+
+def text_of(**words: Any) -> str:
+    """Return words as JSON; what is not finite becomes null, which JSON knows."""
+    return json.dumps(_finite(words), separators=(",", ":"), allow_nan=False)
+
+
+def _finite(value: Any) -> Any:
+    if isinstance(value, float):
+        return value if math.isfinite(value) else None
+    if isinstance(value, dict):
+        return {key: _finite(one) for key, one in value.items()}
+    return [_finite(one) for one in value] if isinstance(value, (list, tuple)) else value
+
+
+def tile_bytes(x: int, y: int, columns: Optional["TileColumns"]) -> bytes:
+    """Return the cells of a tile; None: it is empty now."""
+    if columns is None:
+        return struct.pack("<BBHhh", Kind.TILE, 0, 0, x, y)
+    parts = (columns.index, columns.born, columns.level, columns.within)
+    kinds = ("<u2", "<u2", "u1", "u1")
+    head = struct.pack("<BBHhh", Kind.TILE, 0, len(columns.index), x, y)
+    return head + b"".join(part.astype(kind).tobytes() for part, kind in zip(parts, kinds))
+
+
+@dataclass(frozen=True)
+class TileColumns:
+    """Of each cell of a tile (n,): index in the tile, when it was first seen, strength, place within it."""
+
+    index: np.ndarray
+    born: np.ndarray
+    level: np.ndarray
+    within: np.ndarray
+
+
+def beam_bytes(reach: float, ray: "Ray", strengths: np.ndarray) -> bytes:
+    """Return a beam that hears `reach` [m] far, with strengths (bins,) uint8, at most 255 bins."""
+    head = struct.pack("<BBHf", Kind.BEAM, len(strengths), _steps(ray.width), reach)
+    place = struct.pack("<HHff", _steps(ray.from_bow), _steps(ray.in_map), ray.x, ray.y)
+    return head + place + strengths.tobytes()
+
+
+@dataclass(frozen=True)
+class Ray:
+    """Where a beam went: directions from the bow and from the map's x axis, rad, counter-clockwise; its width, rad;
+    x, y [m] in the map from where.
+    """
+
+    from_bow: float
+    in_map: float
+    width: float
+    x: float
+    y: float
+
+
+def _steps(angle: float) -> int:
+    return round(angle / (2.0 * math.pi) * _TURN) % _TURN
+
+
+def rows_bytes(kind: Kind, chunk: int, rows: np.ndarray) -> bytes:
+    """Return rows (n, columns) of a track or of fixes as float32; chunk: which part of all rows they are."""
+    return struct.pack("<BBHI", kind, rows.shape[1], len(rows), chunk) + rows.astype("<f4").tobytes()

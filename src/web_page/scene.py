@@ -1,0 +1,151 @@
+"""All that the page shows, from what the graph tells."""
+
+import math
+import os
+import time
+from dataclasses import dataclass
+from typing import Callable, Dict, Optional, Sequence
+
+import numpy as np
+
+from node_support.geometry import wrapped
+from node_support.marks import Mark
+from sonar_processing.beams.beam import Beam
+from web_page.board import BEAM, NOW, TILE, TRACK, WORDS, Board
+from web_page.history import History
+from web_page.messages import Kind, text_of
+from web_page.parameters import WebPageParameters
+from web_page.sonar import SonarDisc
+from web_page.tiles import BORN_STEP, SIDE, MapTiles
+
+JUMP_BACK = 1.0  # s: messages overtake each other by less
+_SILENCE = 5.0  # s of wall time
+_TRACK_PERIOD = 1.0  # s between two positions of the trail
+
+
+@dataclass(frozen=True)
+class Status:
+    """How well the position is known: state and words of PositionStatus, seconds since the fix, (3, 3) covariance."""
+
+    state: int
+    text: str
+    age: float
+    covariance: np.ndarray
+
+
+class Scene:
+    """Keeps what is newest on a board; a time that jumps back begins a new run. The caller holds the board's lock."""
+
+    def __init__(
+        self, parameters: WebPageParameters, azimuth_deg: float, board: Board, beams: str,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:  # fmt: skip
+        """azimuth_deg: of the map's x axis, clockwise from north. beams: name of their topic."""
+        self.board, self._parameters, self._clock, self._beams = board, parameters, clock, beams
+        self._azimuth_deg = azimuth_deg
+        self._boot, self._runs = f"{os.getpid()}.{time.time():.0f}", 0
+        self._heard: Dict[str, float] = {}
+        self._status: Optional[Status] = None
+        self._marks: Sequence[Mark] = ()
+        self._cell = parameters.cell
+        self._tiles = MapTiles(lambda tile, data: board.put(("tile", *tile), data, TILE))
+        self._track = History(Kind.TRACK, _TRACK_PERIOD, lambda chunk, data: board.put(("track", chunk), data, TRACK))
+        self._fixes = History(Kind.FIXES, 0.0, lambda chunk, data: board.put(("fixes", chunk), data, TRACK))
+        self._disc = SonarDisc(
+            lambda slot, data: board.put(("beam", slot), data, BEAM),
+            lambda slots: board.drop([("beam", slot) for slot in slots]),
+        )
+        self._begin(None)
+
+    def _begin(self, start: Optional[float]) -> None:
+        """Begin a run at a time [s], None where it is not known yet."""
+        self._runs += 1
+        self.board.run = f"{self._boot}.{self._runs}"
+        self._start = self._newest = start
+        self._place: Optional[np.ndarray] = None
+        self.board.clear()
+        for one in (self._tiles, self._track, self._fixes):
+            one.clear()
+        self.hello()
+        self.take_marks(self._marks)
+
+    def hello(self) -> None:
+        """Show what the page has to know first."""
+        words = {
+            "run": self.board.run, "cell": self._cell, "side": SIDE, "bornStep": BORN_STEP,
+            "azimuth": self._azimuth_deg,
+        }  # fmt: skip
+        self.board.put("hello", text_of(hello=words), NOW)
+
+    def _since_start(self, now: float) -> float:
+        """Return the seconds since the run began; a time [s] that jumped back begins another."""
+        if self._start is None:
+            self._start = self._newest = now
+        elif now < self._newest - JUMP_BACK:
+            self._begin(now)
+        self._newest = max(self._newest, now)
+        return now - self._start
+
+    def take_pose(self, now: float, T_map_base: np.ndarray) -> None:
+        """Take where the vehicle is (4, 4)."""
+        seconds = self._since_start(now)
+        self._heard["pose"] = self._clock()
+        yaw = math.atan2(T_map_base[1, 0], T_map_base[0, 0])
+        self._place = np.array([*T_map_base[:3, 3], yaw])
+        self._track.take((seconds, *self._place[[0, 1, 3]]))
+
+    def take_fix(self, now: float, pose: np.ndarray, covariance: np.ndarray) -> None:
+        """Take a fix x, y, yaw (3,) with its covariance (3, 3)."""
+        self._heard["fix"] = self._clock()
+        row = (self._since_start(now), *pose[:2], covariance[0, 0], covariance[0, 1], covariance[1, 1])
+        self._fixes.take(row)
+
+    def take_map(self, now: float, points: np.ndarray, counts: np.ndarray, cell: float) -> None:
+        """Take the blocks of the map, see `MapTiles.take`."""
+        seconds = self._since_start(now)
+        if cell != self._cell:
+            self._cell = cell
+            self.hello()
+        self._heard["map"] = self._clock()
+        self._tiles.take(points, counts, cell, seconds)
+
+    def take_beam(self, beam: Beam, T_base_sonar: np.ndarray, T_map_sonar: np.ndarray) -> None:
+        """Take a beam, see `SonarDisc.take`."""
+        self._heard["beams"] = self._clock()
+        self._disc.take(beam, T_base_sonar, T_map_sonar)
+
+    def take_status(self, status: Status) -> None:
+        """Take how well the position is known."""
+        self._heard["status"] = self._clock()
+        self._status = status
+
+    def take_marks(self, marks: Sequence[Mark]) -> None:
+        """Take the marks of the map."""
+        self._marks = marks
+        self.board.put("marks", text_of(marks=[[mark.name, mark.x, mark.y] for mark in marks]), WORDS)
+
+    def tell_now(self, now: float) -> None:
+        """Send those who look what holds now."""
+        seconds = self._since_start(now) if now else 0.0
+        clock = self._clock()
+        words = {"t": round(seconds, 2), "ages": {name: round(clock - at, 1) for name, at in self._heard.items()}}
+        words.update(cells=self._tiles.cells, fixes=len(self._fixes), waiting=self._waiting(clock))
+        if self._place is not None:
+            x, y, z, yaw = self._place
+            heading = math.degrees(wrapped(math.radians(self._azimuth_deg) - yaw)) % 360.0
+            words["pose"] = [round(float(value), 3) for value in (x, y, yaw, -z, heading)]
+        if self._status is not None:
+            status = self._status
+            words["status"] = {"state": status.state, "text": status.text[:300], "age": status.age}
+            words["covariance"] = [float(status.covariance[at]) for at in ((0, 0), (0, 1), (1, 1))]
+        self.board.pass_on("now", text_of(now=words), NOW)
+
+    def _waiting(self, clock: float) -> str:
+        """Return what never came, the first in the chain; what ceased later, mlsm_core's status says."""
+        frames = f"{self._parameters.map_frame} to {self._parameters.base_frame}"
+        wanted = {"beams": f"beams on {self._beams}", "pose": f"tf from {frames}", "map": "the first scan"}
+        missing = next((text for name, text in wanted.items() if name not in self._heard), "")
+        silence = clock - self._heard.get("status", clock)
+        if missing or silence <= _SILENCE:
+            return missing and f"waiting for {missing}"
+        return f"mlsm_core has said nothing for {silence:.0f} s"
