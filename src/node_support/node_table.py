@@ -53,6 +53,7 @@ _OF_EMULATORS = (
     _serves("~order_fault", "OrderFault", "makes a fault happen at once"),
     _subscribes("tf", "", "`world -> ` frame of the head, if `head_frame` is set"),
 )
+_SONAR_IN_CLOUD = _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam")
 _AS_POINTS = "also as PointCloud2 on `.../cloud`"
 
 DIAGNOSTICS = _publishes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second")
@@ -107,6 +108,17 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(topics.NEWEST_BEAM, "sensor_msgs/PointCloud2", "the newest beam"),
         ),
     ),
+    "sector_mask": NodeDescription(
+        "Removes what is heard in a sector of the vehicle's own hull. Not part of the chain unless it is named there. "
+        "See [sonar_processing](sonar_processing.md#sector_mask).",
+        (
+            _subscribes(topics.SCANS, "StampedIntensityCloud", "scans"),
+            _subscribes(topics.POLAR_SCANS, "StampedIntensityCloud", "revolutions with all bins"),
+            _SONAR_IN_CLOUD,
+            _publishes(topics.MASKED, "StampedIntensityCloud", f"scans without the sector; {_AS_POINTS}"),
+            _publishes(topics.MASKED_POLAR, "StampedIntensityCloud", f"revolutions without the sector; {_AS_POINTS}"),
+        ),
+    ),
     "thresholder": NodeDescription(
         "Removes weak echoes (thesis 6.5.3). See [sonar_processing](sonar_processing.md#thresholder).",
         (
@@ -145,7 +157,7 @@ NODES: Dict[str, NodeDescription] = {
         "Detects walls by RANSAC (thesis 6.5.5). See [shapes](shapes.md).",
         (
             _subscribes(topics.CLEANED, "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"),
-            _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam"),
+            _SONAR_IN_CLOUD,
             _publishes(f"{topics.LINES}/coefficients", "Walls", "all walls of a scan, the most certain first"),
             _publishes(topics.LINES, "sensor_msgs/PointCloud2", "the inliers of all walls"),
             _publishes(f"{topics.LINES}/markers", "visualization_msgs/MarkerArray", "the walls for rviz"),
@@ -157,7 +169,7 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(
                 topics.THRESHOLDED, "StampedIntensityCloud", "points; the launch argument `cloud` sets the topic"
             ),
-            _subscribes("tf", "", "`sonar_frame` in the cloud's frame: position of the sonar at each beam"),
+            _SONAR_IN_CLOUD,
             _publishes(f"{topics.CIRCLES}/coefficients", "Circles", "all circles of a scan, the most certain first"),
             _publishes(topics.CIRCLES, "sensor_msgs/PointCloud2", "the inliers of all circles"),
             _publishes(f"{topics.CIRCLES}/markers", "visualization_msgs/MarkerArray", "the circles for rviz"),
@@ -383,8 +395,8 @@ NODES: Dict[str, NodeDescription] = {
 
 
 _PROCESSING = (
-    "sonar_to_cloud", "thresholder", "outlier_remover", "echo_extractor", "line_detector", "circle_detector",
-    "sonar_image",
+    "sonar_to_cloud", "sector_mask", "thresholder", "outlier_remover", "echo_extractor", "line_detector",
+    "circle_detector", "sonar_image",
 )  # fmt: skip
 
 HOSTS: Dict[str, HostDescription] = {

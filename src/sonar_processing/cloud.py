@@ -8,6 +8,8 @@ import numpy as np
 from node_support.errors import RefusedInput
 
 HIGHEST_STRENGTH = 255  # Of an echo; sonars send bytes
+SonarPoses = Callable[[str, np.ndarray], np.ndarray]
+"""Returns T_frame_sonar (m, 4, 4) in a frame at times (m,) [s], NaN where nobody knows it."""
 _FOUR_TRUE = np.ones(4, dtype=bool).view(np.uint32)[0]
 
 

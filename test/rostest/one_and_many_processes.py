@@ -27,9 +27,16 @@ N_WALLS = 2  # as match_cleaned.yaml says
 SECONDS = 4.0  # between waits for slow nodes
 # Of the beams, in each layout: sonar_to_cloud, and a node for images where it has one.
 LISTENERS = {"one": 1, "many": 2}
-INNER_TOPICS = {"one": (), "many": ("sonarCloud", "thresholded", "cleaned", "polar")}
-LISTENING = {"sonarCloud": 1, "thresholded": 2, "cleaned": 3, "polar": 1}  # nodes and this test, with detectors
+INNER_TOPICS = {"one": (), "many": ("sonarCloud", "masked", "thresholded", "cleaned", "polar", "masked/polar")}
+# Nodes and this test, with detectors.
+LISTENING = {"sonarCloud": 2, "masked": 2, "thresholded": 2, "cleaned": 3, "polar": 2, "masked/polar": 2}
+MASKED = 3.02  # m around the sonar, as near_mask.yaml says
+BIN = 0.1  # m
 TOPICS = {
+    "heard": ("/sonar/scan/sonarCloud", StampedIntensityCloud),
+    "polar": ("/sonar/scan/polar", StampedIntensityCloud),
+    "masked": ("/sonar/scan/masked", StampedIntensityCloud),
+    "masked polar": ("/sonar/scan/masked/polar", StampedIntensityCloud),
     "cleaned": ("/sonar/scan/cleaned", StampedIntensityCloud),
     "echoes": ("/sonar/scan/echoes", StampedIntensityCloud),
     "laserScan": ("/sonar/scan/laserScan", LaserScan),
@@ -59,6 +66,17 @@ class OneAndManyProcesses(unittest.TestCase):
         np.testing.assert_array_equal(one["laserScan"].ranges, many["laserScan"].ranges)
         self.assertEqual(one["threshold"].data, many["threshold"].data)
         self.assertEqual((one["image"].width, one["image"].encoding), (501, "mono8"))
+
+    def test_both_layouts_leave_out_what_the_sector_mask_covers(self) -> None:
+        """The nearest bins of each beam, in scans and in whole turns; what is farther stays."""
+        for made in self.beside.values():
+            whole, turn = (cloud_from_message(made[name]) for name in ("polar", "masked polar"))
+            left_out = (whole.valid & ~turn.valid).reshape(whole.height, -1)
+            near = np.arange(1, left_out.shape[1] + 1) * BIN <= MASKED
+            np.testing.assert_array_equal(left_out, near & whole.valid.reshape(left_out.shape))
+            self.assertTrue(left_out.any(axis=1).all())
+            scan, masked = (cloud_from_message(made[name]) for name in ("heard", "masked"))
+            self.assertEqual(len(scan) - len(masked), np.count_nonzero(left_out))
 
     def test_both_layouts_search_the_newest_cleaned_cloud_for_walls_and_circles(self) -> None:
         for made in self.beside.values():
@@ -129,7 +147,10 @@ def _made(processes: str, folder: Path) -> Dict[str, Any]:
     """
     inboxes = {name: Inbox(topic, kind) for name, (topic, kind) in TOPICS.items()}
     maps = Inbox("/MLSM/cloud", PointCloud2)
-    arguments = (f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml", f"map_directory:={folder}")
+    arguments = (
+        f"processes:={processes}", f"parameters:={TEST_DATA}/match_cleaned.yaml", f"map_directory:={folder}",
+        "sector_mask:=true", f"sector_mask_yaml:={TEST_DATA}/near_mask.yaml",
+    )  # fmt: skip
     with launched("mapping.launch", "shapes:=true", *arguments):
         for inbox in (maps, *inboxes.values()):
             inbox.wait_for_link()

@@ -8,6 +8,7 @@ from node_support.parameters import ParameterSet
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
+from sonar_processing.filters.sector_mask import SectorMask, SectorMaskParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters
 
 Stage = Callable[[Cloud], Cloud]
@@ -17,32 +18,35 @@ SCANS_IN_A_ROW = 10
 
 @dataclass(frozen=True)
 class StageType:
-    """What is known of a stage before it runs. Topics are relative to the node's namespace.
+    """What is known of a stage before it runs.
 
+    outputs: the topic of what it makes of each topic that it takes, relative to the node's namespace.
     figures: what else the stage tells of its newest cloud; each is published as Float32 on ~name and shown in
     /diagnostics, unless it is None.
     when_empty: what to do when it removes every point of scan after scan.
+    knows_sonar: `build` gets SonarPoses beside the parameters, which then name `sonar_frame` and `stamp_tolerance`.
     """
 
     parameters: Type[ParameterSet]
-    build: Callable[[ParameterSet], Stage]
-    input_topic: str
-    output_topic: str
+    build: Callable[..., Stage]
+    outputs: Mapping[str, str]
     when_empty: str
     figures: Mapping[str, Callable[[Any], Optional[float]]] = field(default_factory=dict)
-
-    @property
-    def takes_polar_scans(self) -> bool:
-        """Whether the stage works on whole polar scans, beside the chain of clouds."""
-        return self.input_topic == topics.POLAR_SCANS
+    knows_sonar: bool = False
 
 
 STAGES: Dict[str, StageType] = {
+    "sector_mask": StageType(
+        SectorMaskParameters,
+        SectorMask,
+        {topics.SCANS: topics.MASKED, topics.POLAR_SCANS: topics.MASKED_POLAR},
+        "lower width or reach",
+        knows_sonar=True,
+    ),
     "thresholder": StageType(
         ThresholderParameters,
         Thresholder,
-        topics.SCANS,
-        topics.THRESHOLDED,
+        {topics.SCANS: topics.THRESHOLDED},
         "lower otsu_multiplier (mode OTSU+PROPORTIONAL), fixed_threshold (FIXED) or max_proportion (PROPORTIONAL), or "
         "raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
@@ -50,15 +54,13 @@ STAGES: Dict[str, StageType] = {
     "outlier_remover": StageType(
         OutlierRemoverParameters,
         OutlierRemover,
-        topics.THRESHOLDED,
-        topics.CLEANED,
+        {topics.THRESHOLDED: topics.CLEANED},
         "raise stddev_multiplier (mode STATISTICAL), lower min_neighbors (RADIUS), or set mode to NONE",
     ),
     "echo_extractor": StageType(
         EchoExtractorParameters,
         EchoExtractor,
-        topics.POLAR_SCANS,
-        topics.ECHOES,
+        {topics.POLAR_SCANS: topics.ECHOES},
         "lower min_contrast or min_height, or raise the sonar's gain",
         {"threshold": lambda stage: stage.newest_threshold},
     ),

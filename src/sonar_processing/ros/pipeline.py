@@ -1,10 +1,11 @@
 """sonar_to_cloud and the chain of stages in one process: arrays go from stage to stage, nothing is copied."""
 
 from collections import defaultdict
-from typing import TYPE_CHECKING, Collection, Dict, List, Mapping, Optional, Sequence
+from typing import TYPE_CHECKING, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import rospy
 
+from node_support import topics
 from node_support.health import Health
 from node_support.parameters import ParameterError
 from sonar_processing.cloud import Cloud, CloudSink
@@ -22,19 +23,21 @@ DEFAULT_CHAIN = ["thresholder", "outlier_remover", "echo_extractor"]
 class StageChain:
     """Stages one after the other; each gets what the one before made."""
 
-    def __init__(self, runners: List[StageRunner], sinks: Mapping[str, Sequence[CloudSink]]) -> None:
-        """`sinks` receive what stages make, by the output topics of these stages."""
-        self._links = [(runner, sinks.get(runner.type.output_topic, ())) for runner in runners]
+    def __init__(self, links: Sequence[Tuple[StageRunner, str]], sinks: Mapping[str, Sequence[CloudSink]]) -> None:
+        """links: stages with the topics that they take. `sinks` receive what they make, by the topics of that."""
+        self._links = [(runner, topic, sinks.get(runner.type.outputs[topic], ())) for runner, topic in links]
 
     def is_wanted(self) -> bool:
         """Return whether anybody takes anything that the stages make."""
-        return any(runner.is_read or any(sink.is_wanted() for sink in sinks) for runner, sinks in self._links)
+        return any(
+            runner.is_read(topic) or any(sink.is_wanted() for sink in sinks) for runner, topic, sinks in self._links
+        )
 
     def process(self, scan: Cloud) -> None:
         """Take a cloud through all stages."""
         cloud: Optional[Cloud] = scan
-        for runner, sinks in self._links:
-            cloud = runner.process(cloud)
+        for runner, topic, sinks in self._links:
+            cloud = runner.process(topic, cloud)
             if cloud is None:
                 return
             for sink in sinks:
@@ -55,12 +58,13 @@ class Pipeline:
         Raises ParameterError for a bad parameter of any stage or detector.
         """
         runners = [StageRunner(name, rospy.resolve_name(name)) for name in _names("chain", DEFAULT_CHAIN, STAGES)]
-        detectors = _detectors({runner.type.output_topic for runner in runners})
+        detectors = _detectors({made for runner in runners for made in runner.type.outputs.values()})
         sinks: Dict[str, List[CloudSink]] = defaultdict(list)
         for detector in detectors:
             sinks[detector.input_topic].append(detector.sink())
-        clouds = _stage_chain([runner for runner in runners if not runner.type.takes_polar_scans], sinks, cloud_sink)
-        polar = _stage_chain([runner for runner in runners if runner.type.takes_polar_scans], sinks, echo_sink)
+        links = [(runner, topic) for runner in runners for topic in runner.type.outputs]
+        clouds = _stage_chain([link for link in links if link[1] != topics.POLAR_SCANS], sinks, cloud_sink)
+        polar = _stage_chain([link for link in links if link[1] == topics.POLAR_SCANS], sinks, echo_sink)
         self._source = SonarToCloud(
             rospy.resolve_name("sonar_to_cloud"),
             CloudSink(clouds.process, clouds.is_wanted),
@@ -95,9 +99,10 @@ def _names(parameter: str, default: List[str], known: Collection[str]) -> List[s
 
 
 def _stage_chain(
-    runners: List[StageRunner], sinks: Dict[str, List[CloudSink]], last: Optional[CloudSink]
+    links: Sequence[Tuple[StageRunner, str]], sinks: Dict[str, List[CloudSink]], last: Optional[CloudSink]
 ) -> StageChain:
     """Return a chain that gives what the last stage makes to `last` too."""
-    if runners and last is not None:
-        sinks[runners[-1].type.output_topic].append(last)
-    return StageChain(runners, sinks)
+    if links and last is not None:
+        runner, topic = links[-1]
+        sinks[runner.type.outputs[topic]].append(last)
+    return StageChain(links, sinks)

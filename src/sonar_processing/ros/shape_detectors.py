@@ -11,57 +11,20 @@ from visualization_msgs.msg import MarkerArray
 
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.headers import DAY
-from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.transforms import TfBuffer, stamp_of
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import PointsPublisher, report_broken, subscribe_to_clouds
 from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
+from sonar_processing.ros.sonar_places import SonarPlaces
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import RansacParameters
 from underwater_map_construction.msg import Circles, Walls
 
-_CACHE = 300.0  # s: the slowest head takes minutes for a scan
-_PATIENCE = 0.5  # s: transforms come at 2 Hz at least
 QUEUE_SIZE = 10
 _WAITING = 10  # clouds: as many as wait for a detector that is a node of its own
 _WAIT = 0.5  # s: clouds wake the thread; this is for shutdown alone
-
-
-class SonarPlaces:
-    """Remembers tf long enough for a slow scan."""
-
-    def __init__(self, sonar_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
-        """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
-        self._frame = sonar_frame
-        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance)
-
-    def check_stamp(self, stamp_ns: int) -> None:
-        """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
-        self._transforms.check_stamp(stamp_ns)
-
-    def at(self, frame_id: str, times: np.ndarray) -> np.ndarray:
-        """Return (m, 2) x y [m] of the sonar in `frame_id` at `times` (m,) [s], NaN where tf does not know it.
-
-        Waits up to half a second for the newest. Raises RefusedInput when tf knows none of them.
-        """
-        distinct, index = np.unique(times, return_inverse=True)
-        stamps = [stamp_of(seconds) for seconds in distinct]
-        reason = self._transforms.wait_for(frame_id, self._frame, stamps[-1], _PATIENCE)
-        places = np.array([self._place(frame_id, stamp) for stamp in stamps])
-        if np.isnan(places).all():
-            raise RefusedInput("scans without sonar position", f"{self._frame} in {frame_id}: {reason}")
-        return places[index]
-
-    def _place(self, frame_id: str, stamp_ns: int) -> Tuple[float, float]:
-        try:
-            x, y = self._transforms.matrix(frame_id, self._frame, stamp_ns)[:2, 3]
-        except RefusedInput:
-            return np.nan, np.nan
-        return x, y
 
 
 class ShapeDetectorNode(ABC):

@@ -1,5 +1,6 @@
 """The ROS side of a filter stage: parameters, topics and health around a callable from cloud to cloud."""
 
+from functools import partial
 from typing import Optional
 
 import numpy as np
@@ -13,6 +14,7 @@ from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
 from sonar_processing.ros.cloud_topics import CloudPublisher, FigurePublisher, report_broken, subscribe_to_clouds
+from sonar_processing.ros.sonar_places import SonarPlaces
 
 
 class StageRunner:
@@ -24,27 +26,30 @@ class StageRunner:
         self.healths = [self.health]
         self.type = STAGES[name]
         self._emptied = EmptiedScans()
+        self._places: Optional[SonarPlaces] = None
         self._live = ReconfigurableParameters(self.type.parameters, namespace, self.health, self._use_parameters)
-        self._publisher = CloudPublisher(self.type.output_topic)
+        self._publishers = {topic: CloudPublisher(made) for topic, made in self.type.outputs.items()}
         self._figures = [FigurePublisher(figure, namespace, self.health) for figure in self.type.figures]
 
     def _use_parameters(self, parameters: ParameterSet) -> None:
-        self._stage = self.type.build(parameters)
+        if self.type.knows_sonar and self._places is None:
+            self._places = SonarPlaces(parameters.sonar_frame, self.health, parameters.stamp_tolerance)
+        self._stage = self.type.build(parameters, *([self._places.poses] if self._places else []))
 
-    @property
-    def is_read(self) -> bool:
-        """Whether anybody listens to any of the stage's topics."""
-        return self._publisher.is_read or any(figure.is_read for figure in self._figures)
+    def is_read(self, topic: str) -> bool:
+        """Return whether anybody listens to what is made of `topic`, or to a figure."""
+        return self._publishers[topic].is_read or any(figure.is_read for figure in self._figures)
 
     @classmethod
     def as_node(cls, name: str) -> "StageRunner":
         """Return the stage `name` as a node of its own, which takes clouds from its input topic."""
         runner = cls(name, "~")
-        subscribe_to_clouds(runner.type.input_topic, runner.process, runner.health)
+        for topic in runner.type.outputs:
+            subscribe_to_clouds(topic, partial(runner.process, topic), runner.health)
         return runner
 
-    def process(self, cloud: Cloud) -> Optional[Cloud]:
-        """Run the stage, publish its result and return it; None when it could not be used (counted)."""
+    def process(self, topic: str, cloud: Cloud) -> Optional[Cloud]:
+        """Run the stage on a cloud of `topic`, publish its result and return it; None for a bad cloud (counted)."""
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
         stage = self._stage
@@ -56,7 +61,7 @@ class StageRunner:
             return None
         report_broken(cloud, self.health)
         self._count_out(cloud, result)
-        self._publisher.publish(result)
+        self._publishers[topic].publish(result)
         for figure in self._figures:
             figure.publish(self.type.figures[figure.name](stage))
         return result
