@@ -11,6 +11,7 @@ from node_support.timing import UsualInterval
 
 SILENCE = 5.0  # s without a message, from which on a stage says that its input ceased
 WARNING_PERIOD = 10.0  # s: often enough to be seen in a log, seldom enough to leave the rest of it readable
+LONGEST_PERIOD = 60.0  # s: of warnings of what goes on, so that a log of days can be read
 
 
 class Level(IntEnum):
@@ -57,6 +58,7 @@ class _Problem:
         self.total = 0
         self.unreported = 0
         self.last_report = float("-inf")
+        self.period = WARNING_PERIOD
         self.last_seen = float("-inf")
         self.detail = ""
         self.level = Level.WARN
@@ -66,7 +68,10 @@ class Health:
     """Collects what a stage did and what went wrong, and warns once in a while instead of at every message."""
 
     def __init__(self, name: str, warn: Callable[[str], None], clock: Callable[[], float] = time.monotonic) -> None:
-        """`warn` receives one line at most every `WARNING_PERIOD` seconds for each kind of problem."""
+        """`warn` receives one line at most every `WARNING_PERIOD` seconds for each kind of problem.
+
+        Of one that goes on it receives them more and more seldom, until they are `LONGEST_PERIOD` apart.
+        """
         self.name = name
         self._warn = warn
         self._clock = clock
@@ -118,15 +123,18 @@ class Health:
             self._values[what] = value
 
     def problem(self, kind: str, detail: str, number: int = 1, level: Level = Level.WARN) -> None:
-        """Count `number` problems of a kind and warn with the newest detail, at most once per `WARNING_PERIOD`.
+        """Count `number` problems of a kind and warn with the newest detail once in a while.
 
         level: that the stage has while the problem is recent.
         """
         with self._lock:
             problem = self._counted(kind, detail, number)
             problem.level = level
-            if problem.last_seen - problem.last_report < WARNING_PERIOD:
+            since = problem.last_seen - problem.last_report
+            if since < problem.period:
                 return
+            goes_on = since < 2.0 * problem.period
+            problem.period = min(2.0 * problem.period, LONGEST_PERIOD) if goes_on else WARNING_PERIOD
             line = f"{self.name}: {problem.unreported} {kind} ({problem.total} in all): {detail}"
             problem.last_report = problem.last_seen
             problem.unreported = 0

@@ -35,9 +35,14 @@ def test_more_of_a_kind_are_kept_for_one_warning_that_says_how_many(stage):
     assert stage.warnings[1:] == ["thresholder: 4 beams refused (5 in all): at 10"]
 
 
-def test_a_flood_gives_one_warning_per_period(stage):
-    stage.problems_at(*[step * 0.25 for step in range(int(5 * WARNING_PERIOD / 0.25))])
-    assert len(stage.warnings) == 5
+def test_a_flood_is_warned_of_more_and_more_seldom_until_once_a_minute(stage):
+    stage.problems_at(*[step * 0.25 for step in range(1000)])
+    assert [line.rpartition("at ")[2] for line in stage.warnings] == ["0", "10", "30", "70", "130", "190"]
+
+
+def test_after_a_pause_a_flood_is_warned_of_as_in_the_beginning(stage):
+    stage.problems_at(*range(200), 400, 405, 410)
+    assert [line.rpartition("at ")[2] for line in stage.warnings][-3:] == ["190", "400", "410"]
 
 
 def test_kinds_are_throttled_one_by_one(stage):
