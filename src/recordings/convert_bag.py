@@ -15,6 +15,7 @@ from node_support.parameters import ParameterError
 from recordings.bags.bag import RecordingError
 from recordings.bags.bag_writer import BagWriter
 from recordings.bags.mcap_writer import McapWriter
+from recordings.bags.messages import Placing
 from recordings.motion.frame_tree import Link
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import MotionSource
@@ -87,7 +88,7 @@ def write_converted(path: Path, content: Content, request: Request) -> None:
 
 def _beams(bag: _Writer, beams: List[Beam]) -> Iterator[_Stamped]:
     for beam in beams:
-        message = _stamped(bag, "underwater_map_construction/SonarScanLine", beam.stamp_ns, beam.frame_id)
+        message = bag.stamped("underwater_map_construction/SonarScanLine", bag.time(beam.stamp_ns), beam.frame_id)
         message.angle, message.sensorAngle = beam.angle, beam.sensor_angle
         message.intensities = np.asarray(beam.intensities, dtype=np.uint8)
         message.range_resolution = beam.range_resolution
@@ -100,7 +101,7 @@ def _motion(bag: _Writer, content: Content, request: Request) -> Iterator[_Stamp
     for link, track in tracks.items():
         if not track.is_fixed:
             for index, stamp_ns in enumerate(map(int, track.stamps_ns)):
-                yield stamp_ns, topics.TRANSFORMS, _transforms(bag, [_transform(bag, link, track, index, stamp_ns)])
+                yield stamp_ns, topics.TRANSFORMS, bag.transforms([_transform(bag, link, track, index, stamp_ns)])
     odometry = tracks.get((names.odom_frame, names.base_frame))
     if odometry is not None and not odometry.is_fixed:
         yield from _odometry(bag, _ODOMETRY, odometry, names.odom_frame, names.base_frame)
@@ -111,38 +112,18 @@ def _truth(bag: _Writer, content: Content) -> Iterator[_Stamped]:
 
 
 def _odometry(bag: _Writer, topic: str, track: PoseTrack, frame: str, child: str) -> Iterator[_Stamped]:
-    for index in range(len(track)):
-        stamp_ns = int(track.stamps_ns[index])
-        message = _stamped(bag, "nav_msgs/Odometry", stamp_ns, frame)
-        message.child_frame_id = child
-        _fill(message.pose.pose.position, message.pose.pose.orientation, track, index)
-        yield stamp_ns, topic, message
+    for index, stamp_ns in enumerate(map(int, track.stamps_ns)):
+        yield stamp_ns, topic, bag.odometry(_placing(track, index), bag.time(stamp_ns), frame, child)
 
 
 def _fixed_links(bag: _Writer, content: Content, stamp_ns: int) -> Any:
     fixed = [(link, track) for link, track in content.motion.tree.tracks.items() if track.is_fixed]
-    return _transforms(bag, [_transform(bag, link, track, 0, stamp_ns) for link, track in fixed])
-
-
-def _transforms(bag: _Writer, transforms: List[Any]) -> Any:
-    message = bag.make("tf2_msgs/TFMessage")
-    message.transforms = transforms
-    return message
+    return bag.transforms([_transform(bag, link, track, 0, stamp_ns) for link, track in fixed])
 
 
 def _transform(bag: _Writer, link: Link, track: PoseTrack, index: int, stamp_ns: int) -> Any:
-    message = _stamped(bag, "geometry_msgs/TransformStamped", stamp_ns, link[0])
-    message.child_frame_id = link[1]
-    _fill(message.transform.translation, message.transform.rotation, track, index)
-    return message
+    return bag.transform(_placing(track, index), bag.time(stamp_ns), *link)
 
 
-def _fill(place: Any, turn: Any, track: PoseTrack, index: int) -> None:
-    place.x, place.y, place.z = track.translations[index]
-    turn.x, turn.y, turn.z, turn.w = track.rotations[index]
-
-
-def _stamped(bag: _Writer, kind: str, stamp_ns: int, frame: str) -> Any:
-    message = bag.make(kind)
-    message.header.stamp, message.header.frame_id = bag.time(stamp_ns), frame
-    return message
+def _placing(track: PoseTrack, index: int) -> Placing:
+    return Placing(track.translations[index], track.rotations[index])

@@ -10,6 +10,7 @@ from mlsm_manager.self_check.verdict import Answer
 from mlsm_manager.surface_map.export.rasters import occupancy
 from node_support.files import whole_file
 from recordings.bags.mcap_writer import McapWriter
+from recordings.bags.messages import Placing, write_pose
 
 _MAP, _VEHICLE = "map", "base_link"
 _FLOAT32 = 7  # of PointField
@@ -36,15 +37,9 @@ def write_mcap(file: File, mission: Mission, picture: File) -> None:
             bag.write(topic, message, stamp_ns)
 
 
-def _stamped(bag: McapWriter, kind: str, stamp_ns: int, frame: str = _MAP) -> Any:
-    message = bag.make(kind)
-    message.header.stamp, message.header.frame_id = bag.time(stamp_ns), frame
-    return message
-
-
 def _cloud(bag: McapWriter, stamp_ns: int, points: np.ndarray) -> Any:
     """Return a PointCloud2 of points (n, 4): x y z [m] and echo strength."""
-    message = _stamped(bag, "sensor_msgs/PointCloud2", stamp_ns)
+    message = bag.stamped("sensor_msgs/PointCloud2", bag.time(stamp_ns), _MAP)
     for index, name in enumerate(("x", "y", "z", "intensity")):
         field = bag.make("sensor_msgs/PointField")
         field.name, field.offset, field.datatype, field.count = name, 4 * index, _FLOAT32, 1
@@ -57,7 +52,7 @@ def _cloud(bag: McapWriter, stamp_ns: int, points: np.ndarray) -> Any:
 def _grid(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
     nothing = mission.blocks.take(np.zeros(len(mission.blocks), dtype=bool))
     raster = occupancy(mission.blocks, nothing, -np.inf, np.inf)
-    message = _stamped(bag, "nav_msgs/OccupancyGrid", stamp_ns)
+    message = bag.stamped("nav_msgs/OccupancyGrid", bag.time(stamp_ns), _MAP)
     message.info.resolution = raster.resolution
     message.info.height, message.info.width = raster.values.shape
     message.info.origin.position.x, message.info.origin.position.y = map(float, raster.origin)
@@ -67,22 +62,22 @@ def _grid(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
 
 
 def _picture(bag: McapWriter, stamp_ns: int, picture: File) -> Any:
-    message = _stamped(bag, "sensor_msgs/CompressedImage", stamp_ns)
+    message = bag.stamped("sensor_msgs/CompressedImage", bag.time(stamp_ns), _MAP)
     message.format, message.data = "png", np.frombuffer(picture.read_bytes(), dtype=np.uint8)
     return message
 
 
 def _path(bag: McapWriter, stamp_ns: int, path: Path) -> Any:
-    message = _stamped(bag, "nav_msgs/Path", stamp_ns)
+    message = bag.stamped("nav_msgs/Path", bag.time(stamp_ns), _MAP)
     for time, pose in zip(path.times, path.poses):
-        one = _stamped(bag, "geometry_msgs/PoseStamped", round(time * 1e9))
-        _fill(one.pose.position, one.pose.orientation, pose)
+        one = bag.stamped("geometry_msgs/PoseStamped", bag.time(round(time * 1e9)), _MAP)
+        write_pose(one.pose.position, one.pose.orientation, _placing(pose))
         message.poses.append(one)
     return message
 
 
 def _checks(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
-    message = _stamped(bag, "diagnostic_msgs/DiagnosticArray", stamp_ns, "")
+    message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
     message.status.append(_status(bag, "trust", 0, mission.headline))
     for verdict in mission.verdicts:
         message.status.append(_status(bag, verdict.name, _LEVELS[verdict.answer], verdict.line()))
@@ -104,15 +99,9 @@ def _poses(bag: McapWriter, mission: Mission) -> List[Any]:
     found = []
     for time, pose, covariance in zip(told.times, np.column_stack(columns), told.covariances):
         stamp = round(float(time) * 1e9)
-        odometry = _stamped(bag, "nav_msgs/Odometry", stamp)
-        odometry.child_frame_id = _VEHICLE
-        _fill(odometry.pose.pose.position, odometry.pose.pose.orientation, pose)
+        odometry = bag.odometry(_placing(pose), bag.time(stamp), _MAP, _VEHICLE)
         odometry.pose.covariance[[0, 1, 6, 7]] = covariance.ravel()
-        transform = _stamped(bag, "geometry_msgs/TransformStamped", stamp)
-        transform.child_frame_id = _VEHICLE
-        _fill(transform.transform.translation, transform.transform.rotation, pose)
-        tree = bag.make("tf2_msgs/TFMessage")
-        tree.transforms.append(transform)
+        tree = bag.transforms([bag.transform(_placing(pose), bag.time(stamp), _MAP, _VEHICLE)])
         found += [
             (stamp, "/pose", odometry),
             (stamp, "/tf", tree),
@@ -123,7 +112,7 @@ def _poses(bag: McapWriter, mission: Mission) -> List[Any]:
 
 def _doubts(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
     """Return which checks find that moment doubtful."""
-    message = _stamped(bag, "diagnostic_msgs/DiagnosticArray", stamp_ns, "")
+    message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
     for verdict in mission.verdicts:
         begins, ends = verdict.doubtful.T * 1e9
         is_doubtful = bool(((begins <= stamp_ns) & (stamp_ns <= ends)).any())
@@ -141,7 +130,7 @@ def _scans(bag: McapWriter, mission: Mission) -> List[Any]:
     return found
 
 
-def _fill(place: Any, turn: Any, pose: np.ndarray) -> None:
-    place.x, place.y = float(pose[0]), float(pose[1])
+def _placing(pose: np.ndarray) -> Placing:
     yaw = float(pose[2]) if len(pose) > 2 else 0.0
-    turn.z, turn.w = float(np.sin(yaw / 2.0)), float(np.cos(yaw / 2.0))
+    turn = [0.0, 0.0, float(np.sin(yaw / 2.0)), float(np.cos(yaw / 2.0))]
+    return Placing([float(pose[0]), float(pose[1]), 0.0], turn)

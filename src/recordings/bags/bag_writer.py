@@ -6,7 +6,7 @@ from typing import Any, Dict
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer
 
-from recordings.bags.message_types import blank_message, ros1_types
+from recordings.bags.message_types import StoreMessages, ros1_types
 
 COMPRESSIONS = ("none", "lz4", "bz2")
 
@@ -19,11 +19,12 @@ class _Replaced(type(Path())):
         return super().open(mode.replace("x", "w"), *arguments, **options)
 
 
-class BagWriter:
+class BagWriter(StoreMessages):
     """An open bag; a context manager. What is at its path is replaced, so give it a file of `whole_file`."""
 
     def __init__(self, path: Path, compression: str = "none") -> None:
         """`compression`: one of COMPRESSIONS. Raises OSError."""
+        super().__init__(ros1_types())
         # The constructor refuses a file that is there, and makes a plain path of any other.
         self._writer = Writer(path / "new")
         self._writer.path = _Replaced(path)
@@ -37,16 +38,6 @@ class BagWriter:
 
     def __exit__(self, *exception: object) -> None:
         self._writer.close()
-
-    def make(self, kind: str) -> Any:
-        """Return a new message of the type package/Name with fields of zero. Raises KeyError for an unknown type."""
-        return blank_message(ros1_types(), kind.replace("/", "/msg/"))
-
-    def time(self, stamp_ns: int) -> Any:
-        """Return a time for a header."""
-        time = blank_message(ros1_types(), "builtin_interfaces/msg/Time")
-        time.sec, time.nanosec = divmod(stamp_ns, 10**9)
-        return time
 
     def write(self, topic: str, message: Any, stamp_ns: int) -> None:
         """Append a message, made by `make` or read from a bag of the same type. Raises OSError."""

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any, Dict
 
 from recordings.bags.bag import RecordingError
-from recordings.bags.message_types import blank_message, ros2_types
+from recordings.bags.message_types import StoreMessages, ros2_types
 
 
 def mcap_writer() -> Any:
@@ -16,11 +16,12 @@ def mcap_writer() -> Any:
     return Writer
 
 
-class McapWriter:
+class McapWriter(StoreMessages):
     """An open file; a context manager, used as BagWriter. What is at its path is replaced."""
 
     def __init__(self, path: Path) -> None:
         """Raises OSError, and RecordingError without the library."""
+        super().__init__(ros2_types())
         self._writer = mcap_writer()(str(path))
         self._writer.start(profile="ros2", library="underwater_map_construction")
         self._channels: Dict[str, int] = {}
@@ -31,16 +32,6 @@ class McapWriter:
 
     def __exit__(self, *exception: object) -> None:
         self._writer.finish()
-
-    def make(self, kind: str) -> Any:
-        """Return a new message of the type package/Name with fields of zero. Raises KeyError for an unknown type."""
-        return blank_message(ros2_types(), kind.replace("/", "/msg/"))
-
-    def time(self, stamp_ns: int) -> Any:
-        """Return a time for a header."""
-        time = blank_message(ros2_types(), "builtin_interfaces/msg/Time")
-        time.sec, time.nanosec = divmod(stamp_ns, 10**9)
-        return time
 
     def write(self, topic: str, message: Any, stamp_ns: int) -> None:
         """Append a message made by `make`. Raises OSError."""

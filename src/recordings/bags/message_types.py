@@ -8,6 +8,8 @@ from rosbags.interfaces import Nodetype
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from rosbags.typesys.store import Typestore
 
+from recordings.bags.messages import Messages
+
 BEAM_TYPE = "underwater_map_construction/msg/SonarScanLine"
 
 # msg/SonarScanLine.msg; an installation without ROS does not have that file.
@@ -52,6 +54,19 @@ def _with_ours(distribution: Stores) -> Typestore:
         if name not in store.types:
             store.register(get_types_from_msg(definition, name))
     return store
+
+
+class StoreMessages(Messages):
+    """Makes messages of the types of a store."""
+
+    def __init__(self, store: Typestore) -> None:
+        super().__init__(lambda kind: blank_message(store, kind.replace("/", "/msg/")))
+
+    def time(self, stamp_ns: int) -> Any:
+        """Return a time for a header."""
+        time = self.make("builtin_interfaces/Time")
+        time.sec, time.nanosec = divmod(stamp_ns, 10**9)
+        return time
 
 
 def blank_message(store: Typestore, name: str) -> Any:

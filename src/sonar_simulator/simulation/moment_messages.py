@@ -5,7 +5,7 @@ from typing import Any, Callable, List, Tuple
 import numpy as np
 
 from node_support import topics
-from node_support.geometry import quaternion_of
+from recordings.bags.messages import Messages, Placing
 from sonar_simulator.simulation.simulation import Instruments, Moment, Ping
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
 
@@ -49,12 +49,12 @@ def map_origin(T_world_start: np.ndarray, instruments: Instruments) -> np.ndarra
     return T_world_start[:3, 3] * [1.0, 1.0, 0.0]
 
 
-class MomentMessages:
+class MomentMessages(Messages):
     """Fills in messages of any library, whose fields are named as in their definitions."""
 
     def __init__(self, make: Callable[[str], Any], octets: Callable[[np.ndarray], Any]) -> None:
         """`make` returns an empty message of a type, package/Name; `octets` what a field uint8[] takes."""
-        self._make = make
+        super().__init__(make)
         self._octets = octets
 
     def at(self, moment: Moment, stamp: Any, max_range: float, instruments: Instruments, origin: np.ndarray) -> _Told:
@@ -75,32 +75,19 @@ class MomentMessages:
         pose = moment.odometry.T_odom_base
         joint = (topics.JOINT_STATES, self._joint_state(moment.tilt, stamp))
         if instruments is not Instruments.COMPASS:
-            transform = self.transform(pose, stamp, ODOM_FRAME, BASE_FRAME)
+            transform = self.transform(Placing.of(pose), stamp, ODOM_FRAME, BASE_FRAME)
             return [(topics.TRANSFORMS, self.transforms([transform])), joint]
         if not moment.is_tick:
             return [joint]
-        heading, depth = self._stamped("sensor_msgs/Imu", stamp, BASE_FRAME), self._make("std_msgs/Float64")
-        _turn(heading.orientation, pose)
+        heading, depth = self.stamped("sensor_msgs/Imu", stamp, BASE_FRAME), self.make("std_msgs/Float64")
+        turn = heading.orientation
+        turn.x, turn.y, turn.z, turn.w = Placing.of(pose).turn
         depth.data = -pose[2, 3]
         return [(topics.HEADING, heading), (topics.DEPTH, depth), joint]
 
-    def transforms(self, transforms: List[Any]) -> Any:
-        """Return the message of several transforms."""
-        message = self._make("tf2_msgs/TFMessage")
-        message.transforms = transforms
-        return message
-
-    def transform(self, T_parent_child: np.ndarray, stamp: Any, parent: str, child: str) -> Any:
-        """Return the transform that places `child` at a (4, 4) pose in `parent`."""
-        message = self._stamped("geometry_msgs/TransformStamped", stamp, parent)
-        message.child_frame_id = child
-        _shift(message.transform.translation, T_parent_child)
-        _turn(message.transform.rotation, T_parent_child)
-        return message
-
     def scan_line(self, ping: Ping, tilt: float, stamp: Any, frame: str, max_range: float) -> Any:
         """Return a beam's message; `tilt` [rad] is that of the sonar's servo, `max_range` [m] the last bin's end."""
-        message = self._stamped(_ALWAYS[topics.BEAMS], stamp, frame)
+        message = self.stamped(_ALWAYS[topics.BEAMS], stamp, frame)
         message.angle = ping.angle
         message.intensities = self._octets(ping.strengths)
         message.maxrange_meters = max_range
@@ -118,35 +105,19 @@ class MomentMessages:
             messages.append((topics.ODOMETRY, odometry))
         if instruments is Instruments.NONE:
             return messages
-        velocity = self._make(_VELOCITY)
+        velocity = self.make(_VELOCITY)
         _move(velocity, moment.odometry.twist)
         return [(topics.VELOCITY, velocity), *messages]
 
     def _odometry(self, pose: np.ndarray, twist: np.ndarray, stamp: Any, frame: str) -> Any:
-        message = self._stamped("nav_msgs/Odometry", stamp, frame)
-        message.child_frame_id = BASE_FRAME
-        _shift(message.pose.pose.position, pose)
-        _turn(message.pose.pose.orientation, pose)
+        message = self.odometry(Placing.of(pose), stamp, frame, BASE_FRAME)
         _move(message.twist.twist, twist)
         return message
 
     def _joint_state(self, tilt: float, stamp: Any) -> Any:
-        message = self._stamped("sensor_msgs/JointState", stamp, "")
+        message = self.stamped("sensor_msgs/JointState", stamp, "")
         message.name, message.position = [SERVO_JOINT], np.array([tilt])
         return message
-
-    def _stamped(self, kind: str, stamp: Any, frame: str) -> Any:
-        message = self._make(kind)
-        message.header.stamp, message.header.frame_id = stamp, frame
-        return message
-
-
-def _shift(vector: Any, pose: np.ndarray) -> None:
-    vector.x, vector.y, vector.z = pose[:3, 3].tolist()
-
-
-def _turn(quaternion: Any, pose: np.ndarray) -> None:
-    quaternion.x, quaternion.y, quaternion.z, quaternion.w = quaternion_of(pose).tolist()
 
 
 def _move(twist: Any, values: np.ndarray) -> None:

@@ -17,6 +17,7 @@ from node_support.help import CommandLine
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import ParameterError
 from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
+from recordings.bags.messages import Placing
 from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
 from sonar_simulator.simulation.simulation import Drive, Moment
 from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup, make_setup
@@ -43,7 +44,7 @@ class SimulatedBag:
         stamp_ns = _stamp_ns(0.0)
         stamp = self._bag.time(stamp_ns)
         transforms = [
-            self._messages.transform(joint.T_parent_child, stamp, joint.parent, joint.child)
+            self._messages.transform(Placing.of(joint.T_parent_child), stamp, joint.parent, joint.child)
             for joint in robot.fixed_joints
         ]
         self._write(topics.STATIC_TRANSFORMS, self._messages.transforms(transforms), stamp_ns)
@@ -58,7 +59,7 @@ class SimulatedBag:
         messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments, self._origin)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
-        mount = tilted(self._setup.T_base_sonar, moment.tilt)
+        mount = Placing.of(tilted(self._setup.T_base_sonar, moment.tilt))
         messages[0][1].transforms.append(self._messages.transform(mount, stamp, BASE_FRAME, SONAR_FRAME))
         for topic, message in messages:
             self._write(topic, message, stamp_ns)
