@@ -17,8 +17,8 @@ TITLE = "PingViewer sensor log file"
 _BUILD_TEXTS = 5  # Commit, date, release, name and version of the operating system
 _NULL = 0xFFFFFFFF  # Length of a text or of data that Qt calls null
 _LONGEST_PART = 10240  # Bytes, the buffer of Ping Viewer's parser
-_DAY = 86400.0
-_HALF_DAY = 12  # h
+_HALF_DAY = 12 * 3600.0  # s
+_BACK = 11 * 3600.0  # s: a clock that goes back by more began a new half of a day, in a language not known here
 # Hours, minutes and seconds with the same sign between them, and milliseconds, which a date beside them does not have.
 _CLOCK = re.compile(r"(?<!\d)(\d{1,2})([^\d\s])([0-5]\d)\2([0-5]\d)\D(\d{3})(?!\d)")
 _AFTERNOON = {"pm", "بظ", "بعدازظهر", "م", "下午", "午後", "오후", "μμ"}
@@ -47,17 +47,28 @@ class PingViewerLog:
         """`data`: the whole file. Raises NoLogError."""
         self.damaged = 0
         self._data = data
-        self._start = 0 if self._time(0) is not None else _after_header(data)
+        self._start = 0 if self._time(0) is not None else self._first_part()
 
     def __iter__(self) -> Iterator[LoggedPart]:
-        position, last, days = self._start, 0.0, 0
+        position, last, halves = self._start, 0.0, 0
         while position < len(self._data):
             part, position = self._part(position)
             if part is not None:
-                if part.time + days * _DAY < last - _DAY / 2:
-                    days += 1
-                last = max(last, part.time + days * _DAY)
+                while part.time + halves * _HALF_DAY < last - _BACK:
+                    halves += 1
+                last = max(last, part.time + halves * _HALF_DAY)
                 yield LoggedPart(last, part.data)
+
+    def _first_part(self) -> int:
+        """Return where the first part begins, also where what stood before it is damaged or lost. Raises NoLogError."""
+        try:
+            return _after_header(self._data)
+        except NoLogError:
+            first = self._next_time(0, min(len(self._data), 2 * _LONGEST_PART))
+            if first is None:
+                raise
+            self.damaged += 1
+            return first
 
     def _part(self, position: int) -> Tuple[Optional[LoggedPart], int]:
         """Return the part at `position`, if there is one, and where to continue."""
@@ -114,7 +125,7 @@ def _seconds(text: str) -> Optional[float]:
     hours, minutes, seconds, milliseconds = (int(found[group]) for group in (1, 3, 4, 5))
     letters = "".join(filter(str.isalpha, plain[: found.start()] + plain[found.end() :])).casefold()
     if letters in _AFTERNOON | _MORNING:
-        hours = hours % _HALF_DAY + _HALF_DAY * (letters in _AFTERNOON)
+        hours = hours % 12 + 12 * (letters in _AFTERNOON)
     return 3600.0 * hours + 60.0 * minutes + seconds + 1e-3 * milliseconds
 
 

@@ -8,9 +8,11 @@ import numpy as np
 from node_support.geometry import FULL_TURN, wrapped
 from recordings.beams import RecordedBeams
 from recordings.motion.sweep_shifts import sweep_shifts
-from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.scans.assembler import turns_of
 
 _GAP = 1.0  # s: longer than any head takes for a beam
+_WHOLE = 0.9  # share of a circle from which on a sweep counts as a turn: beams may be lost
 _MOST_SETTINGS = 6  # that are listed
 
 
@@ -22,25 +24,26 @@ def beam_lines(recorded: RecordedBeams) -> List[str]:
     shifts = sweep_shifts(beams)
     return [
         f"{len(beams)} beams in {(end - start) * 1e-9:.1f} s{lost}",
-        _head(np.array([beam.angle for beam in beams])),
+        _head(beams),
         _settings(beams),
         _gaps(np.array([beam.stamp_ns for beam in beams])),
         f"motion as sweeps show it: {shifts.motion.value}; {shifts}",
     ]
 
 
-def _head(angles: np.ndarray) -> str:
+def _head(beams: List[Beam]) -> str:
+    angles = np.array([beam.angle for beam in beams])
     steps = wrapped(np.diff(angles))
-    steps = steps[steps != 0.0]
+    steps = np.abs(steps[steps != 0.0])
     if not steps.size:
         return "the head stood still"
-    usual = float(np.median(np.abs(steps)))
-    swept = [abs(sum(run)) for _, run in groupby(steps, key=lambda step: step > 0.0)]
-    sweeps = np.array([one for one in swept if one > 1.5 * usual])
-    step = f"steps of {np.degrees(usual):.2g} degrees"
-    if len(sweeps) < 2 or sweeps.max() >= FULL_TURN:
-        return f"{sweeps.sum() / FULL_TURN:.1f} turns of the head, {step}"
-    return f"{len(sweeps)} sweeps to and fro of {np.degrees(np.median(sweeps)):.0f} degrees, {step}"
+    turns = turns_of([PlacedBeam(beam, np.eye(4), is_moving=False) for beam in beams], fewest=2)
+    swept = np.array([np.abs(wrapped(np.diff([one.beam.angle for one in turn]))).sum() for turn in turns])
+    is_turn = swept >= _WHOLE * FULL_TURN
+    told = [f"{is_turn.sum()} whole turns"] if is_turn.any() else []
+    if not is_turn.all():
+        told.append(f"{(~is_turn).sum()} sweeps of {np.degrees(np.median(swept[~is_turn])):.0f} degrees")
+    return f"the head made {' and '.join(told)} in steps of {np.degrees(np.median(steps)):.2g} degrees"
 
 
 def _settings(beams: List[Beam]) -> str:

@@ -21,13 +21,14 @@ _VELOCITY_TOPIC = "/cmd_vel"
 class RecordedBeams:
     """beams: in the order of the recording. moving: whether the vehicle moved then. refused: messages without a beam.
 
-    notes: what was assumed, as sentences.
+    notes: what was assumed, as sentences. soundings: (n, 2) s and m below an echo sounder that was recorded with them.
     """
 
     beams: List[Beam]
     moving: List[bool]
     refused: int = 0
     notes: List[str] = field(default_factory=list)
+    soundings: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
 
     @property
     def stamps_ns(self) -> np.ndarray:
@@ -39,7 +40,8 @@ class RecordedBeams:
         if seconds == 0.0:
             return self
         shift = round(seconds * 1e9)
-        return replace(self, beams=[replace(beam, stamp_ns=beam.stamp_ns + shift) for beam in self.beams])
+        beams = [replace(beam, stamp_ns=beam.stamp_ns + shift) for beam in self.beams]
+        return replace(self, beams=beams, soundings=self.soundings + np.array([seconds, 0.0]))
 
 
 def beam_topic(bag: Bag, wanted: Optional[str]) -> str:

@@ -26,6 +26,9 @@ from sonar_processing.messages.beam_fields import USUAL_SPEED_OF_SOUND
 
 _FRAME = "sonar"
 _BEAMS = (MessageId.DEVICE_DATA, MessageId.AUTO_DEVICE_DATA)
+_SOUNDINGS = (MessageId.SOUNDING, MessageId.SOUNDING_PROFILE)
+_SURE = 50  # %: confidence of an echo sounder (ping1d) from which on its distance counts
+_BEGINNING = 20480  # bytes: two parts of the longest that Ping Viewer writes; the first may be damaged
 _Reader = Callable[[Path], RecordedBeams]
 
 
@@ -89,7 +92,7 @@ def _is_ping_viewer_log(path: Path) -> bool:
     """Return whether a file begins as a log of Ping Viewer does; False for one that cannot be read."""
     try:
         with path.open("rb") as file:
-            PingViewerLog(file.read(4096))
+            PingViewerLog(file.read(_BEGINNING))
     except (OSError, NoLogError):
         return False
     return True
@@ -109,8 +112,12 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
         raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
     stream = MessageStream()
     heads: Dict[int, List[Beam]] = {}
+    soundings: List[Tuple[float, float]] = []
     inconsistent = 0
-    for time, message in _beam_messages(log, stream):
+    for time, message in _messages(log, stream):
+        if message.message_id in _SOUNDINGS:
+            soundings += [(time, 1e-3 * message.distance)] if message.confidence >= _SURE else []
+            continue
         try:
             found = head_beam(message)
             beam = _beam_of(found, time - found.pulse.listening_time)
@@ -128,7 +135,9 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
     if len(heads) > 1:
         counts = ", ".join(f"{len(kept)} of device {number}" for number, kept in sorted(heads.items()))
         notes.append(f"{path.name} holds the beams of several heads, {counts}: only those of device {device} are used")
-    return RecordedBeams(beams, [False] * len(beams), refused, notes)
+    if soundings:
+        notes.append(f"an echo sounder beside the Ping360 told {len(soundings)} distances below")
+    return RecordedBeams(beams, [False] * len(beams), refused, notes, np.array(soundings).reshape(-1, 2))
 
 
 def _ping_viewer_next_beams(path: Path) -> RecordedBeams:
@@ -144,11 +153,11 @@ def _ping_viewer_next_beams(path: Path) -> RecordedBeams:
     return RecordedBeams(beams, [False] * len(beams), refused, notes)
 
 
-def _beam_messages(log: PingViewerLog, stream: MessageStream) -> Iterator[Tuple[float, PingMessage]]:
-    """Yield the messages of beams with the times at which they came, s."""
+def _messages(log: PingViewerLog, stream: MessageStream) -> Iterator[Tuple[float, PingMessage]]:
+    """Yield the messages of beams and of distances below with the times at which they came, s."""
     for part in log:
         for parsed in stream.feed(part.data):
-            if parsed.message.message_id in _BEAMS:
+            if parsed.message.message_id in _BEAMS + _SOUNDINGS:
                 yield part.time, parsed.message
 
 

@@ -19,7 +19,7 @@ from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import FEWEST_BEAMS, EchoExtractor
-from sonar_processing.scans.assembler import RevolutionCollector
+from sonar_processing.scans.assembler import turns_of
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
@@ -41,6 +41,7 @@ class Recording:
     """beams: in the order of their stamps, placed in odom. unplaced: number of beams that tf could not place.
 
     track: T_odom_base over the whole recording. seconds: its length. notes: what was assumed, as sentences.
+    soundings: (n, 2) s and m below the vehicle.
     """
 
     beams: List[PlacedBeam]
@@ -48,6 +49,7 @@ class Recording:
     track: Track
     truth: Optional[Truth]
     notes: List[str] = field(default_factory=list)
+    soundings: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
 
     def corrected(self, correction: BeamCorrection) -> "Recording":
         """Return the recording with all beams corrected, each placed by the odometry at its new stamp.
@@ -111,27 +113,9 @@ def scans_of(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[S
 
 def _echoes(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Cloud, int]]:
     cloud = SonarToCloudParameters()
-    for turn in _turns(recording.beams):
+    for turn in turns_of(recording.beams, FEWEST_BEAMS):
         with suppress(RefusedInput):
             yield extractor(PolarScan.of(turn).cloud(cloud)), len(turn)
-
-
-def _turns(beams: List[PlacedBeam]) -> Iterator[List[PlacedBeam]]:
-    """Yield the beams of each turn or sweep, and of each part of one that other bins or a silence of the head ended.
-
-    What is left at the end comes last, where it is at least half as long as the longest turn.
-    """
-    collector = RevolutionCollector()
-    longest = 0
-    for index, placed in enumerate(beams):
-        held, turn = len(collector), collector.add(placed)
-        if turn is not None:
-            longest = max(longest, len(turn))
-            yield turn
-        elif held >= FEWEST_BEAMS and len(collector) == 1:
-            yield beams[index - held : index]
-    if len(collector) >= max(longest / 2.0, FEWEST_BEAMS):
-        yield beams[len(beams) - len(collector) :]
 
 
 def clouds_with_odometry(recording: Recording, clouds: Iterable[Tuple[Cloud, int]]) -> Iterator[Tuple[Scan, int]]:
@@ -183,7 +167,7 @@ def read_recording(path: Path, request: Request) -> Recording:
     placed, unplaced = _placed(recorded, tree, path, request)
     known = content.truth
     truth = None if known is None else Truth(known.stamps_ns * 1e-9, known.translations[:, :2])
-    return Recording(placed, recorded.refused + unplaced, track, truth, content.notes)
+    return Recording(placed, recorded.refused + unplaced, track, truth, content.notes, recorded.soundings)
 
 
 def _track(tree: FrameTree, stamps: np.ndarray, near_ns: np.ndarray, path: Path, request: Request) -> Track:

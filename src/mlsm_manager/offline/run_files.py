@@ -64,6 +64,8 @@ def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
     write_trajectory(folder / "trajectory.csv", run.times, run.poses)
     for tum, poses in run.poses.items():
         _write_tum(folder / f"{tum}.tum", run.times, poses)
+    if len(recording.soundings):
+        _write_soundings(folder / "soundings.csv", run, recording.soundings)
     if recording.truth is not None:
         # The truth has no heading: its quaternions are those of heading 0.
         level = np.pad(recording.truth.positions, ((0, 0), (0, 1)), mode="constant")
@@ -107,6 +109,13 @@ def trajectories_of(run: Run, recording: Recording) -> List[Trajectory]:
         positions = aligned_truth(run.times, run.poses[ODOMETRY], recording.truth)
         found.insert(1, Trajectory("truth", TRUTH_COLOR, recording.truth.times, positions))
     return found
+
+
+def _write_soundings(path: Path, run: Run, soundings: np.ndarray) -> None:
+    """Write where the vehicle was when an echo sounder told distances below: time [s], x y [m], below [m]."""
+    rows = np.column_stack([soundings[:, 0], positions_at(run.times, run.best, soundings[:, 0]), soundings[:, 1]])
+    lines = [f"{time:.3f},{x:.3f},{y:.3f},{below:.3f}\n" for time, x, y, below in rows.tolist()]
+    write_whole(path, "".join(["time,x,y,below\n", *lines]).encode("ascii"))
 
 
 def _write_tum(path: Path, times: np.ndarray, poses: np.ndarray) -> None:

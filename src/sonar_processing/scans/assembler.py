@@ -3,7 +3,7 @@
 from collections import deque
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Deque, List, Optional
+from typing import Deque, Iterator, List, Optional, Sequence
 
 import numpy as np
 
@@ -154,6 +154,25 @@ class RevolutionCollector:
         beams = list(self._beams)
         self.clear()
         return beams
+
+
+def turns_of(beams: Sequence[PlacedBeam], fewest: int) -> Iterator[List[PlacedBeam]]:
+    """Yield the beams of each turn or sweep, and of each part of one that other bins or a silence of the head ended.
+
+    Such a part has at least `fewest` beams. What is left at the end comes last, where it is at least half as long as
+    the longest turn.
+    """
+    collector = RevolutionCollector()
+    longest = 0
+    for index, placed in enumerate(beams):
+        held, turn = len(collector), collector.add(placed)
+        if turn is not None:
+            longest = max(longest, len(turn))
+            yield turn
+        elif held >= fewest and len(collector) == 1:
+            yield list(beams[index - held : index])
+    if len(collector) >= max(longest / 2.0, fewest):
+        yield list(beams[len(beams) - len(collector) :])
 
 
 def _differs(beam: Beam, earlier: Beam) -> bool:

@@ -98,6 +98,20 @@ def test_times_are_read_in_the_digits_signs_and_order_of_any_language(text):
     assert (part.time, part.data) == (pytest.approx(78970.861), b"BR")
 
 
+def test_a_clock_of_twelve_hours_in_an_unknown_language_goes_on_at_noon():
+    texts = ("11:59:59.900 qu", "12:00:00.100 qu", "12:59:59.900 qu", "1:00:00.100 qu")
+    data = log_bytes([]) + b"".join(text_bytes(text) + struct.pack(">I", 1) + b"B" for text in texts)
+    times = np.array([part.time for part in PingViewerLog(data)])
+    np.testing.assert_allclose(times - times[0], [0.0, 0.2, 3600.0, 3600.2])
+
+
+def test_a_log_whose_beginning_is_lost_is_read_from_its_first_whole_part_on(turn, tmp_path):
+    path = tmp_path / "rest.bin"
+    path.write_bytes(turn.read_bytes()[3001:])
+    assert is_makers_log(path)
+    assert len(makers_beams(path).beams) == 400 - 9
+
+
 def test_logs_of_the_first_versions_have_no_header():
     data = log_bytes([(1.0, b"a"), (2.0, b"b")])[len(log_bytes([])) :]
     assert [part.time for part in PingViewerLog(data)] == [1.0, 2.0]
@@ -108,11 +122,21 @@ def test_the_head_with_most_beams_is_read_of_several_on_one_line(tmp_path):
     other = bytearray(beam_bytes(5))
     other[6] = 3  # Number of the sending device, and the checksum that counts it
     other[-2:] = struct.pack("<H", sum(other[:-2]) & 0xFFFF)
-    depth = packed(1211, distance=4000, confidence=90)
-    path.write_bytes(log_bytes([(1.0, bytes(other)), (1.1, depth), (1.2, beam_bytes(6)), (1.3, beam_bytes(7))]))
+    path.write_bytes(log_bytes([(1.0, bytes(other)), (1.2, beam_bytes(6)), (1.3, beam_bytes(7))]))
     found = makers_beams(path)
     assert (len(found.beams), found.refused) == (2, 0)
     assert "1 of device 3: only those of device 0 are used" in found.notes[-1]
+
+
+def test_an_echo_sounder_beside_the_head_tells_the_distances_below(tmp_path):
+    path = tmp_path / "ping1d.bin"
+    sure = packed(1212, distance=4000, confidence=90)
+    profile = packed(1300, distance=4200, confidence=80, profile_data_length=2, profile_data=b"ab")
+    unsure = packed(1212, distance=100, confidence=10)
+    path.write_bytes(log_bytes([(1.0, beam_bytes(5)), (1.1, sure), (1.2, unsure), (1.3, profile)]))
+    found = makers_beams(path)
+    assert found.refused == 0
+    np.testing.assert_allclose(found.later(10.0).soundings, [[11.1, 4.0], [11.3, 4.2]])
 
 
 def test_times_go_on_after_midnight():

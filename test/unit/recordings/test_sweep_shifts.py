@@ -42,8 +42,8 @@ def beams(place_at, steps=range(4 * TURN)):
     ("place_at", "motion"),
     [
         (lambda _: (0.0, 0.0), SweepMotion.STILL),
-        (lambda time: (0.6 * np.sin(0.05 * time), 0.0), SweepMotion.DRIFTING),
-        (lambda time: (0.08 * time - 3.0, 0.02 * time), SweepMotion.MOVING),
+        (lambda time: (0.02 * time, 0.03 * time), SweepMotion.DRIFTING),
+        (lambda time: (0.125 * time - 4.5, 0.06 * time - 3.0), SweepMotion.MOVING),
     ],
 )
 def test_sweeps_tell_whether_the_head_stood_still(place_at, motion):
@@ -57,12 +57,24 @@ def test_one_turn_or_noise_tells_no_motion():
     assert sweep_shifts(heard).motion is SweepMotion.UNTOLD
 
 
+def test_few_sweeps_or_one_direction_are_not_called_still_or_moved():
+    to_and_fro = [*range(-13, 14), *range(13, -14, -1)]
+    assert sweep_shifts(beams(lambda _: (0.0, 0.0), 8 * to_and_fro)).motion is SweepMotion.UNTOLD
+    assert sweep_shifts(beams(lambda time: (0.3 * (time > 1.5), 0.0), to_and_fro)).motion is SweepMotion.UNTOLD
+
+
+def test_a_sector_that_crosses_angle_zero_tells_as_any_other():
+    to_and_fro = [*range(-52, 53), *range(52, -53, -1)]
+    assert sweep_shifts(beams(lambda _: (0.0, 0.0), 4 * to_and_fro)).motion is SweepMotion.STILL
+    assert sweep_shifts(beams(lambda time: (0.03 * time, 0.03 * time), 4 * to_and_fro)).motion is SweepMotion.DRIFTING
+
+
 def test_head_settings_gaps_and_motion_are_told():
     made = beams(lambda _: (0.0, 0.0), 4 * [*range(50), *range(49, -1, -1)])
     late = [Beam(one.stamp_ns + 10**11, "sonar", one.angle, one.intensities, 0.1) for one in made[:10]]
     told = beam_lines(RecordedBeams(made + late, [], refused=3))
     assert told[0] == "410 beams in 100.9 s; 3 messages were damaged or held none"
-    assert told[1] == "9 sweeps to and fro of 88 degrees, steps of 1.8 degrees"
+    assert told[1] == "the head made 8 sweeps of 86 degrees in steps of 1.8 degrees"
     assert told[2] == "range: 15 m in 300 bins from 0.0 s, 30 m in 300 bins from 100.0 s"
     assert told[3] == "1 gaps longer than 1 s, the longest 60.1 s after 39.9 s"
     assert told[4].startswith("motion as sweeps show it: still; ")
