@@ -1,6 +1,5 @@
 """Maps many recordings, each by itself in a process of its own, into one folder with an index."""
 
-import html
 import json
 import os
 import signal
@@ -8,9 +7,10 @@ import subprocess
 import sys
 from concurrent.futures import FIRST_COMPLETED, ThreadPoolExecutor, wait
 from pathlib import Path
-from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence
+from typing import Dict, Iterable, List, Optional, Sequence
 
 from mlsm_manager.offline.cluster import Cluster
+from mlsm_manager.offline.index_page import Job, Outcome, index_page
 from node_support.files import make_folder, write_whole
 from recordings.bags.bag import RecordingError
 from recordings.makers_logs import is_makers_log
@@ -21,33 +21,8 @@ _METADATA = "metadata.yaml"  # of a ROS 2 folder
 _MESSAGES = "messages.txt"
 _SUMMARY = "summary.json"
 _PROGRAM = "from mlsm_manager.offline.program import main; main()"
+_PREFIX = "map_bag: "  # of a line that says why there is no map
 _LOOK = 2.0  # s after which one looks whether workers are left
-_COLUMNS = ("recording", "result", "scans", "blocks", "odometry", "trust", "s")
-
-
-class Job(NamedTuple):
-    """One recording and the folder of its map."""
-
-    recording: Path
-    folder: Path
-
-
-class Outcome(NamedTuple):
-    """What became of a job: its summary, empty where there is no map, and one line that says why."""
-
-    job: Job
-    summary: Dict[str, Any]
-    problem: str
-
-    @property
-    def cells(self) -> List[str]:
-        """The row of the index, without the picture, in the order of its columns."""
-        own = self.summary
-        if not own:
-            return [str(self.job.recording), self.problem, "", "", "", "", ""]
-        odometry = f"{own['odometry']['profile']}, because {own['odometry']['reason']}"
-        figures = [str(own[key]) for key in ("scans", "blocks")]
-        return [str(self.job.recording), "mapped", *figures, odometry, own.get("trust", ""), f"{own['seconds']:.0f}"]
 
 
 def recordings_in(paths: Iterable[Path]) -> List[Path]:
@@ -106,7 +81,8 @@ def map_each(
                     outcomes[outcome.job] = outcome
                     line = f"{len(outcomes)}/{len(jobs)} {outcome.job.recording}: {outcome.problem or 'mapped'}"
                     print(line, flush=True)
-                    write_whole(out / INDEX, _index([outcomes[job] for job in jobs if job in outcomes]).encode())
+                    page = index_page([outcomes[job] for job in jobs if job in outcomes], len(jobs))
+                    write_whole(out / INDEX, page.encode())
         except BaseException:
             for one in running:
                 one.cancel()
@@ -143,20 +119,6 @@ def _problem(done: "subprocess.CompletedProcess[bytes]") -> str:
     if done.returncode < 0:
         return f"ended by {signal.Signals(-done.returncode).name}"
     lines = done.stdout.decode(errors="replace").strip().splitlines()
-    return lines[-1] if lines else f"ended with status {done.returncode}"
-
-
-def _index(outcomes: Iterable[Outcome]) -> str:
-    """Return the page: a row with the picture of each map, or with the reason why there is none."""
-    head = "".join(f"<th>{name}</th>" for name in ("map", *_COLUMNS))
-    return (
-        '<!DOCTYPE html><meta charset="utf-8"><title>Maps</title><style>body{font-family:sans-serif}'
-        "td,th{border-bottom:1px solid #ccc;padding:.4em;text-align:left;vertical-align:top}</style>"
-        f"<table><tr>{head}</tr>{''.join(map(_row, outcomes))}</table>\n"
-    )
-
-
-def _row(outcome: Outcome) -> str:
-    folder = html.escape(outcome.job.folder.name)
-    picture = f'<a href="{folder}/"><img src="{folder}/map.png" width="240"></a>' if outcome.summary else ""
-    return f"<tr><td>{picture}</td>{''.join(f'<td>{html.escape(cell)}</td>' for cell in outcome.cells)}</tr>\n"
+    if not lines:
+        return f"ended with status {done.returncode}"
+    return lines[-1][len(_PREFIX) :] if lines[-1].startswith(_PREFIX) else lines[-1]

@@ -59,7 +59,7 @@ def _map_each(options: Namespace, arguments: List[str]) -> None:
     without = [outcome for outcome in outcomes if not outcome.summary]
     print(f"{len(outcomes) - len(without)} of {len(outcomes)} mapped; {options.out / INDEX} shows them")
     if without:
-        sys.exit("\n".join(f"map_bag: {outcome.job.recording}: no map: {outcome.problem}" for outcome in without))
+        sys.exit("\n".join(f"map_bag: no map: {outcome.problem}" for outcome in without))
 
 
 def map_bag(options: Namespace) -> Dict[str, Any]:

@@ -8,6 +8,7 @@ import pytest
 
 from mlsm_manager.offline.cluster import Cluster
 from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
+from mlsm_manager.offline.index_page import Job, Outcome, Standing
 from recordings.bags.bag import RecordingError
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -74,12 +75,29 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
     assert (out / "basin_2/map.ply").is_file()
     page = (out / INDEX).read_text()
     assert page.count("<img") == 2
+    assert "2 of 3 recordings mapped" in page
     assert "not a bag, or damaged" in page
     written = (out / "basin/summary.json").stat().st_mtime_ns
     again = map_each([good, bad, same], out, [], scheduler)
-    assert [outcome.cells for outcome in again] == [outcome.cells for outcome in first]
+    assert again == first
     assert (out / "basin/summary.json").stat().st_mtime_ns == written
     assert "3/3" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("answers", "matched", "standing"),
+    [
+        ((), 3, Standing.UNMEASURED),
+        (("fine", "fine"), 2, Standing.UNMEASURED),
+        (("fine", "fine"), 3, Standing.FINE),
+        (("fine", "not measured"), 3, Standing.PARTLY),
+        (("not measured", "DOUBTFUL"), 0, Standing.DOUBTFUL),
+    ],
+)
+def test_nothing_is_called_fine_on_the_page_that_was_not_measured(answers, matched, standing):
+    checks = {str(number): {"answer": answer} for number, answer in enumerate(answers)}
+    own = {"checks": checks, "matched": matched}
+    assert Outcome(Job(Path("a.bag"), Path("a")), own, "").standing is standing
 
 
 def test_a_cluster_that_is_not_there_is_told_before_the_first_map(tmp_path, monkeypatch):

@@ -1,0 +1,97 @@
+"""What became of many recordings, and the page that shows it: a row with picture, trust and reasons for each."""
+
+import html
+from collections import Counter
+from enum import Enum
+from pathlib import Path
+from typing import Any, Dict, List, NamedTuple, Sequence
+
+from mlsm_manager.offline.run_files import PICTURE, REPORT
+from mlsm_manager.self_check.headline import FEWEST_MATCHED
+from mlsm_manager.self_check.verdict import Answer
+
+_PAGE = """<!DOCTYPE html>
+<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
+<link rel="icon" href="data:,"><title>{title}</title><style>
+body {{ font-family: system-ui, sans-serif; margin: 1.5em auto; max-width: 1200px; padding: 0 1em; color: #222; }}
+h1 {{ font-size: 1.5em; }} table {{ border-collapse: collapse; width: 100%; }}
+td {{ border-top: 1px solid #ddd; padding: 0.7em 1em 0.7em 0; vertical-align: top; overflow-wrap: anywhere; }}
+img {{ width: 260px; height: 200px; object-fit: contain; display: block; }}
+b {{ display: inline-block; padding: 0.1em 0.6em; border-radius: 0.8em; color: white; }}
+small {{ color: #666; }} p {{ margin: 0.3em 0; }}
+</style></head><body><h1>{title}</h1><p>{counts}</p><table>{rows}</table></body></html>
+"""
+
+
+class Standing(Enum):
+    """How a recording came out: words and colour."""
+
+    FINE = "all checks fine", "#2e7d32"
+    PARTLY = "partly measured", "#5c6bc0"
+    UNMEASURED = "not measured", "#757575"
+    DOUBTFUL = "doubtful", "#c77700"
+    NO_MAP = "no map", "#b3261e"
+
+    @property
+    def badge(self) -> str:
+        """HTML."""
+        words, color = self.value
+        return f'<b style="background:{color}">{words}</b>'
+
+
+class Job(NamedTuple):
+    """One recording and the folder of its map."""
+
+    recording: Path
+    folder: Path
+
+
+class Outcome(NamedTuple):
+    """What became of a job: its summary, empty where there is no map, and one line that says why."""
+
+    job: Job
+    summary: Dict[str, Any]
+    problem: str
+
+    @property
+    def standing(self) -> Standing:
+        """How it came out, by the answers of its checks."""
+        if not self.summary:
+            return Standing.NO_MAP
+        checks = self.summary.get("checks", {})
+        answers = {Answer(check["answer"]) for check in checks.values()}
+        if Answer.DOUBTFUL in answers or self.summary.get("causes"):
+            return Standing.DOUBTFUL
+        if Answer.FINE not in answers or self.summary["matched"] < FEWEST_MATCHED:
+            return Standing.UNMEASURED
+        return Standing.FINE if answers == {Answer.FINE} else Standing.PARTLY
+
+
+def index_page(outcomes: Sequence[Outcome], total: int) -> str:
+    """Return the page of those of `total` recordings that are done."""
+    found = Counter(outcome.standing for outcome in outcomes)
+    counts = " &nbsp; ".join(f"{found[one]} {one.badge}" for one in Standing if found[one])
+    title = f"{sum(bool(one.summary) for one in outcomes)} of {total} recordings mapped"
+    waiting = f" &nbsp; {total - len(outcomes)} waiting" if len(outcomes) < total else ""
+    return _PAGE.format(title=title, counts=counts + waiting, rows="".join(map(_row, outcomes)))
+
+
+def _row(outcome: Outcome) -> str:
+    folder, own = outcome.job.folder, outcome.summary
+    link, picture = html.escape(folder.name), ""
+    if own:
+        page = REPORT if (folder / REPORT).is_file() else ""
+        shown = f'<img loading="lazy" alt="map of {link}" src="{link}/{PICTURE}">'
+        picture = f'<a href="{link}/{page}">{shown}</a><small><a href="{link}/">files</a></small>'
+    name, place = html.escape(outcome.job.recording.name), html.escape(str(outcome.job.recording.parent))
+    told = "".join(f"<p>{html.escape(line)}</p>" for line in _lines(outcome))
+    return f"<tr><td>{picture}</td><td><p>{outcome.standing.badge} {name}</p>{told}<small>{place}</small></td></tr>\n"
+
+
+def _lines(outcome: Outcome) -> List[str]:
+    own = outcome.summary
+    if not own:
+        return [outcome.problem]
+    figures = f"{own['scans']} scans, {own['matched']} matched, {own['blocks']} blocks, {own['seconds']:.0f} s of work"
+    odometry = f"odometry: {own['odometry']['profile']}, because {own['odometry']['reason']}"
+    return [own.get("trust", ""), odometry, figures]
