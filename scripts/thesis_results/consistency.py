@@ -4,10 +4,7 @@ from typing import Dict, List
 
 import numpy as np
 from benchmarks.matchers import MatcherName
-from benchmarks.no_parameters import outcome
-from benchmarks.paths import PathFigures
 from benchmarks.scans import KINDS, ScanMaker, SonarKind
-from benchmarks.tours import simulated
 from matplotlib.axes import Axes
 from scipy.stats import chi2
 
@@ -15,8 +12,6 @@ from thesis_results.moves import ODOMETRY, SEEDS, matching_estimator, session_er
 from thesis_results.page import joined, prose, table
 from thesis_results.pictures import Pictures, new_figure
 
-_JOINT_KINDS = (KINDS[0], KINDS[2])
-_DRAWS = 6
 _FEWEST = 10  # runs: fewer make no distribution
 _STATES = 3
 """Of a pose: x, y and heading."""
@@ -27,7 +22,6 @@ def make(pictures: Pictures) -> str:
     squares = {kind: _last_squares(kind) for kind in KINDS}
     figure, ((axes,),) = new_figure(7.5, 4.8)
     _draw_squares(axes, squares)
-    joint = [_joint(world, kind) for world in ("basin", "harbour") for kind in _JOINT_KINDS]
     return joined(
         prose(f"""A fix comes with a covariance. Its normalised estimation error squared (NEES), the squared error
         divided by that covariance, is {_STATES} on average where the covariance is true, for x, y and heading; more
@@ -43,10 +37,8 @@ def make(pictures: Pictures) -> str:
             """How often a squared error stays below a value, and how often it should (black). A curve to the right
             of the black one: too sure.""",
         ),
-        prose(f"""The joint solver on simulated tours, whose odometry has errors as a DVL and a compass have them,
-        drawn {_DRAWS} times: NEES of x and y per state (1 is true), live and of the whole run fitted afterwards
-        (batch). All fixes of one run share its odometry, so these means scatter much."""),
-        table(["tour", "sonar", "live: error", "deviation", "NEES", "batch: error", "deviation", "NEES"], joint),
+        prose("""How far the deviations of the joint solver on simulated tours are true, `scripts/bench no_parameters
+        --rows rays` measures ([matching](matching.md))."""),
     )  # fmt: skip
 
 
@@ -68,14 +60,6 @@ def _row(kind: SonarKind, squares: np.ndarray) -> List[str]:
         return [str(kind), f"0 of {SEEDS}", "", ""]
     low, high = chi2.ppf([0.025, 0.975], _STATES * len(squares)) / len(squares)
     return [str(kind), f"{len(squares)} of {SEEDS}", f"{squares.mean():.2f}", f"{low:.2f} to {high:.2f}"]
-
-
-def _joint(world: str, kind: SonarKind) -> List[str]:
-    tour = simulated(f"{world}_tour", kind)
-    outcomes = [outcome(tour.with_dvl(seed), ()) for seed in range(_DRAWS)]
-    means = [PathFigures(*np.mean([one[path] for one in outcomes], axis=0)) for path in (0, 1)]
-    cells = [text for one in means for text in (f"{one.mean:.2f} m", f"{one.stated:.2f} m", f"{one.nees:.2f}")]
-    return [world, str(kind), *cells]
 
 
 def _draw_squares(axes: Axes, squares: Dict[SonarKind, np.ndarray]) -> None:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks.matchers import BEAM_WIDTH
-from benchmarks.open_water import bubbles, outcome
+from made_open_water import bubbles, outcome
 from made_scans import SECONDS, drifting, elsewhere, harbour, map_of, scan_of, still, wall
 
 from mlsm_manager.localisation.clouds import MapCloud

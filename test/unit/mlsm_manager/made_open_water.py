@@ -1,12 +1,10 @@
 """Water with nothing in it: no scan of noise may lead to a fix."""
 
 from dataclasses import dataclass
-from itertools import product
-from typing import Callable, Dict
+from typing import Callable
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser, print_table
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import replay
@@ -16,7 +14,6 @@ from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
-SCANS = 1000
 _BEAMS, _BINS, _RESOLUTION = 120, 250, 0.2
 _SECONDS_PER_TURN = 16.0
 _START = 1000.0
@@ -37,11 +34,6 @@ class Outcome:
     farthest: float
 
 
-def silence(_rng: np.random.Generator) -> np.ndarray:
-    """Return strengths (beams, bins) of a turn in which nothing is heard."""
-    return np.zeros((_BEAMS, _BINS))
-
-
 def speckle(rng: np.random.Generator) -> np.ndarray:
     """Return a turn of receiver noise: amplitudes of Rayleigh's distribution."""
     return rng.rayleigh(_SPECKLE / np.sqrt(np.pi / 2.0), (_BEAMS, _BINS))
@@ -52,9 +44,6 @@ def bubbles(rng: np.random.Generator) -> np.ndarray:
     strengths = speckle(rng)
     strengths[rng.integers(0, _BEAMS, _BUBBLES), rng.integers(5, _BINS, _BUBBLES)] = _BUBBLE_STRENGTH
     return strengths
-
-
-WATERS: Dict[str, Turn] = {"silence": silence, "receiver noise": speckle, "noise and bubbles": bubbles}
 
 
 def recording(turn: Turn, scans: int, seed: int) -> Recording:
@@ -79,19 +68,3 @@ def outcome(turn: Turn, estimator: EstimatorName, scans: int, seed: int) -> Outc
     replayed = replay(made, found, parameters, lambda _: None)
     fixes = sum(update.accepted and update.result is not None for update in replayed.updates)
     return Outcome(len(found), fixes, float(np.hypot(*(replayed.corrected - replayed.odometry)[:, :2].T).max()))
-
-
-def main() -> None:
-    """Print one table of all waters and both estimators."""
-    parser = benchmark_parser("open_water", __doc__)
-    parser.add_argument("scans", type=int, nargs="?", default=SCANS)
-    scans, table = parser.parse_args().scans, []
-    for (name, turn), estimator in product(WATERS.items(), EstimatorName):
-        one = outcome(turn, estimator, scans, seed=1)
-        text = f"{one.fixes} of {one.scans} scans, correction up to {one.farthest:.2f} m"
-        table.append((f"fixes in {name}, {estimator.value}", text, "0"))
-    print_table(table)
-
-
-if __name__ == "__main__":
-    main()
