@@ -6,6 +6,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.odometry_log import as_complex
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -52,7 +53,7 @@ def replay_input(recording: Recording, kind: OdometryKind) -> Tuple[List[Scan], 
 def solved_live(recording: Recording, kind: OdometryKind) -> LiveSolver:
     """Return the joint solver after all scans of a recording."""
     scans, parameters = replay_input(recording, kind)
-    solver = LiveSolver(parameters.solver_parameters(), recording.sonar_in_base)
+    solver = LiveSolver(parameters.solver_parameters(), RunLog(recording.sonar_in_base))
     for scan in scans:
         solver.add(scan)
     return solver

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.replay_parameters import ReplayParameters
@@ -26,7 +27,7 @@ def recorded(recording):
 
 
 def path_of(recording, parameters, scans):
-    solver = LiveSolver(parameters.solver_parameters(), np.array(recording.sonar_in_base))
+    solver = LiveSolver(parameters.solver_parameters(), RunLog(recording.sonar_in_base))
     for scan in scans:
         solver.add(scan)
     return np.array([estimate.T_map_base for estimate in solver.estimates])

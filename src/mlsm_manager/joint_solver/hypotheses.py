@@ -13,6 +13,7 @@ from mlsm_manager.joint_solver.live_solver import ODOMETRY, LiveSolver, name_of
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 
@@ -36,7 +37,7 @@ class Doubt(NamedTuple):
 
 
 class Hypotheses:
-    """The solvers of a run: one, or, where its odometry has a rival, one for each.
+    """The solvers of a run: one, or, where its odometry has a rival, one for each. All have one log.
 
     shown: the solver that is believed. other: that of the other odometry; None where there is none, or it is out of the
     question. switched: whether `shown` was the other one before the newest scan. doubt: None without an other one.
@@ -54,12 +55,12 @@ class Hypotheses:
         known: Optional[KnownSurfaces] = None,
     ) -> "Hypotheses":  # fmt: skip
         """Return those of a new run; arguments as LiveSolver's."""
-        solver = LiveSolver(parameters, sonar_in_base, start, known)
+        solver = LiveSolver(parameters, RunLog(sonar_in_base), start, known)
         return cls(solver, _of_rival(solver))
 
     def begun_with(self, parameters: SolverParameters) -> "Hypotheses":
         """Return those with other parameters that begin where these began and have taken no scan."""
-        solver = self.shown.begun_with(parameters)
+        solver = self.shown.begun_with(parameters, RunLog(self.shown.log.sonar_in_base))
         return Hypotheses(solver, _of_rival(solver))
 
     @property
@@ -74,8 +75,7 @@ class Hypotheses:
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""
-        for solver in self.solvers:
-            solver.log.odometry.extend(track, time)
+        self.shown.log.odometry.extend(track, time)
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs; see LiveSolver.stored."""
@@ -87,10 +87,12 @@ class Hypotheses:
         cls, parameters: SolverParameters, sonar_in_base: np.ndarray, scans: Sequence[Scan],
         stored: Mapping[str, np.ndarray],
     ) -> "Hypotheses":  # fmt: skip
-        """Return those that go on after `scans`; arguments and errors as LiveSolver.resumed."""
+        """Return those that go on after `scans`. Raises as LiveSolver.resumed does, and RefusedInput."""
+        log = RunLog(sonar_in_base)
+        log.take(scans, parameters.parts_per_turn, parameters.lookahead)
         other = {name[len(_OTHER) :]: array for name, array in stored.items() if name.startswith(_OTHER)}
         shown, *others = (
-            LiveSolver.resumed(_as_stored(parameters, one), sonar_in_base, scans, one)
+            LiveSolver.resumed(_as_stored(parameters, one), log, one)
             for one in (stored, other)
             if one is stored or (one and parameters.odometry.rival is not None)
         )
@@ -114,7 +116,7 @@ class Hypotheses:
         self.shown.add(scan, fix)
         if self.other is not None:
             try:
-                self.other.add(scan, of_other)
+                self.other.solve(of_other)
                 self._weigh()
             except RefusedInput:
                 self.other = self.doubt = None
@@ -195,7 +197,7 @@ class Hypotheses:
 def _of_rival(solver: LiveSolver) -> Optional[LiveSolver]:
     """Return a solver of the odometry that the one of `solver` may be instead; None where that is certain."""
     rival = solver.odometry.rival
-    return None if rival is None else solver.begun_with(replace(solver.parameters, odometry=rival))
+    return None if rival is None else solver.begun_with(replace(solver.parameters, odometry=rival), solver.log)
 
 
 def _as_stored(parameters: SolverParameters, stored: Mapping[str, np.ndarray]) -> SolverParameters:

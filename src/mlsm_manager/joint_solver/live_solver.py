@@ -19,7 +19,7 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.prior_mixture import Gaussian, PriorTerm
-from mlsm_manager.joint_solver.run_log import RunLog, parts_of
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
@@ -109,8 +109,8 @@ _CONVINCING = 10.0  # of log likelihood, by which a path with a loop must fit be
 class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
-    sonar_in_base: (2,) m, where the sonar is in base_link. estimates: one per scan of the log,
-    None for old ones. state: of all nodes.
+    log: the scans, which solvers with other odometries may share. estimates: one per scan of the log, None for old
+    ones. state: of all nodes.
     submaps: which scans are compared with each other. search: what came of the search for the newest scans in the map
     after scans that heard nothing; None where none was needed. closed: the loop that was closed with the newest scan.
     """
@@ -118,16 +118,15 @@ class LiveSolver:
     def __init__(
         self,
         parameters: SolverParameters,
-        sonar_in_base: np.ndarray,
+        log: RunLog,
         start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
     ) -> None:
-        """`start`: (3,) standard deviations of the first pose in the map, m, m, rad; None: it defines the map.
-
-        `known`: surfaces that the map has already.
+        """`log`: without scans. `start`: (3,) standard deviations of the first pose in the map, m, m, rad; None: it
+        defines the map. `known`: surfaces that the map has already.
         """
         self.parameters = parameters
-        self.log = RunLog(sonar_in_base)
+        self.log = log
         self.odometry = parameters.odometry
         self.estimates: List[Optional[LiveEstimate]] = []
         self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean(self.log))
@@ -154,16 +153,10 @@ class LiveSolver:
         }
 
     @classmethod
-    def resumed(
-        cls,
-        parameters: SolverParameters,
-        sonar_in_base: np.ndarray,
-        scans: Sequence[Scan],
-        stored: Mapping[str, np.ndarray],
-    ) -> "LiveSolver":
-        """Return a solver that goes on after `scans` as the one did that took them and was `stored` then.
+    def resumed(cls, parameters: SolverParameters, log: RunLog, stored: Mapping[str, np.ndarray]) -> "LiveSolver":
+        """Return a solver that goes on after the scans of `log` as the one did that took them and was `stored` then.
 
-        Raises ValueError, KeyError and RefusedInput for arrays and scans that do not belong together.
+        Raises ValueError and KeyError for arrays and scans that do not belong together.
         """
         if not np.array_equal(stored[ODOMETRY], name_of(parameters.odometry)):
             name = stored[ODOMETRY].tobytes().decode("ascii", "replace")
@@ -171,11 +164,7 @@ class LiveSolver:
                 f"it was stored with another odometry profile: {name}, not {type(parameters.odometry).__name__}"
             )
         start, known = stored["start"], stored["known"]
-        solver = cls(
-            parameters, sonar_in_base, start if len(start) else None, KnownSurfaces(known) if len(known) else None
-        )
-        for scan in scans:
-            solver._append(scan)
+        solver = cls(parameters, log, start if len(start) else None, KnownSurfaces(known) if len(known) else None)
         solver._may_bend = False  # the map that was stored with it is not drawn anew
         solver._nodes.restore(stored, solver.log.scan_count)
         solver.submaps = Submaps(stored[_SUBMAPS])
@@ -193,9 +182,9 @@ class LiveSolver:
         """The unknowns as they are known now; a view that the next scan makes invalid."""
         return self._nodes.state
 
-    def begun_with(self, parameters: SolverParameters) -> "LiveSolver":
-        """Return a solver with other parameters that begins where this one began and has taken no scan."""
-        return LiveSolver(parameters, self.log.sonar_in_base, self._start, self._known)
+    def begun_with(self, parameters: SolverParameters, log: RunLog) -> "LiveSolver":
+        """Return a solver with other parameters that begins where this one began; log: without scans."""
+        return LiveSolver(parameters, log, self._start, self._known)
 
     @property
     def solution(self) -> Solution:
@@ -234,51 +223,50 @@ class LiveSolver:
         return float(self.estimates[-1].node_deviations[SCALE])
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
-        """Take the next scan and return where the vehicle was at its end, as known from all scans so far.
+        """Put the next scan into the log, and return what `solve` says of it.
 
-        fix: where the scan alone was found in the map, where somebody looked.
         It may be cut into parts (`parts_per_turn`), each then a scan of the log with an estimate of its own.
 
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
         """
-        scans, before, by_parts, loops = self.log.scan_count, self.state.copy(), self._by_parts, self._loops
+        scans = self.log.scan_count
+        self.log.take([scan], self._parts, self.parameters.lookahead)
+        try:
+            estimate = self.solve(fix)
+        except RefusedInput:
+            self.log.shorten(scans)
+            raise
+        self._forget_old()
+        return estimate
+
+    def solve(self, fix: Optional[Fix] = None) -> LiveEstimate:
+        """Return where the vehicle was at the end of the newest scan of the log, as known from all of them.
+
+        fix: where the scan alone was found in the map, where somebody looked.
+
+        Raises RefusedInput, and stays as it is, where the fit has no finite solution.
+        """
+        scans, before, by_parts, loops = len(self.estimates), self.state.copy(), self._by_parts, self._loops
+        for _ in range(scans, self.log.scan_count):
+            self.submaps.append()
         try:
             with np.errstate(over="ignore", invalid="ignore"):
-                self._append(scan)
                 self.estimates += self._solved(fix)
-        except RefusedInput:
-            raise
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
             self._nodes.take_back(before)
             self._by_parts, self._loops = by_parts, loops
             self.fixes.by_node.pop(self.log.scan_count, None)
-            self._shorten(scans)
-            text = f"the scan that ends at {scan.reference_time:.3f} s: {error}"
+            self.submaps.shorten(scans)
+            text = f"the scan that ends at {self.log.node_times[-1]:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
+        self.estimates[: self._old_scans] = [None] * self._old_scans
         return self.estimates[-1]
 
     @property
     def _parts(self) -> int:
         return self.parameters.parts_per_turn
-
-    def _append(self, scan: Scan) -> None:
-        """Append the parts of a scan to the log, all or none."""
-        scans = self.log.scan_count
-        try:
-            for part in parts_of(scan, self._parts, self.log.node_times[-1] if scans else None):
-                self.log.append(part, self.parameters.lookahead)
-                self.submaps.append()
-        except RefusedInput:
-            self._shorten(scans)
-            raise
-
-    def _shorten(self, scans: int) -> None:
-        """Keep the oldest `scans` of the log."""
-        while self.log.scan_count > scans:
-            self.log.remove_newest()
-        self.submaps.shorten(scans)
 
     def _solved(self, fix: Optional[Fix]) -> List[LiveEstimate]:
         """Return what is known of the scans of the log that have no estimates yet."""
@@ -299,18 +287,22 @@ class LiveSolver:
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
         self._nodes.covariances.replace_from(window.oldest, covariances)
         variance = self._misfit_variance()
-        self._forget_old()
         return [replace(estimate, misfit_variance=variance) for estimate in estimates]
 
-    def _forget_old(self) -> None:
-        """Forget what no later scan needs, of many scans at once."""
+    @property
+    def _old_scans(self) -> int:
+        """How many scans of the log are so old that they are to be forgotten now: many at once, else none."""
         old = self.log.scan_count - self.parameters.kept_scans * self._parts
-        if old <= 0 or old % _FORGOTTEN_AT_ONCE:
+        return old if old > 0 and old % _FORGOTTEN_AT_ONCE == 0 else 0
+
+    def _forget_old(self) -> None:
+        """Forget what no later scan needs."""
+        old = self._old_scans
+        if not old:
             return
         groups = np.array([max(old - _FORGOTTEN_AT_ONCE, 0), old]) // self.parameters.group_scans
         self.log.forget(superfluous(self.solution, *groups))
         self.log.thin_odometry(old)
-        self.estimates[:old] = [None] * old
 
     def _start_at(self, fix: Fix) -> None:
         """Put the newest node where its scan was found."""

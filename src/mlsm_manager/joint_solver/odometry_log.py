@@ -1,7 +1,7 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
 from dataclasses import dataclass, field
-from typing import Union
+from typing import Tuple, Union
 
 import numpy as np
 
@@ -52,6 +52,36 @@ class GrowingArray:
         self.values = self._rows[:count]
 
 
+class GrowingTable:
+    """Columns of equally many rows, appended at constant cost per row."""
+
+    def __init__(self, **shapes: Tuple[int, ...]) -> None:
+        """shapes: of a row of each column, by name; () for a number."""
+        self._columns = {name: GrowingArray(*shape) for name, shape in shapes.items()}
+
+    def __len__(self) -> int:
+        return len(next(iter(self._columns.values())))
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return a column (n, ...), a view that is valid until the next change."""
+        return self._columns[name].values
+
+    def extend(self, **rows: np.ndarray) -> None:
+        """Append m rows: (m, ...) of each column."""
+        for name, array in self._columns.items():
+            array.extend(rows[name])
+
+    def shorten(self, count: int) -> None:
+        """Keep the first `count` rows."""
+        for array in self._columns.values():
+            array.shorten(count)
+
+    def keep(self, chosen: np.ndarray) -> None:
+        """Keep the chosen rows, (n,) bool, in little more memory than they need."""
+        for array in self._columns.values():
+            array.keep(chosen)
+
+
 @dataclass(frozen=True)
 class Motion:
     """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
@@ -86,9 +116,7 @@ class OdometryLog:
     """Poses T_odom_base of a run in the order of time; grows at its end, and yaw never jumps by a turn."""
 
     def __init__(self) -> None:
-        self._times = GrowingArray()
-        self._poses = GrowingArray(3)
-        self._ahead = GrowingArray(2)
+        self._table = GrowingTable(times=(), poses=(3,), ahead=(2,))
 
     @classmethod
     def of(cls, track: Track) -> "OdometryLog":
@@ -98,26 +126,22 @@ class OdometryLog:
         return log
 
     def __len__(self) -> int:
-        return len(self._times)
+        return len(self._table)
 
     def shorten(self, count: int) -> None:
         """Keep the oldest `count` poses."""
-        self._times.shorten(count)
-        self._poses.shorten(count)
-        self._ahead.shorten(count)
+        self._table.shorten(count)
 
     def thin(self, until: float) -> None:
         """Keep about one pose in a second of those before `until` [s]."""
-        times = self._times.values
+        times = self._table["times"]
         seconds = np.floor(times / _WINDOW)
-        kept = (np.diff(seconds, prepend=-np.inf) > 0.0) | (times >= until)
-        for array in (self._times, self._poses, self._ahead):
-            array.keep(kept)
+        self._table.keep((np.diff(seconds, prepend=-np.inf) > 0.0) | (times >= until))
 
     @property
     def end(self) -> float:
         """Time of the newest pose [s]; minus infinity without any."""
-        return float(self._times.values[-1]) if len(self._times) else -np.inf
+        return float(self._table["times"][-1]) if len(self) else -np.inf
 
     def extend(self, track: Track, until: float) -> None:
         """Append the poses of `track` that are newer than the newest known one and not after `until` [s]."""
@@ -126,31 +150,29 @@ class OdometryLog:
         if last <= first:
             return
         times, poses = track.times[first:last], track.poses[first:last].copy()
-        if len(self._poses):
-            jump = poses[0, 2] - self._poses.values[-1, 2]
+        if len(self):
+            jump = poses[0, 2] - self._table["poses"][-1, 2]
             poses[:, 2] -= 2.0 * np.pi * np.round(jump / (2.0 * np.pi))
-        self._ahead.extend(self._gone_ahead(times, poses[:, 2]))
-        self._times.extend(times)
-        self._poses.extend(poses)
+        self._table.extend(times=times, poses=poses, ahead=self._gone_ahead(times, poses[:, 2]))
 
     def _gone_ahead(self, times: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Return where the newest (m,) poses are on the path of `Motion.ahead`, by the trapezoidal rule."""
-        known = len(self._times) > 0
-        start = self._ahead.values[-1] if known else np.zeros(2)
-        times = np.append(self._times.values[-1] if known else times[0], times)
-        yaw = np.append(self._poses.values[-1, 2] if known else yaw[0], yaw)
+        table, known = self._table, len(self) > 0
+        start = table["ahead"][-1] if known else np.zeros(2)
+        times = np.append(table["times"][-1] if known else times[0], times)
+        yaw = np.append(table["poses"][-1, 2] if known else yaw[0], yaw)
         heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
         steps = (heading[1:] + heading[:-1]) / 2.0 * np.diff(times)[:, np.newaxis]
         return start + np.cumsum(steps, axis=0)
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""
-        return _between(times, self._times.values, self._poses.values)
+        return _between(times, self._table["times"], self._table["poses"])
 
     def between(self, start: float, end: float) -> Motion:
         """Return the known poses between `start` and `end` [s], and the nearest beyond both."""
-        near = _around(self._times.values, start, end)
-        return Motion(self._times.values[near], self._poses.values[near], self._ahead.values[near])
+        near = _around(self._table["times"], start, end)
+        return Motion(*(self._table[name][near] for name in ("times", "poses", "ahead")))
 
     def velocity_at(self, time: float) -> np.ndarray:
         """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
@@ -159,7 +181,7 @@ class OdometryLog:
 
     def motion(self, times: np.ndarray) -> Motion:
         """Return the motion at `times` (m,), as `at` does."""
-        return Motion(times, self.at(times), _between(times, self._times.values, self._ahead.values))
+        return Motion(times, self.at(times), _between(times, self._table["times"], self._table["ahead"]))
 
 
 def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:

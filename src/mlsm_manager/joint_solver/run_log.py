@@ -1,12 +1,12 @@
 """What was measured during a run: surface points of every scan, the nodes' times and the odometry."""
 
 from dataclasses import fields
-from typing import List, Optional
+from typing import List, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.odometry_log import GrowingArray, Motion, OdometryLog
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, echo_count, post_points
+from mlsm_manager.joint_solver.odometry_log import GrowingArray, GrowingTable, Motion, OdometryLog
+from mlsm_manager.joint_solver.surface_points import Sights, SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
@@ -14,14 +14,15 @@ _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning b
 _POINTS_OF_PLATEAU = 2.0  # per echo: plateaus have 3 to 4 at a spacing of 1 m, peaks 1.0 to 1.3
 
 
+_OF_POINTS = [field.name for field in fields(SurfacePoints)]
+
+
 class PointTable:
     """The points of scans 0, 1, ... in the order of time."""
 
     def __init__(self) -> None:
         self._starts: List[int] = [0]
-        self._scans = GrowingArray()
-        self._points = {field.name: GrowingArray() for field in fields(SurfacePoints)}
-        self._points["normals"] = GrowingArray(2)
+        self._table = GrowingTable(**{name: (2,) if name == "normals" else () for name in (*_OF_POINTS, "scans")})
 
     @property
     def scan_count(self) -> int:
@@ -35,9 +36,7 @@ class PointTable:
 
     def append(self, points: SurfacePoints) -> None:
         """Append the points of one scan."""
-        for name, array in self._points.items():
-            array.extend(getattr(points, name))
-        self._scans.extend(np.full(len(points), self.scan_count))
+        self._table.extend(**vars(points), scans=np.full(len(points.times), self.scan_count))
         self._starts.append(self._starts[-1] + len(points))
 
     def since(self, scan: int) -> "PointTable":
@@ -47,18 +46,15 @@ class PointTable:
             later.append(self.points(self.rows(number, number + 1)))
         return later
 
-    def remove_newest(self) -> None:
-        """Take back the last `append`."""
-        self._starts.pop()
-        for array in (*self._points.values(), self._scans):
-            array.shorten(self._starts[-1])
+    def shorten(self, scans: int) -> None:
+        """Keep the oldest `scans`."""
+        del self._starts[scans + 1 :]
+        self._table.shorten(self._starts[-1])
 
     def forget(self, scans: np.ndarray) -> None:
         """Forget the points of `scans` (n,) bool, one for each scan so far."""
         counts = self.counts
-        kept = np.repeat(~scans, counts)
-        for array in (*self._points.values(), self._scans):
-            array.keep(kept)
+        self._table.keep(np.repeat(~scans, counts))
         self._starts = [0, *np.cumsum(np.where(scans, 0, counts)).tolist()]
 
     def rows(self, first: int, last: int) -> np.ndarray:
@@ -67,11 +63,11 @@ class PointTable:
 
     def points(self, rows: np.ndarray) -> SurfacePoints:
         """Return the points in `rows` (n,) int."""
-        return SurfacePoints(**{name: array.values[rows] for name, array in self._points.items()})
+        return SurfacePoints(*(self._table[name][rows] for name in _OF_POINTS))
 
     def scans(self, rows: np.ndarray) -> np.ndarray:
         """Return the scan (n,) int of each point in `rows`."""
-        return self._scans.values[rows].astype(np.int64)
+        return self._table["scans"][rows].astype(np.int64)
 
 
 class RunLog:
@@ -116,13 +112,25 @@ class RunLog:
         points, echoes = self._points_and_echoes.values.sum(axis=0)
         return bool(points > _POINTS_OF_PLATEAU * echoes)
 
+    def take(self, scans: Sequence[Scan], parts: int, lookahead: float) -> None:
+        """Append `scans`, each cut into `parts`, all or none; see `append`."""
+        before = self.scan_count
+        try:
+            for scan in scans:
+                for part in parts_of(scan, parts, self.node_times[-1] if self.scan_count else None):
+                    self.append(part, lookahead)
+        except RefusedInput:
+            self.shorten(before)
+            raise
+
     def append(self, scan: Scan, lookahead: float) -> None:
         """Append a scan and the odometry of its track up to `lookahead` seconds after its end.
 
         Raises RefusedInput for a scan that does not end later than the one before.
         """
-        points = SurfacePoints.of(scan, self.sonar_in_base)
-        posts = post_points(scan, self.sonar_in_base, points)
+        sights = Sights.of(scan, self.sonar_in_base)
+        points = SurfacePoints.of(scan, sights)
+        posts = post_points(scan, sights, points)
         if not len(self._node_times):
             self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
         newest = self.node_times[-1]
@@ -133,19 +141,20 @@ class RunLog:
         self._forgotten.extend([False])
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
-        self._points_and_echoes.extend(np.array([[len(scan.points), echo_count(scan, self.sonar_in_base)]]))
+        self._points_and_echoes.extend(np.array([[len(scan.points), sights.echo_count]]))
         self._surfaces.append(points)
         self.posts.append(posts)
 
-    def remove_newest(self) -> None:
-        """Take back the last `append`, as if that scan had not been."""
-        self._surfaces.remove_newest()
-        self.posts.remove_newest()
-        self.odometry.shorten(self._odometry_lengths.pop())
-        self._points_and_echoes.shorten(self.scan_count)
-        self._forgotten.shorten(self.scan_count)
+    def shorten(self, scans: int) -> None:
+        """Keep the oldest `scans`, as if the others had not been."""
+        if scans == self.scan_count:
+            return
+        for table in (self._surfaces, self.posts, self._points_and_echoes, self._forgotten):
+            table.shorten(scans)
+        self.odometry.shorten(self._odometry_lengths[scans])
+        del self._odometry_lengths[scans:]
         # Without scans no node is known: the next scan begins the run.
-        self._node_times.shorten(self.scan_count + 1 if self.scan_count else 0)
+        self._node_times.shorten(scans + 1 if scans else 0)
 
     def forget(self, scans: np.ndarray) -> None:
         """Forget the points of `scans` (n,) bool, those of each scan so far."""

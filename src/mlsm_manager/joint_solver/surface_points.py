@@ -1,7 +1,7 @@
 """Points of a scan on surfaces, or alone as of posts: range, bearing and normal as the sonar heard them."""
 
 from dataclasses import dataclass, fields
-from typing import Sequence, Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -21,6 +21,33 @@ _FLATNESS = (0.35, 0.25)  # variance across over variance along: from a heap to 
 _ECHO_LENGTH = (3.0, 2.0)  # m: from points of a beam that tell of two surfaces to points of one echo
 _NOTHING = 1e-9  # m: keeps points on top of each other, or of the sonar, from dividing by zero
 _GRAZING = (0.02, 0.1)  # cosine of incidence: from no telling which side of a surface was heard to certainty
+
+
+class Sights(NamedTuple):
+    """The points of a scan as the sonar saw them.
+
+    places: (n, 2) m from the sonar, in base_link at their own times. ranges: (n,) m. bearings: (n,) rad. reach: (n,) m,
+    see `reaches`. per_echo: (n,), see `points_per_echo`.
+    """
+
+    places: np.ndarray
+    ranges: np.ndarray
+    bearings: np.ndarray
+    reach: np.ndarray
+    per_echo: np.ndarray
+
+    @classmethod
+    def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "Sights":
+        """Return those of a scan; sonar_in_base: (2,) m, where the sonar is in base_link."""
+        places = transformed(inverse(scan.track.at(scan.times)), scan.points[:, :2]) - sonar_in_base
+        ranges, bearings = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
+        reach, per_echo = reaches(scan.times, bearings, ranges), points_per_echo(scan.times, ranges)
+        return cls(places, ranges, bearings, reach, per_echo)
+
+    @property
+    def echo_count(self) -> float:
+        """How many echoes the points belong to."""
+        return float((1.0 / self.per_echo).sum())
 
 
 @dataclass(frozen=True)
@@ -50,25 +77,18 @@ class SurfacePoints:
         return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
     @classmethod
-    def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "SurfacePoints":
-        """Return the points of a scan that lie on surfaces; sonar_in_base: (2,) m, where the sonar is in base_link."""
-        sight = sights(scan, sonar_in_base)
-        ranges = np.hypot(sight[:, 0], sight[:, 1])
-        bearings = np.arctan2(sight[:, 1], sight[:, 0])
-        normals, qualities = surface_normals(scan.points[:, :2], reaches(scan.times, bearings, ranges))
+    def of(cls, scan: Scan, sights: Sights) -> "SurfacePoints":
+        """Return the points of a scan that lie on surfaces."""
+        sight, ranges, bearings, reach, per_echo = sights
+        normals, qualities = surface_normals(scan.points[:, :2], reach)
         normals = rotated(normals, -scan.track.at(scan.times)[:, 2])
         outward = np.einsum("na,na->n", normals, sight)
         normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
         slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
         qualities = qualities * ramp(np.abs(outward) / np.maximum(ranges, _NOTHING), *_GRAZING)
-        qualities = qualities / np.sqrt(points_per_echo(scan.times, ranges))
+        qualities = qualities / np.sqrt(per_echo)
         known = qualities > 0.0
         return cls(*(array[known] for array in (scan.times, ranges, bearings, normals, slants, qualities)))
-
-
-def sights(scan: Scan, sonar_in_base: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) [m] of a scan from the sonar, in base_link at their own times."""
-    return transformed(inverse(scan.track.at(scan.times)), scan.points[:, :2]) - sonar_in_base
 
 
 def reaches(times: np.ndarray, bearings: np.ndarray, ranges: np.ndarray) -> np.ndarray:
@@ -99,12 +119,6 @@ def points_per_echo(times: np.ndarray, ranges: np.ndarray) -> np.ndarray:
     result = np.empty(len(order))
     result[order] = count
     return result
-
-
-def echo_count(scan: Scan, sonar_in_base: np.ndarray) -> float:
-    """Return how many echoes the points of a scan belong to."""
-    ranges = np.hypot(*sights(scan, sonar_in_base).T)
-    return float((1.0 / points_per_echo(scan.times, ranges)).sum())
 
 
 def surface_normals(points: np.ndarray, reach: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -146,22 +160,20 @@ _OTHERS = (1.0, 0.3)
 simulated canal was taken for posts in one of three runs; with these in none of six."""
 
 
-def post_points(scan: Scan, sonar_in_base: np.ndarray, surfaces: SurfacePoints) -> SurfacePoints:
+def post_points(scan: Scan, sights: Sights, surfaces: SurfacePoints) -> SurfacePoints:
     """Return the strong points of a scan that too few others surround for a line; their normals are the lines of sight.
 
-    sonar_in_base: (2,) m, where the sonar is in base_link. surfaces: the points of the scan that lie on surfaces. The
-    last echoes of a wall, where the sonar's range ends, are none: they travel with the vehicle.
+    surfaces: the points of the scan that lie on surfaces. The last echoes of a wall, where the sonar's range ends, are
+    none: they travel with the vehicle.
     """
-    sight = sights(scan, sonar_in_base)
-    ranges, bearings = np.hypot(*sight.T), np.arctan2(sight[:, 1], sight[:, 0])
-    reach = reaches(scan.times, bearings, ranges)
+    sight, ranges, bearings, reach, per_echo = sights
     threshold = max(height_threshold(scan.points[:, 3]), _NOTHING)
     strong = ramp(scan.points[:, 3], threshold, _STRONG * threshold)
     qualities = ramp(crowds(scan.points[:, :2], reach), *_ALONE) * strong
     candidates = np.flatnonzero((qualities > 0.0) & (ranges > 0.0))
     qualities[candidates] *= 1.0 - on_surfaces(sight[candidates], reach[candidates], surfaces)
     qualities = qualities * _distinctness(sight, qualities)
-    qualities = qualities / np.sqrt(points_per_echo(scan.times, ranges))
+    qualities = qualities / np.sqrt(per_echo)
     normals = sight / np.maximum(ranges, _NOTHING)[:, np.newaxis]
     known = (qualities > 0.0) & (ranges > 0.0)
     arrays = (scan.times, ranges, bearings, normals, np.zeros(len(ranges)), qualities)

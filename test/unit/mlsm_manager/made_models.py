@@ -5,6 +5,7 @@ from made_harbour import SONAR_IN_BASE
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import Compass, DvlFactors, DvlOdometry, ThrusterFactors, ThrusterOdometry
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.velocity_models import (
     HeadingFactors,
@@ -39,7 +40,7 @@ def solver_parameters(**values):
 
 def followed(scans, parameters=None, sonar_in_base=SONAR_IN_BASE):
     """Return the live solver after `scans`, by default of a vehicle with a DVL whose beams may be late."""
-    solver = LiveSolver(parameters or solver_parameters(sonar_delay_deviation=1.0), sonar_in_base)
+    solver = LiveSolver(parameters or solver_parameters(sonar_delay_deviation=1.0), RunLog(sonar_in_base))
     for scan in scans:
         solver.add(scan)
     return solver

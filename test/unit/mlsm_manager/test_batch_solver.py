@@ -4,7 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, that_heard, tour
+from made_harbour import logged, that_heard, tour
 from made_loops import astray
 from made_models import followed, solver_parameters
 
@@ -26,7 +26,7 @@ def not_found_live(scans):
     """Return a live solver after `scans` that closed no loop itself, because it was stored and resumed on the way."""
     parameters = solver_parameters(sonar_delay_deviation=1.0)
     begun = followed(scans[:RESUMED])
-    solver = LiveSolver.resumed(parameters, SONAR_IN_BASE, scans[:RESUMED], begun.stored())
+    solver = LiveSolver.resumed(parameters, logged(scans[:RESUMED]), begun.stored())
     for scan in scans[RESUMED:]:
         solver.add(scan)
     return solver

@@ -15,6 +15,7 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
 from mlsm_manager.joint_solver.odometry_log import as_complex
 from mlsm_manager.joint_solver.placement import PlacedPoints, solved_path
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.surface_points import ramp
 from mlsm_manager.joint_solver.weak_directions import discounted
 from node_support.geometry import rotated
@@ -174,7 +175,8 @@ def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
     T_base_sonar = np.eye(4)
     T_base_sonar[:2, 3] = SONAR_IN_BASE
     solvers = [
-        LiveSolver(solver_parameters(sonar_delay_deviation=1.0), some) for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])
+        LiveSolver(solver_parameters(sonar_delay_deviation=1.0), RunLog(some))
+        for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])
     ]
     for scan in tour(2).scans:
         expected, found = (solver.add(scan) for solver in solvers)

@@ -132,7 +132,7 @@ def test_submaps_of_another_number_of_scans_are_refused(canal):
     solver = canal[0].solver
     stored = {**solver.stored(), "islands": solver.submaps.numbers[1:]}
     with pytest.raises(ValueError, match="submaps"):
-        LiveSolver.resumed(PARAMETERS, SONAR_IN_BASE, canal[0].scans, stored)
+        LiveSolver.resumed(PARAMETERS, solver.log, stored)
 
 
 WEST, EAST = 6, 2  # scans before the silence and after it

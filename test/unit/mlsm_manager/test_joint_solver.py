@@ -13,6 +13,7 @@ from mlsm_manager.joint_solver.motion_models import DIRECTION, DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.placement import solved_path
+from mlsm_manager.joint_solver.run_log import RunLog
 from node_support.errors import RefusedInput
 from node_support.geometry import composed
 
@@ -123,7 +124,7 @@ def test_a_scan_without_a_solution_is_refused_and_changes_nothing(made):
 
 
 def test_a_first_scan_without_a_solution_is_forgotten(made):
-    solver = LiveSolver(DEFAULTS, SONAR_IN_BASE)
+    solver = LiveSolver(DEFAULTS, RunLog(SONAR_IN_BASE))
     with pytest.raises(RefusedInput, match="ends at"):
         solver.add(with_wild_odometry(made.scans[0]))
     for scan in made.scans[:2]:
@@ -143,7 +144,7 @@ def test_scans_without_echoes_are_bridged_by_the_odometry(made):
 
 
 def test_a_run_that_begins_deaf_starts_at_the_odometry(made):
-    estimate = LiveSolver(DEFAULTS, SONAR_IN_BASE).add(made.scans[0].without_points(TURN))
+    estimate = LiveSolver(DEFAULTS, RunLog(SONAR_IN_BASE)).add(made.scans[0].without_points(TURN))
     np.testing.assert_allclose(estimate.T_map_base, estimate.T_odom_base, atol=1e-9)
     assert estimate.comparisons == 0
 

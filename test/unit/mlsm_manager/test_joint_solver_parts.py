@@ -154,7 +154,7 @@ def test_a_scan_that_is_taken_back_and_a_run_that_begins_later_do_not_count():
     first, second = heard(2)
     log = logged([first, drawn_along(second, 6)])
     assert (log.has_plateaus, log.since(1).has_plateaus) == (True, True)
-    log.remove_newest()
+    log.shorten(1)
     assert not log.has_plateaus
 
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_harbour import HARBOUR, SONAR_IN_BASE, that_heard, tour
+from made_harbour import HARBOUR, SONAR_IN_BASE, logged, that_heard, tour
 from made_loops import DEAF, astray
 from made_models import followed, solver_parameters
 from scipy.spatial import cKDTree
@@ -12,6 +12,7 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.places import PlaceCandidate
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 
 pytestmark = pytest.mark.newest_only("slow; test_batch_solver finds the first loop with every version")
@@ -25,7 +26,7 @@ def run():
     """The errors [m] of the newest place after each scan of a run that goes astray, and the loops it closed."""
     made = tour(SCANS)
     scans, _ = astray(made, DRIFT)
-    solver, errors, closed = LiveSolver(solver_parameters(), SONAR_IN_BASE), [], {}
+    solver, errors, closed = LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE)), [], {}
     for number, scan in enumerate(scans):
         newest = solver.add(scan)
         errors.append(np.hypot(*(newest.T_map_base - made.truth.at(newest.time))[:2]))
@@ -48,14 +49,14 @@ def test_a_closed_loop_is_said_once_with_its_age_and_the_move(run):
 
 
 def test_a_run_that_is_not_astray_closes_no_loop():
-    solver = LiveSolver(solver_parameters(), SONAR_IN_BASE)
+    solver = LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE))
     for scan in tour(SCANS).scans:
         solver.add(scan)
         assert solver.closed is None
 
 
 def test_noise_closes_no_loop():
-    rng, solver = np.random.RandomState(0), LiveSolver(solver_parameters(), SONAR_IN_BASE)
+    rng, solver = np.random.RandomState(0), LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE))
     for scan in tour(SCANS).scans:
         places = scan.track.at(scan.times)[:, :2] + rng.uniform(-30.0, 30.0, (len(scan), 2))
         solver.add(that_heard(scan, scan.track, places))
@@ -65,7 +66,7 @@ def test_noise_closes_no_loop():
 def test_a_resumed_run_closes_no_loop_since_the_map_stored_with_it_would_stay_behind():
     scans, _ = astray(tour(SCANS), DRIFT)
     begun = followed(scans[:20], solver_parameters())
-    solver = LiveSolver.resumed(solver_parameters(), SONAR_IN_BASE, scans[:20], begun.stored())
+    solver = LiveSolver.resumed(solver_parameters(), logged(scans[:20]), begun.stored())
     for scan in scans[20:]:
         solver.add(scan)
         assert solver.closed is None

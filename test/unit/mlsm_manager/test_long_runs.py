@@ -42,7 +42,7 @@ def test_the_newest_scan_can_be_taken_back_after_some_are_forgotten(log):
     log.thin_odometry(6)
     length = len(log.odometry)
     log.append(tour(13).scans[-1], 1.0)
-    log.remove_newest()
+    log.shorten(12)
     assert (log.scan_count, len(log.odometry), len(log.forgotten)) == (12, length, 12)
 
 

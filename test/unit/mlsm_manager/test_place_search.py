@@ -16,6 +16,7 @@ from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.place_search import searched_node
 from mlsm_manager.joint_solver.placement import solved_path
+from mlsm_manager.joint_solver.run_log import RunLog
 from node_support.geometry import transformed
 
 FAR = np.array([3.0, -5.0])
@@ -94,7 +95,7 @@ def known_places():
 
 
 def pairs_with(known):
-    solver = LiveSolver(PARAMETERS, SONAR)
+    solver = LiveSolver(PARAMETERS, RunLog(SONAR))
     solver.add(HARBOUR.scans[0])
     sources = solver.solution.placed(solver.log.rows(0, 1))
     return known.compared(sources, 2.2, solver_parameters()), sources
@@ -116,7 +117,7 @@ def test_normals_of_the_map_point_as_those_of_the_scan():
 def test_a_run_that_starts_beside_its_map_is_drawn_onto_it():
     shift = np.array([0.6, -0.4, 0.0])
     known = KnownSurfaces(transformed(shift, known_places()))
-    solver = LiveSolver(PARAMETERS, SONAR, start=np.array([1.0, 1.0, 0.05]), known=known)
+    solver = LiveSolver(PARAMETERS, RunLog(SONAR), start=np.array([1.0, 1.0, 0.05]), known=known)
     for scan in HARBOUR.scans:
         estimate = solver.add(scan)
     np.testing.assert_allclose(estimate.T_map_base - estimate.T_odom_base, shift, atol=0.1)
@@ -124,7 +125,9 @@ def test_a_run_that_starts_beside_its_map_is_drawn_onto_it():
 
 def test_a_run_in_a_known_map_goes_on_when_its_first_scans_are_frozen():
     parameters = replace(PARAMETERS, free_scans=2)
-    solver = LiveSolver(parameters, SONAR, start=np.array([1.0, 1.0, 0.05]), known=KnownSurfaces(known_places()))
+    solver = LiveSolver(
+        parameters, RunLog(SONAR), start=np.array([1.0, 1.0, 0.05]), known=KnownSurfaces(known_places())
+    )
     estimates = [solver.add(scan) for scan in HARBOUR.scans]
     np.testing.assert_allclose(estimates[-1].T_map_base, estimates[-1].T_odom_base, atol=0.2)
 

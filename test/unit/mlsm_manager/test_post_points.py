@@ -6,7 +6,7 @@ from made_models import HEADING, followed, solver_parameters
 from made_posts import SPEED, cluttered, heard, true_path
 
 from mlsm_manager.joint_solver.batch_solver import solved
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, post_points
+from mlsm_manager.joint_solver.surface_points import Sights, SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = pytest.mark.long
@@ -26,7 +26,8 @@ def scan_of(places, strengths):
 
 
 def found_in(scan, sonar_in_base=AT_BASE):
-    return post_points(scan, sonar_in_base, SurfacePoints.of(scan, sonar_in_base))
+    sights = Sights.of(scan, sonar_in_base)
+    return post_points(scan, sights, SurfacePoints.of(scan, sights))
 
 
 def wall_and(place, strength):

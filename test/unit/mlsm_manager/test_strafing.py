@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, TURN, tour
+from made_harbour import SONAR_IN_BASE, TURN, logged, tour
 from made_models import followed
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
@@ -94,7 +94,7 @@ def test_equal_runs_find_equal_paths(hovering):
 
 def test_a_stored_run_goes_on_as_it_would_have():
     first = solver_of(OdometryKind.HOVERING, MADE.scans[:5])
-    again = LiveSolver.resumed(first.parameters, SONAR_IN_BASE, MADE.scans[:5], first.stored())
+    again = LiveSolver.resumed(first.parameters, logged(MADE.scans[:5], SONAR_IN_BASE, 3), first.stored())
     ends = [solver.add(MADE.scans[5]).T_map_base for solver in (first, again)]
     np.testing.assert_allclose(ends[1], ends[0])
 
