@@ -8,6 +8,7 @@ import numpy as np
 from mlsm_manager.joint_solver.motion_models import DRIFT_SCALE, Drift
 from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS
 from mlsm_manager.joint_solver.odometry_log import as_complex
+from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 
 
 @dataclass(frozen=True)
@@ -21,7 +22,7 @@ class LiveEstimate:
     world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
     mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
-    prior_term: (k, k + 1) what a mixture of priors added, see PriorTerm; k is 0 for models without one.
+    prior_term: what a mixture of priors added; of no unknowns for models without one.
     misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place. doubt: (3, 3) what
     another odometry that the vehicle may have adds to the covariance of the pose.
     """
@@ -41,7 +42,7 @@ class LiveEstimate:
     agreement: float
     distance: float
     surfaces: np.ndarray
-    prior_term: np.ndarray
+    prior_term: PriorTerm
     misfit_variance: float = 0.0
     doubt: np.ndarray = field(default_factory=lambda: np.zeros((POSE_COLUMNS, POSE_COLUMNS)))
 

@@ -18,7 +18,7 @@ from mlsm_manager.joint_solver.odometry_log import GrowingArray
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
-from mlsm_manager.joint_solver.prior_mixture import Gaussian, PriorTerm
+from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.scan_matching.scan import Scan
@@ -189,7 +189,7 @@ class LiveSolver:
     @property
     def solution(self) -> Solution:
         """The run as it is known now; its state is a view that the next scan makes invalid."""
-        term = PriorTerm.of_array(self.estimates[-1].prior_term) if self.estimates else None
+        term = self.estimates[-1].prior_term if self.estimates else None
         return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
 
     @property
@@ -199,7 +199,7 @@ class LiveSolver:
         if mixture is None or not self.estimates:
             return None
         newest = self.estimates[-1]
-        return mixture.without(PriorTerm.of_array(newest.prior_term), newest.node, newest.covariance)
+        return mixture.without(newest.prior_term, newest.node, newest.covariance)
 
     def expected_deviations(self, estimates: Sequence[LiveEstimate]) -> np.ndarray:
         """Return by how much (n,) [m] the positions of `estimates` are uncertain whatever the water tells.

@@ -23,7 +23,7 @@ from mlsm_manager.joint_solver.normal_equations import (
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
-from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, PriorTerm
+from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 from node_support.geometry import composed, inverse
@@ -223,7 +223,7 @@ class LiveWindow:
         """
         node, deviations, mixture = frozen.node.copy(), frozen.node_deviations, self._odometry.mixture
         if mixture is not None:
-            known = mixture.without(PriorTerm.of_array(frozen.prior_term), node, frozen.own_covariance)
+            known = mixture.without(frozen.prior_term, node, frozen.own_covariance)
             columns = list(mixture.columns)
             forgotten = mixture.walks**2 * float(self._motion.times[-1] - self._motion.times[0])
             node[columns], deviations[columns] = known.mean, np.sqrt(np.diag(known.covariance) + forgotten)
@@ -311,5 +311,5 @@ class LiveWindow:
             world_scale_deviation=self._parameters.world_scale_deviation(self._log),
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
-            agreement=share, distance=distance, surfaces=surfaces, prior_term=self._prior.term.array,
+            agreement=share, distance=distance, surfaces=surfaces, prior_term=self._prior.term,
         )  # fmt: skip

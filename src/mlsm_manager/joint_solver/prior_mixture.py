@@ -15,7 +15,8 @@ class Gaussian(NamedTuple):
     covariance: np.ndarray
 
 
-class PriorTerm(NamedTuple):
+@dataclass(frozen=True)
+class PriorTerm:
     """A Gaussian factor exp(-x^T information x / 2 + vector^T x) of k unknowns x. information: (k, k). vector: (k,)."""
 
     information: np.ndarray
@@ -25,16 +26,6 @@ class PriorTerm(NamedTuple):
     def none(cls, size: int) -> "PriorTerm":
         """Return the factor 1 of `size` unknowns."""
         return cls(np.zeros((size, size)), np.zeros(size))
-
-    @classmethod
-    def of_array(cls, array: np.ndarray) -> "PriorTerm":
-        """Return what `array` gave, (k, k + 1)."""
-        return cls(array[:, :-1], array[:, -1])
-
-    @property
-    def array(self) -> np.ndarray:
-        """(k, k + 1) information and vector, to be stored."""
-        return np.column_stack([self.information, self.vector])
 
     def add(self, equations: NormalEquations, columns: np.ndarray, values: np.ndarray) -> None:
         """Add the factor of unknowns in `columns` (k,), which are at `values` (k,)."""

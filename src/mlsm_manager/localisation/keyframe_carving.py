@@ -86,21 +86,18 @@ class KeyframeCarving:
         return self._most_followed > 0
 
     def carve(
-        self, surface_map: MultiLevelSurfaceMap, points: np.ndarray, times: np.ndarray, origins: np.ndarray,
-        also_free: Sequence[MultiLevelSurfaceMap] = (),
-    ) -> Optional[CarveReport]:  # fmt: skip
+        self, surface_map: MultiLevelSurfaceMap, points: np.ndarray, times: np.ndarray, origins: np.ndarray
+    ) -> Tuple[Optional[CarveReport], Optional[Blocks]]:
         """Carve for ever along the beams of points (n, 4) in the map, taken at `times` (n,) s from `origins` (n, 2) m.
 
-        also_free: where else what was not known to be free is noted. Return None where nothing is to be carved.
+        Return a report and what was not known to be free; None of both where nothing is to be carved.
         """
         if self._carver is None:
-            return None
+            return None, None
         findings = self._carver.findings(surface_map, FirstEchoes.of_level(points, times, origins), points)
         removed = self._carver.charge(surface_map, findings)
         noted = note_free(self._free, findings.free)
-        for free in also_free:
-            free.insert_blocks(noted)
-        return CarveReport(len(findings.free), len(findings.rows), removed)
+        return CarveReport(len(findings.free), len(findings.rows), removed), noted
 
     def forget_oldest(self) -> None:
         """Forget what the oldest keyframe said, because it is settled."""

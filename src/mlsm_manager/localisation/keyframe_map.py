@@ -1,7 +1,7 @@
 """Maps drawn from keyframes: clouds whose places may still change are kept as points and drawn anew when they do."""
 
 from collections import deque
-from typing import Deque, Dict, List, Mapping, Optional, Sequence
+from typing import Deque, Dict, List, Mapping, Optional
 
 import numpy as np
 
@@ -14,7 +14,7 @@ from mlsm_manager.localisation.resumption import StoredRun
 from mlsm_manager.localisation.stretches import Stretches
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.free_space import Carver, CarveReport
-from mlsm_manager.surface_map.insertion import InsertReport
+from mlsm_manager.surface_map.insertion import InsertReport, blocks_of
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
@@ -45,12 +45,9 @@ class KeyframeMap:
         self._stretches = stretches
         self._moving: Deque[MapCloud] = deque()
         self._overlay = Overlay(self._map)
-        self._above = self._new().blocks
+        self._above = Blocks.none(resolution)
         self._due: Optional[Placement] = None
         self._left_out = 0
-
-    def _new(self) -> MultiLevelSurfaceMap:
-        return MultiLevelSurfaceMap(self._map.resolution, self._map.limit)
 
     @property
     def map(self) -> MultiLevelSurfaceMap:
@@ -88,10 +85,20 @@ class KeyframeMap:
     def carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
         """Carve for ever along the beams of points (n, 4) that were inserted; see KeyframeCarving.carve."""
         self._overlay.take_off()
-        carved = self._free.carve(self._map, points, times, origins, self._also_free)
+        carved = self._carved(points, times, origins)
         if self._due is None:
             self._overlay.lay(self._above)
         return carved
+
+    def _carved(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        """As `carve` while only what is settled is in the map.
+
+        Nobody looks at the free space of a map whose moving keyframes are not followed.
+        """
+        report, noted = self._free.carve(self._map, points, times, origins)
+        if self._stretches is not None and noted is not None and self._free.follows:
+            self._stretches.note_free(noted)
+        return report
 
     def add(self, cloud: MapCloud) -> None:
         """Add a keyframe; it is in the map from the next `draw` on."""
@@ -111,7 +118,7 @@ class KeyframeMap:
             self._due = placement
             self._left_out += 1
         else:
-            self._due, self._above = None, self._new().blocks
+            self._due, self._above = None, Blocks.none(self._map.resolution)
         carved = [report for report in carved if report is not None]
         return sum(carved, CarveReport(0, 0, 0)) if carved else None
 
@@ -132,17 +139,11 @@ class KeyframeMap:
         self._free.keep_oldest(0)
         self._due = placement if self._moving else None
 
-    @property
-    def _also_free(self) -> Sequence[MultiLevelSurfaceMap]:
-        """Nobody looks at the free space of a map whose moving keyframes are not followed."""
-        shows = self._stretches is not None and self._free.follows
-        return (self._stretches.free,) if shows else ()
-
     def drawn_until(self, time: float, placement: Placement) -> MultiLevelSurfaceMap:
         """Return a map of its own without the keyframes that end after `time` [s]."""
         self._overlay.take_off()
         self._due = placement if self._moving else None
-        copy = self._new()
+        copy = MultiLevelSurfaceMap(self._map.resolution, self._map.limit)
         copy.insert_blocks(self._map.blocks)
         for cloud in self._moving:
             if cloud.end <= time:
@@ -157,17 +158,16 @@ class KeyframeMap:
         self._map.insert(points)
         if self._stretches is not None:
             self._stretches.add(cloud.end, points, placement)
-        return self._free.carve(self._map, points, cloud.times, origins, self._also_free)
+        return self._carved(points, cloud.times, origins)
 
     def _draw_what_is_due(self) -> None:
         """Draw the keyframes that may still move, if that was put off."""
         if self._due is None:
             return
-        placement, self._due, above = self._due, None, self._new()
+        placement, self._due = self._due, None
         together = MapCloud.joined(self._moving)
         points, origins = placement.heard(together)
-        above.insert(points)
-        self._above = above.blocks
+        self._above = blocks_of(points, self._map.resolution, self._map.limit)
         self._overlay.lay(self._above)
         ends = np.cumsum([len(cloud) for cloud in self._moving])
         keyframes = zip(*(np.split(each, ends[:-1]) for each in (points, together.times, origins)))

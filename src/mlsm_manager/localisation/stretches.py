@@ -5,12 +5,13 @@ is kept as blocks, which move with the path in the middle of it.
 """
 
 from dataclasses import dataclass
-from typing import List, Optional, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.localisation.clouds import Placement
 from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.insertion import blocks_of
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.operations import LevelTransform, moved
 from node_support.geometry import composed, inverse
@@ -44,46 +45,43 @@ class _Stretch:
 
 
 class Stretches:
-    """The stretches of a run in a map that held nothing before. free: cells that the newest one saw through first."""
+    """The stretches of a run in a map that held nothing before."""
 
     def __init__(self, resolution: float) -> None:
-        self._resolution = resolution
+        self._none = Blocks.none(resolution)
         self._closed: List[_Stretch] = []
         self._begin()
 
     def _begin(self) -> None:
         self._newest: Optional[Tuple[float, np.ndarray]] = None
-        self._drawn, self.free = (MultiLevelSurfaceMap(self._resolution, np.inf) for _ in range(2))
+        self._drawn, self._free = self._none, [self._none]
 
     def add(self, end: float, points: np.ndarray, placement: Placement) -> None:
         """Add a keyframe that ends at `end` [s] and settles at points (n, 4) in map."""
         self._close()
-        self._drawn.insert(points)
+        self._drawn = Blocks.joined([self._drawn, blocks_of(points, self._none.resolution)])
         self._newest = end, placement.path(np.array([end]))[0]
 
     def insert(self, points: np.ndarray) -> None:
         """Add points (n, 4) in map of no keyframe."""
-        self._drawn.insert(points)
+        self._drawn = _merged([self._drawn, blocks_of(points, self._none.resolution)])
+
+    def note_free(self, blocks: Blocks) -> None:
+        """Add cells that the newest keyframe saw through first."""
+        self._free.append(blocks)
 
     def _close(self) -> None:
         if self._newest is None:
             return
-        kept = (_light(blocks) for blocks in (self._drawn.blocks, self.free.blocks))
-        self._closed.append(_Stretch(1, *self._newest, *kept))
+        self._closed.append(_Stretch(1, *self._newest, _light(self._drawn), _light(Blocks.joined(self._free))))
         self._begin()
         if len(self._closed) > _MOST:
             counts = np.array([one.keyframes for one in self._closed])
             fewest = int(np.argmin(counts[1:] + counts[:-1]))
-            self._closed[fewest : fewest + 2] = [self._joined(*self._closed[fewest : fewest + 2])]
-
-    def _joined(self, first: _Stretch, second: _Stretch) -> _Stretch:
-        drawn, free = (MultiLevelSurfaceMap(self._resolution, np.inf) for _ in range(2))
-        for one in (first, second):
-            drawn.insert_blocks(one.drawn)
-            free.insert_blocks(one.free)
-        return _Stretch(
-            first.keyframes + second.keyframes, first.time, first.pose, _light(drawn.blocks), _light(free.blocks)
-        )
+            first, second = self._closed[fewest : fewest + 2]
+            drawn, free = (_light(_merged(each)) for each in ((first.drawn, second.drawn), (first.free, second.free)))
+            together = _Stretch(first.keyframes + second.keyframes, first.time, first.pose, drawn, free)
+            self._closed[fewest : fewest + 2] = [together]
 
     def redraw(self, drawn: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, placement: Placement) -> None:
         """Draw both maps, which hold nothing but this run, anew with the stretches where the path is now."""
@@ -93,6 +91,13 @@ class Stretches:
         self._closed = [one.at(pose) for one, pose in zip(there, poses)]
         drawn.replace([one.drawn for one in self._closed])
         free.replace([one.free for one in self._closed])
+
+
+def _merged(parts: Sequence[Blocks]) -> Blocks:
+    merged = MultiLevelSurfaceMap(parts[0].resolution, np.inf)
+    for blocks in parts:
+        merged.insert_blocks(blocks)
+    return merged.blocks
 
 
 def _light(blocks: Blocks) -> Blocks:

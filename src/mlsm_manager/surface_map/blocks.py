@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Optional, Protocol
+from typing import Optional, Protocol, Sequence
 
 import numpy as np
 
@@ -40,6 +40,17 @@ class Blocks:
     def __post_init__(self) -> None:
         if self.crossed is None:
             object.__setattr__(self, "crossed", np.zeros(len(self.rows), dtype=np.uint16))
+
+    @classmethod
+    def none(cls, resolution: float) -> "Blocks":
+        """Return no blocks."""
+        return cls(np.empty((0, ROW_WIDTH)), resolution)
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Blocks]") -> "Blocks":
+        """Return the blocks of all `parts`, at least one, as they are: they may overlap."""
+        rows, crossed = ([getattr(part, name) for part in parts] for name in ("rows", "crossed"))
+        return cls(np.concatenate(rows), parts[0].resolution, np.concatenate(crossed))
 
     def __len__(self) -> int:
         return len(self.rows)

@@ -28,6 +28,12 @@ def admitted(points: np.ndarray, limit: float) -> Tuple[np.ndarray, InsertReport
     return kept, InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
 
 
+def blocks_of(points: np.ndarray, resolution: float, limit: float = np.inf) -> Blocks:
+    """Return the blocks that points (n, 4) make in an empty map; `limit`: see `admitted`."""
+    _, groups = grouped_points(admitted(points, limit)[0], resolution)
+    return Blocks(groups.rows, resolution, groups.crossed)
+
+
 def insert_points(store: BlockStore, points: np.ndarray, resolution: float) -> np.ndarray:
     """Insert admitted points (n, 4); return the keys (c,) of the cells that they went into, sorted."""
     cells, groups = grouped_points(points, resolution)

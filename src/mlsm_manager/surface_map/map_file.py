@@ -72,7 +72,7 @@ class StoredMap:
     @property
     def shown(self) -> Blocks:
         """The blocks that tools show and export; those of the matched layer where there are no others."""
-        return self.layers.get(Layer.SHOWN, self.layers.get(Layer.MATCHED, Blocks(np.empty((0, ROW_WIDTH)), 1.0)))
+        return self.layers.get(Layer.SHOWN, self.layers.get(Layer.MATCHED, Blocks.none(1.0)))
 
 
 def write_map(path: Path, stored: StoredMap) -> int:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
@@ -36,7 +36,7 @@ class Overlay:
 
     def _forget(self) -> None:
         self._cells = np.empty(0, dtype=np.int64)
-        self._held = Blocks(np.empty((0, ROW_WIDTH)), self._map.resolution)
+        self._held = Blocks.none(self._map.resolution)
 
     @property
     def covered(self) -> Covered:
@@ -64,5 +64,4 @@ class Overlay:
         new = np.setdiff1d(cell_keys(cells), self._cells)
         held, _, _ = self._map.find(cells_of_keys(new))
         self._cells = np.union1d(self._cells, new)
-        rows, crossed = np.append(self._held.rows, held.rows, axis=0), np.append(self._held.crossed, held.crossed)
-        self._held = Blocks(rows, held.resolution, crossed)
+        self._held = Blocks.joined([self._held, held])

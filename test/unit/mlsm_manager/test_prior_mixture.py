@@ -59,7 +59,8 @@ def test_a_rival_leads_by_the_ratio_of_the_likelihoods_of_all_echoes(mean):
 
 
 def test_a_narrow_prior_does_not_count_before_the_echoes_tell_the_unknown():
-    np.testing.assert_allclose(MIXTURE.judged(known(0.0, 0.12)).term.array, 0.0, atol=1e-9)
+    term = MIXTURE.judged(known(0.0, 0.12)).term
+    np.testing.assert_allclose([term.information[0, 0], term.vector[0]], 0.0, atol=1e-9)
 
 
 def test_what_lies_between_two_peaks_is_not_made_more_certain():
@@ -95,4 +96,4 @@ def test_a_model_without_a_mixture_adds_nothing():
     prior, equations = AdaptedPrior(None, None), NormalEquations(2)
     prior.add(equations, 0, np.zeros(2))
     assert not equations.gradient.any()
-    assert prior.term.array.size == 0
+    assert prior.term.vector.size == 0

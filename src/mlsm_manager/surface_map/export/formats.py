@@ -6,7 +6,7 @@ from typing import Callable, Dict
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.octomap import write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, write_picture
 from mlsm_manager.surface_map.export.rasters import (
@@ -109,5 +109,5 @@ def export(stored: StoredMap, path: Path, options: ExportOptions) -> None:
     if not len(stored):
         raise ExportError("the map has no blocks")
     blocks = stored.shown
-    free = stored.layers.get(Layer.FREE, Blocks(np.empty((0, ROW_WIDTH)), blocks.resolution))
+    free = stored.layers.get(Layer.FREE, Blocks.none(blocks.resolution))
     _WRITERS[path.suffix](path, blocks, free, options)

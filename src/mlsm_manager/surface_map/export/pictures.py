@@ -91,7 +91,7 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = 
 
 def _pixels(blocks: Blocks, free: Blocks, color_by: ColorBy) -> tuple:
     """Return (rows, columns, 3) colours, the origin (2,) m and the resolution, m."""
-    both = Blocks(np.concatenate([free.rows, blocks.rows]), blocks.resolution)
+    both = Blocks.joined([free, blocks])
     raster = elevation(both)
     pixels = np.ones((*raster.values.shape, 3))
     low = np.rint(raster.origin / raster.resolution).astype(np.int64)
