@@ -14,7 +14,6 @@ from mlsm_manager.joint_solver.loops import Loop
 from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, YAW, State
-from mlsm_manager.joint_solver.odometry_log import GrowingArray
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
@@ -23,77 +22,6 @@ from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution, Submaps
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
-
-
-class SolvedNodes:
-    """Unknowns that every scan changes or adds to.
-
-    covariances: rows (3, 3) of the poses of those nodes that stay where they were found. misfits: a variance [m^2] of
-    the place for each turn of the head.
-    """
-
-    def __init__(self, first_node: np.ndarray, run: np.ndarray) -> None:
-        """first_node: (width,) unknowns of the node before the first scan. run: (r,) unknowns of the run."""
-        self._nodes = GrowingArray(len(first_node))
-        self._nodes.extend(first_node[np.newaxis])
-        self._run = run.copy()
-        self.covariances = GrowingArray(POSE_COLUMNS, POSE_COLUMNS)
-        self.misfits = GrowingArray()
-
-    def __len__(self) -> int:
-        """Number of nodes."""
-        return len(self._nodes)
-
-    @property
-    def state(self) -> State:
-        """The unknowns as they are known now, which may be changed in place; valid until nodes are added."""
-        return State(self._nodes.values, self._run)
-
-    def extend(self, nodes: np.ndarray) -> None:
-        """Append nodes (m, width)."""
-        self._nodes.extend(nodes)
-
-    def replace_newest(self, nodes: np.ndarray) -> None:
-        """Put nodes (m, width) in place of the m newest ones."""
-        self._nodes.replace_from(len(self) - len(nodes), nodes)
-
-    def take_back(self, state: State) -> None:
-        """Have nodes and run as they were in `state`, a copy."""
-        self._nodes.replace_from(0, state.nodes)
-        self._run[:] = state.run
-
-    @property
-    def misfits_until(self) -> np.ndarray:
-        """(n,) m^2, sum of the misfits until each node, those of whole turns; 0 beyond the turns that are judged."""
-        known = np.cumsum(np.append(0.0, self.misfits.values))
-        return known[np.minimum(np.arange(len(self)), len(known) - 1)]
-
-    def know_better(self, left: np.ndarray) -> None:
-        """Take away from the variance of the first nodes' places all but the share `left` (n,)."""
-        misfits = self.misfits_until
-        misfits[: len(left)] *= left
-        self.misfits.replace_from(0, np.diff(misfits)[: len(self.misfits)])
-        self.covariances.values[: len(left)] *= left[:, np.newaxis, np.newaxis]
-
-    def stored(self) -> Dict[str, np.ndarray]:
-        """Return copies of all that `restore` needs, by name."""
-        return {
-            "nodes": self._nodes.values.copy(),
-            "node_covariances": self.covariances.values.copy(),
-            "run_unknowns": self._run.copy(),
-            "misfits": self.misfits.values.copy(),
-        }
-
-    def restore(self, stored: Mapping[str, np.ndarray], scans: int) -> None:
-        """Take what was `stored` after `scans`; raises ValueError for arrays of other shapes, KeyError for none."""
-        nodes, covariances = stored["nodes"], stored["node_covariances"]
-        width = self._nodes.values.shape[1]
-        if nodes.shape != (scans + 1, width) or covariances.shape[1:] != (POSE_COLUMNS, POSE_COLUMNS):
-            raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {scans} scans")
-        self.take_back(State(nodes, stored["run_unknowns"]))
-        self.covariances.replace_from(0, covariances)
-        self.misfits.replace_from(0, stored["misfits"])
-
 
 ODOMETRY = "odometry"
 """Name under which the name of a run's model is stored."""
@@ -110,7 +38,7 @@ class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
     log: the scans, which solvers with other odometries may share. estimates: one per scan of the log, None for old
-    ones. state: of all nodes.
+    ones. state: the unknowns as they are known now.
     submaps: which scans are compared with each other. search: what came of the search for the newest scans in the map
     after scans that heard nothing; None where none was needed. closed: the loop that was closed with the newest scan.
     """
@@ -129,7 +57,9 @@ class LiveSolver:
         self.log = log
         self.odometry = parameters.odometry
         self.estimates: List[Optional[LiveEstimate]] = []
-        self._nodes = SolvedNodes(self.odometry.first_node(), parameters.run_mean(self.log))
+        self.state = State(self.odometry.first_node()[np.newaxis], parameters.run_mean(log))
+        # Of the poses of those nodes that stay where they were found; m^2, of the place, for each turn of the head.
+        self._covariances, self._misfits = np.empty((0, POSE_COLUMNS, POSE_COLUMNS)), np.empty(0)
         self._start, self._known = start, known
         self.submaps = Submaps(np.empty(0))
         self.fixes = Fixes()
@@ -143,7 +73,10 @@ class LiveSolver:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
         return {
             ODOMETRY: name_of(self.odometry),
-            **self._nodes.stored(),
+            "nodes": self.state.nodes.copy(),
+            "node_covariances": self._covariances,
+            "run_unknowns": self.state.run.copy(),
+            "misfits": self._misfits,
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             _SUBMAPS: self.submaps.numbers,
@@ -166,7 +99,7 @@ class LiveSolver:
         start, known = stored["start"], stored["known"]
         solver = cls(parameters, log, start if len(start) else None, KnownSurfaces(known) if len(known) else None)
         solver._may_bend = False  # the map that was stored with it is not drawn anew
-        solver._nodes.restore(stored, solver.log.scan_count)
+        solver._restore(stored)
         solver.submaps = Submaps(stored[_SUBMAPS])
         solver.fixes = Fixes.of_arrays(stored)
         if solver._by_parts is not None:
@@ -177,10 +110,13 @@ class LiveSolver:
                 raise ValueError(f"{len(found)} {name} for {solver.log.scan_count} scans")
         return solver
 
-    @property
-    def state(self) -> State:
-        """The unknowns as they are known now; a view that the next scan makes invalid."""
-        return self._nodes.state
+    def _restore(self, stored: Mapping[str, np.ndarray]) -> None:
+        nodes, covariances, scans = stored["nodes"], stored["node_covariances"], self.log.scan_count
+        width = self.state.nodes.shape[1]
+        if nodes.shape != (scans + 1, width) or covariances.shape[1:] != (POSE_COLUMNS, POSE_COLUMNS):
+            raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {scans} scans")
+        self.state = State(nodes, stored["run_unknowns"]).copy()
+        self._covariances, self._misfits = covariances, stored["misfits"]
 
     def begun_with(self, parameters: SolverParameters, log: RunLog) -> "LiveSolver":
         """Return a solver with other parameters that begins where this one began; log: without scans."""
@@ -188,7 +124,7 @@ class LiveSolver:
 
     @property
     def solution(self) -> Solution:
-        """The run as it is known now; its state is a view that the next scan makes invalid."""
+        """The run as it is known now, until the next scan."""
         term = self.estimates[-1].prior_term if self.estimates else None
         return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
 
@@ -255,7 +191,7 @@ class LiveSolver:
                 self.estimates += self._solved(fix)
         except (np.linalg.LinAlgError, ValueError) as error:
             # numpy and scipy raise a ValueError where they meet what is not finite.
-            self._nodes.take_back(before)
+            self.state = before
             self._by_parts, self._loops = by_parts, loops
             self.fixes.by_node.pop(self.log.scan_count, None)
             self.submaps.shorten(scans)
@@ -270,9 +206,11 @@ class LiveSolver:
 
     def _solved(self, fix: Optional[Fix]) -> List[LiveEstimate]:
         """Return what is known of the scans of the log that have no estimates yet."""
-        for node in range(len(self._nodes), self.log.scan_count + 1):
+        state = self.state
+        for node in range(len(state.nodes), self.log.scan_count + 1):
             motion = self.log.node_motion(np.array([node - 1, node]))
-            self._nodes.extend(self.odometry.advanced(self.state.nodes[-1:], motion[:1], motion[1:]))
+            newest = self.odometry.advanced(state.nodes[-1:], motion[:1], motion[1:])
+            state.nodes = np.append(state.nodes, newest, axis=0)
         self.search = None
         if fix is None:
             self._search()
@@ -285,7 +223,7 @@ class LiveSolver:
         if self._may_close:
             window = self._closed(window)
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
-        self._nodes.covariances.replace_from(window.oldest, covariances)
+        self._covariances = np.append(self._covariances[: window.oldest], covariances, axis=0)
         variance = self._misfit_variance()
         return [replace(estimate, misfit_variance=variance) for estimate in estimates]
 
@@ -314,12 +252,12 @@ class LiveSolver:
         """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
         first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
         newest = misfit_variances(self.solution, first)
-        self._nodes.misfits.replace_from(first, newest)
-        return float(self._nodes.misfits.values.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
+        self._misfits = np.append(self._misfits[:first], newest)
+        return float(self._misfits.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
 
     def _fitted(self, bend: Optional[Bend] = None) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution; loops only pull them near."""
-        window = LiveWindow(self.solution, self.estimates, self._nodes.covariances.values, self._start)
+        window = LiveWindow(self.solution, self.estimates, self._covariances, self._start)
         cut = self.parameters.wide_cut
         for _ in range(_PULLED_STEPS if bend else 0):
             window.step(cut, bend)
@@ -340,28 +278,43 @@ class LiveSolver:
         if not loops:
             return window
         oldest, before = window.oldest, window.log_likelihood()
-        covariances = np.append(self._nodes.covariances.values[:oldest], window.covariances_of_oldest(0), axis=0)
-        places = (covariances + misfit_covariance(self._nodes.misfits_until[: oldest + 1]))[:, :2, :2]
-        bend = Bend.of(loops, self.state.copy(), places)
+        covariances = np.append(self._covariances[:oldest], window.covariances_of_oldest(0), axis=0)
+        places = (covariances + misfit_covariance(self._misfits_until[: oldest + 1]))[:, :2, :2]
+        now = self.state
+        bend = Bend.of(loops, now, places)
         found = [self._bent(bend, share) for share in bend.tried]
         likelihood, share, state = max(found, key=lambda one: one[0])
         if likelihood < before + _CONVINCING:
-            self._nodes.take_back(bend.start)
+            self.state = now
             return window
-        self._nodes.take_back(state)
-        self._nodes.know_better(bend.left(share, np.trace(places, axis1=1, axis2=2))[:oldest])
+        self.state = state
+        self._know_better(bend.left(share, np.trace(places, axis1=1, axis2=2))[:oldest])
         self._loops = ()
         self.fixes = Fixes()  # in the map as it was
         seconds = self.log.node_times[-1] - self.log.node_times[loops[-1].older + 1]
-        shift = state.nodes[-1, :2] - bend.start.nodes[-1, :2]
+        shift = state.nodes[-1, :2] - now.nodes[-1, :2]
         self.closed = ClosedLoop(float(seconds), shift, likelihood - before)
         return self._fitted()
 
     def _bent(self, bend: Bend, share: float) -> Tuple[float, float, State]:
         """Return the log likelihood of the run with the path before the window bent by a `share`, that and the fit."""
-        self._nodes.take_back(bend.state(share))
+        self.state = bend.state(share)
         window = self._fitted(bend)
-        return window.log_likelihood() - bend.cost(share), share, self.state.copy()
+        return window.log_likelihood() - bend.cost(share), share, self.state
+
+    @property
+    def _misfits_until(self) -> np.ndarray:
+        """(n,) m^2, sum of the misfits until each node, those of whole turns; 0 beyond the turns that are judged."""
+        known = np.cumsum(np.append(0.0, self._misfits))
+        return known[np.minimum(np.arange(len(self.state.nodes)), len(known) - 1)]
+
+    def _know_better(self, left: np.ndarray) -> None:
+        """Take away from the variance of the first nodes' places all but the share `left` (n,)."""
+        misfits = self._misfits_until
+        misfits[: len(left)] *= left
+        self._misfits = np.diff(misfits)[: len(self._misfits)]
+        self._covariances = self._covariances.copy()
+        self._covariances[: len(left)] *= left[:, np.newaxis, np.newaxis]
 
     @property
     def found(self) -> str:
@@ -392,7 +345,8 @@ class LiveSolver:
         if self._by_parts is not None:
             self._by_parts = self._by_parts.followed(self.log, self.parameters)
             starts_known = self._known is not None or self._start is not None
-            self._nodes.replace_newest(self._by_parts.placed(self.log, self.state.nodes, self.parameters, starts_known))
+            placed = self._by_parts.placed(self.log, self.state.nodes, self.parameters, starts_known)
+            self.state.nodes[-len(placed) :] = placed
 
     def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
         """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
