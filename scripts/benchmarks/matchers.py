@@ -93,7 +93,7 @@ def _judged(difference: np.ndarray, covariance: np.ndarray, prior: Prior) -> Mat
 def _result(
     scan: Scan, prior: Prior, status: MatchStatus, correction: np.ndarray, covariance: np.ndarray, numbers: dict
 ) -> MatchResult:
-    """Return the result; besides the pose the state stays the prior's. Open3D does not tell its iterations: 0."""
+    """Return the result; besides the pose the state stays the prior's."""
     pose, state = composed(correction, scan.reference_pose), prior.covariance.copy()
     pose[2] = wrapped(pose[2])
     if status is MatchStatus.CONVERGED:
@@ -102,7 +102,7 @@ def _result(
     beam_times = np.unique(np.append(scan.times, scan.reference_time))
     return MatchResult(
         status=status, pose=pose, velocity=scan.track.velocity_at(scan.reference_time) + prior.rate,
-        covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state, iterations=0,
+        covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state,
         beam_times=beam_times, beam_poses=composed(correction, scan.track.at(beam_times)), reason="", **numbers,
     )  # fmt: skip
 

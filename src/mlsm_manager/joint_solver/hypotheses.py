@@ -7,13 +7,13 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.fixes import Fix
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, LiveSolver, name_of
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import Fix
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput
 

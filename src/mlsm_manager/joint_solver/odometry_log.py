@@ -1,7 +1,7 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
 from dataclasses import dataclass, field
-from typing import Tuple, Union
+from typing import List, Tuple, Union
 
 import numpy as np
 
@@ -65,6 +65,10 @@ class GrowingTable:
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a column (n, ...), a view that is valid until the next change."""
         return self._columns[name].values
+
+    def chosen(self, rows: Union[slice, np.ndarray], *names: str) -> List[np.ndarray]:
+        """Return `rows`, a slice or indices, of the columns with `names`."""
+        return [self._columns[name].values[rows] for name in names]
 
     def extend(self, **rows: np.ndarray) -> None:
         """Append m rows: (m, ...) of each column."""
@@ -172,7 +176,7 @@ class OdometryLog:
     def between(self, start: float, end: float) -> Motion:
         """Return the known poses between `start` and `end` [s], and the nearest beyond both."""
         near = _around(self._table["times"], start, end)
-        return Motion(*(self._table[name][near] for name in ("times", "poses", "ahead")))
+        return Motion(*self._table.chosen(near, "times", "poses", "ahead"))
 
     def velocity_at(self, time: float) -> np.ndarray:
         """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""

@@ -63,7 +63,7 @@ class PointTable:
 
     def points(self, rows: np.ndarray) -> SurfacePoints:
         """Return the points in `rows` (n,) int."""
-        return SurfacePoints(*(self._table[name][rows] for name in _OF_POINTS))
+        return SurfacePoints(*self._table.chosen(rows, *_OF_POINTS))
 
     def scans(self, rows: np.ndarray) -> np.ndarray:
         """Return the scan (n,) int of each point in `rows`."""

@@ -5,19 +5,18 @@ from typing import List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.fixes import Fix
 from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.solution import Fix
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.estimator import Estimator, MapSettings
+from mlsm_manager.localisation.estimator import PATH_POINTS, Estimator, MapSettings
 from mlsm_manager.localisation.joint_session import (
     JointSession,
     belief_at,
     belief_of,
     belief_of_match,
     correction_of,
-    path_times,
     prior_at,
     update_of,
 )
@@ -233,7 +232,7 @@ class Joint(Estimator):
             return self._wait(cloud)
         self._maps.shown.add(cloud)
         carved = self._maps.shown.draw(session, session.settled_until)
-        _, report = admitted(session.heard(cloud)[0], self.settings.limit)
+        _, report = admitted(cloud.points, self.settings.limit)
         return CloudUpdate(report, False, 0, carved)
 
     def _insert(self, points: np.ndarray) -> InsertReport:
@@ -316,7 +315,7 @@ class Joint(Estimator):
         self._end_session()
         pose = composed(self.correction, scan.reference_pose)
         self.belief = belief_at(scan.reference_time, pose, self.errors)
-        times = path_times(scan.start, scan.reference_time)
+        times = np.linspace(scan.start, scan.reference_time, PATH_POINTS)
         self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
         points = transformed(self.correction, scan.points)
         self._maps.matched.insert(points)

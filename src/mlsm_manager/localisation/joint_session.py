@@ -4,15 +4,16 @@ from dataclasses import dataclass, field, replace
 from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
+from scipy.linalg import block_diag
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
-from mlsm_manager.joint_solver.fixes import Fix
 from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.solution import Fix
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
@@ -37,8 +38,6 @@ _CHECKED_SCANS = 20
 _MOST_APART = 200
 """Scans whose place in the map is not known that may still be moved: an hour's, since drawing takes as long as there
 are many."""
-_PATH_POINTS = 17
-"""Points of the path within a scan: about one per second of a slow head's revolution."""
 
 
 @dataclass
@@ -282,39 +281,18 @@ def correction_of(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
     return correction
 
 
-def path_times(start: float, end: float) -> np.ndarray:
-    """Return the times (_PATH_POINTS,) s at which the path within a scan is told."""
-    return np.linspace(start, end, _PATH_POINTS)
-
-
 def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float) -> ScanUpdate:
     """Return what a run that has just taken a scan made of it. seconds: that it took."""
     solver = session.solver
     estimate = solver.estimates[-1]
     if not estimate.comparisons:
         return ScanUpdate(scan, None, True, belief, provisional=session.is_provisional)
-    result = _match(scan, estimate, belief, session, seconds)
-    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=_loop(solver))
-
-
-def _match(scan: Scan, estimate: LiveEstimate, belief: Belief, session: JointSession, seconds: float) -> MatchResult:
-    """Return what the solver found for a scan, as a matcher would say it."""
-    times = path_times(min(scan.start, estimate.time - 1e-3), estimate.time)
-    return MatchResult(
-        status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity,
-        covariance=_fix_covariance(estimate), rate=belief.theta[RATE], motion=belief.theta[MOTION],
-        state_covariance=belief.covariance, error=estimate.distance, points_used=estimate.comparisons,
-        iterations=session.solver.parameters.live_iterations, seconds=seconds, beam_times=times,
-        beam_poses=session.path(times),
+    # What pose and velocity share is left out.
+    covariance = block_diag(estimate.pose_covariance, estimate.velocity_covariance)
+    result = MatchResult(
+        status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity, covariance=covariance,
+        rate=belief.theta[RATE], motion=belief.theta[MOTION], state_covariance=belief.covariance,
+        error=estimate.distance, points_used=estimate.comparisons, seconds=seconds,
     )  # fmt: skip
-
-
-def _loop(solver: LiveSolver) -> str:
-    return "" if solver.closed is None else solver.closed.line()
-
-
-def _fix_covariance(estimate: LiveEstimate) -> np.ndarray:
-    """Return the covariance (6, 6) of pose and velocity; what both share is left out."""
-    covariance = np.zeros((6, 6))
-    covariance[:3, :3], covariance[3:, 3:] = estimate.pose_covariance, estimate.velocity_covariance
-    return covariance
+    loop = "" if solver.closed is None else solver.closed.line()
+    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=loop)

@@ -5,7 +5,7 @@ from typing import List, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.estimator import PATH_POINTS, Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
 from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
@@ -151,6 +151,6 @@ class ThesisEstimator(Estimator):
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""
-        times = np.unique(np.append(np.linspace(scan.start, scan.reference_time, 17), scan.reference_time))
+        times = np.unique(np.append(np.linspace(scan.start, scan.reference_time, PATH_POINTS), scan.reference_time))
         correction = prior_of(belief, scan.reference_pose).correction
         return times, composed(correction, scan.track.at(times))

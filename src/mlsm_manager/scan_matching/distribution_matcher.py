@@ -232,7 +232,6 @@ def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, st
         state_covariance=fit.covariance,
         error=float(used.mean()) if used.size else float("inf"),
         points_used=int(used.size),
-        iterations=fit.iterations,
         seconds=time.perf_counter() - start,
         beam_times=motion.beam_times,
         beam_poses=motion.path(fit.theta),

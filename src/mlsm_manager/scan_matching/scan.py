@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol
+from typing import Optional, Protocol
 
 import numpy as np
 
@@ -147,8 +147,9 @@ class MatchResult:
     covariance: (6, 6) of [pose, velocity], prior included.
     rate, motion, state_covariance: as in `Prior`, after the match; the covariance is (8, 8) of [pose, rate, motion].
     error: mean distance of the used points from the map, m. seconds: time the match took.
-    beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
     reason: one line that says why a match was not accepted, with the value that decided; empty when it was accepted.
+    beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
+        None of the joint solver, which knows the path of the whole run.
     """
 
     status: MatchStatus
@@ -160,11 +161,10 @@ class MatchResult:
     state_covariance: np.ndarray
     error: float
     points_used: int
-    iterations: int
     seconds: float
-    beam_times: np.ndarray
-    beam_poses: np.ndarray
     reason: str = ""
+    beam_times: Optional[np.ndarray] = None
+    beam_poses: Optional[np.ndarray] = None
 
     @property
     def accepted(self) -> bool:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Optional, Protocol, Sequence
+from typing import Protocol, Sequence
 
 import numpy as np
 
@@ -30,21 +30,22 @@ class Blocks:
     rows: (n, 11) float64: mean x y z [m] and strength, their sums of squared deviations, number of points,
         bottom and top [m].
     resolution: side of a cell, m.
-    crossed: (n,) uint16, number of beams that crossed the block since a point last fell into it; 0 when left out.
+    crossed: (n,) uint16, number of beams that crossed the block since a point last fell into it.
     """
 
     rows: np.ndarray
     resolution: float
-    crossed: Optional[np.ndarray] = None
+    crossed: np.ndarray
 
-    def __post_init__(self) -> None:
-        if self.crossed is None:
-            object.__setattr__(self, "crossed", np.zeros(len(self.rows), dtype=np.uint16))
+    @classmethod
+    def uncrossed(cls, rows: np.ndarray, resolution: float) -> "Blocks":
+        """Return blocks that no beam has crossed yet."""
+        return cls(rows, resolution, np.zeros(len(rows), dtype=np.uint16))
 
     @classmethod
     def none(cls, resolution: float) -> "Blocks":
         """Return no blocks."""
-        return cls(np.empty((0, ROW_WIDTH)), resolution)
+        return cls.uncrossed(np.empty((0, ROW_WIDTH)), resolution)
 
     @classmethod
     def joined(cls, parts: "Sequence[Blocks]") -> "Blocks":

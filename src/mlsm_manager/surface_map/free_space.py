@@ -263,10 +263,10 @@ def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:
     """Return one block per cell, with the heights of the axes that crossed it."""
     rows = np.zeros((len(paths.cells), ROW_WIDTH))
     if not len(rows):
-        return Blocks(rows, resolution)
+        return Blocks.none(resolution)
     rows[:, :2] = (paths.cells + 0.5) * resolution
     rows[:, COUNT] = np.diff(np.append(paths.starts, len(paths.cell)))
     rows[:, BOTTOM] = np.minimum.reduceat(paths.height, paths.starts)
     rows[:, TOP] = np.maximum.reduceat(paths.height, paths.starts)
     rows[:, 2] = (rows[:, BOTTOM] + rows[:, TOP]) / 2.0
-    return Blocks(rows, resolution)
+    return Blocks.uncrossed(rows, resolution)

@@ -143,7 +143,7 @@ def _result(status: MatchStatus, scan: Scan, prior: Prior, fit: _Fit, start: flo
     return MatchResult(
         status=status, pose=pose, velocity=scan.track.velocity_at(scan.reference_time) + prior.rate + missed,
         covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state, error=float(fit.error),
-        points_used=len(scan), iterations=fit.iterations, seconds=time.perf_counter() - start, beam_times=beam_times,
+        points_used=len(scan), seconds=time.perf_counter() - start, beam_times=beam_times,
         beam_poses=beam_poses, reason="" if accepted else f"error {fit.error:.3f} m after {fit.iterations} iterations",
     )  # fmt: skip
 

@@ -61,4 +61,4 @@ def blocks_of(intervals, resolution=0.5):
     rows = np.zeros((len(intervals), 11))
     for index, (bottom, top) in enumerate(intervals):
         rows[index] = [(index + 0.3) * resolution, 0.2, (bottom + top) / 2, 40, 1, 2, 3, 4, 2, bottom, top]
-    return Blocks(rows, resolution)
+    return Blocks.uncrossed(rows, resolution)

@@ -17,7 +17,7 @@ def blocks(count):
     rows[:, 2] = np.arange(count) % 10
     rows[:, 8] = 1 + np.arange(count) % 7
     rows[:, 9:] = rows[:, 2:3]
-    return Blocks(rows, RESOLUTION)
+    return Blocks.uncrossed(rows, RESOLUTION)
 
 
 def verdict(value, limit=4.0, **more):

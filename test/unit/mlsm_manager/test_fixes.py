@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from made_scans import at_velocity, harbour, scan_of
 
-from mlsm_manager.joint_solver.fixes import Fix, Fixes
+from mlsm_manager.joint_solver.solution import Fix, Fixes
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import LocaliserParameters
 

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from made_maps import content, in_order, map_with, partition, random_map, stored_map
 
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
-from mlsm_manager.surface_map.blocks import ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.formats import write_ply
 from mlsm_manager.surface_map.export.map_folder import MapFolder
 from mlsm_manager.surface_map.map_file import (
@@ -250,7 +250,7 @@ def test_overwriting_keeps_nothing(folder):
 def test_an_empty_map_replaces_none(folder, overwrite):
     folder.save("basin", stored_map())
     before = (folder.folder / "basin.mlsm").read_bytes()
-    empty = StoredMap("map", {Layer.SHOWN: Blocks(np.empty((0, ROW_WIDTH)), 0.5), Layer.FREE: stored_map().shown})
+    empty = StoredMap("map", {Layer.SHOWN: Blocks.none(0.5), Layer.FREE: stored_map().shown})
     with pytest.raises(MapFileError, match="not replaced, the map has no blocks"):
         folder.save("basin", empty, overwrite)
     assert _files(folder) == ["basin.mlsm"]

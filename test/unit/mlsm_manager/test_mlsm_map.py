@@ -133,7 +133,7 @@ def test_no_loop_is_compiled_after_the_map_was_made(dtype, writeable):
 def test_blocks_that_overlap_among_themselves_become_one():
     tall, inner = (map_with([[0.1, 0.1, z, 1.0] for z in heights]) for heights in ((0.0, 0.4, 0.8, 1.2), (0.1, 1.0)))
     merged = MultiLevelSurfaceMap(0.5)
-    merged.insert_blocks(Blocks(np.concatenate([tall.blocks.rows, inner.blocks.rows]), 0.5))
+    merged.insert_blocks(Blocks.joined([tall.blocks, inner.blocks]))
     assert partition(merged.blocks) == [((0, 0), 0.0, 1.2, 6, 1)]
 
 

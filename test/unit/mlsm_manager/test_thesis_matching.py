@@ -186,8 +186,7 @@ def test_without_success_it_stops_at_max_iterations_and_is_not_accepted(limit):
     scan = scan_of(harbour(), still())
     result = match(scan, map_of(harbour()), [0.9, 0.9, 0.1], error_threshold=0.0, max_iterations=limit)
     assert result.status is MatchStatus.DIVERGED
-    assert result.iterations == limit
-    assert "iterations" in result.reason
+    assert f"after {limit} iterations" in result.reason
 
 
 @pytest.mark.parametrize(("points", "blocks"), [(0, 10), (2, 10), (10, 0)])
