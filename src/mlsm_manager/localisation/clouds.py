@@ -9,6 +9,8 @@ import numpy as np
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import composed, inverse, transformed
 
+PATH_POINTS = 17
+"""Points of the path within a scan: about one per second of a slow head's revolution."""
 _MOST_STRETCHES = 8
 """A cloud comes within a scan or two of its own; eight turns of a head are two minutes."""
 _SLACK = 0.5

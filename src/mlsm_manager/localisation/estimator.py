@@ -26,10 +26,6 @@ _MOST_WAITING = 8
 """Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""
 
 
-PATH_POINTS = 17
-"""Points of the path within a scan: about one per second of a slow head's revolution."""
-
-
 @dataclass(frozen=True)
 class MapSettings:
     """The grids of the map that is shown and of the map that is matched with.

@@ -9,8 +9,8 @@ from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Fix
-from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.estimator import PATH_POINTS, Estimator, MapSettings
+from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
+from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint_session import (
     JointSession,
     belief_at,

@@ -14,7 +14,7 @@ from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Fix
-from mlsm_manager.localisation.clouds import MapCloud
+from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
 from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
@@ -289,10 +289,12 @@ def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float)
         return ScanUpdate(scan, None, True, belief, provisional=session.is_provisional)
     # What pose and velocity share is left out.
     covariance = block_diag(estimate.pose_covariance, estimate.velocity_covariance)
+    times = np.linspace(min(scan.start, estimate.time - 1e-3), estimate.time, PATH_POINTS)
     result = MatchResult(
         status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity, covariance=covariance,
         rate=belief.theta[RATE], motion=belief.theta[MOTION], state_covariance=belief.covariance,
-        error=estimate.distance, points_used=estimate.comparisons, seconds=seconds,
+        error=estimate.distance, points_used=estimate.comparisons, seconds=seconds, beam_times=times,
+        beam_poses=session.path(times),
     )  # fmt: skip
     loop = "" if solver.closed is None else solver.closed.line()
     return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=loop)

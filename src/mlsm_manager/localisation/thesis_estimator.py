@@ -4,8 +4,8 @@ from typing import List, Mapping, Optional
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.estimator import PATH_POINTS, Estimator
+from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
+from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
 from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Optional, Protocol
+from typing import Protocol
 
 import numpy as np
 
@@ -149,7 +149,6 @@ class MatchResult:
     error: mean distance of the used points from the map, m. seconds: time the match took.
     reason: one line that says why a match was not accepted, with the value that decided; empty when it was accepted.
     beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
-        None of the joint solver, which knows the path of the whole run.
     """
 
     status: MatchStatus
@@ -162,9 +161,9 @@ class MatchResult:
     error: float
     points_used: int
     seconds: float
+    beam_times: np.ndarray
+    beam_poses: np.ndarray
     reason: str = ""
-    beam_times: Optional[np.ndarray] = None
-    beam_poses: Optional[np.ndarray] = None
 
     @property
     def accepted(self) -> bool:
