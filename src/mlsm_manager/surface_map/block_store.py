@@ -9,7 +9,6 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks
 from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
-from mlsm_manager.surface_map.large_array import LargeArray
 from node_support.numba_cache import compiled
 
 _PIECE = 1 << 15  # rows copied at once: 3 MB, one or two milliseconds
@@ -18,7 +17,7 @@ _MIN_ROWS = 1024  # reserved from the start (96 kB), so that small maps do not g
 
 
 class StoreArrays(NamedTuple):
-    """Views that compiled loops read and write. While somebody holds one, a store that grows copies all its rows.
+    """Arrays that compiled loops read and write.
 
     rows: (n, ROW_WIDTH). following: (n,) the row that follows each in its cell. crossed: (n,). heads: (s,) the first
     rows of all cells.
@@ -50,9 +49,9 @@ class BlockStore:
     def __init__(self, expected_blocks: int) -> None:
         """`expected_blocks`: room is reserved for so many."""
         reserved = max(expected_blocks, _MIN_ROWS)
-        self._rows = LargeArray(reserved, (ROW_WIDTH,), np.float64)
-        self._following = LargeArray(reserved, (), np.int32)
-        self._crossed = LargeArray(reserved, (), np.uint16)
+        self._rows = np.empty((reserved, ROW_WIDTH))
+        self._following = np.empty(reserved, dtype=np.int32)
+        self._crossed = np.empty(reserved, dtype=np.uint16)
         self._index = CellIndex(expected_blocks)
         self._used = 0
         self._free = np.empty(0, dtype=np.int64)
@@ -64,17 +63,17 @@ class BlockStore:
     @property
     def nbytes(self) -> int:
         """Memory in use, bytes; rows beyond those are reserved but never touched, so that they cost nothing yet."""
-        arrays = self._rows.values, self._following.values, self._crossed.values
+        arrays = self._rows, self._following, self._crossed
         return self._used * sum(array[0].nbytes for array in arrays) + self._index.nbytes
 
     @property
     def rows_in_use(self) -> np.ndarray:
         """(n,) numbers of all rows that hold a block, increasing."""
-        return np.flatnonzero(self._rows.values[: self._used, COUNT])
+        return np.flatnonzero(self._rows[: self._used, COUNT])
 
     def blocks(self, rows: np.ndarray, resolution: float) -> Blocks:
         """Return a copy of the blocks in `rows` (n,)."""
-        return Blocks(self._rows.values[rows], resolution, self._crossed.values[rows])
+        return Blocks(self._rows[rows], resolution, self._crossed[rows])
 
     def begin_copy(self, resolution: float) -> "RunningCopy":
         """Return a copy of all blocks as they are now, which is still to be made."""
@@ -85,7 +84,7 @@ class BlockStore:
     @property
     def arrays(self) -> StoreArrays:
         """All arrays, good until the store grows."""
-        return StoreArrays(self._rows.values, self._following.values, self._crossed.values, self._index.heads.values)
+        return StoreArrays(self._rows, self._following, self._crossed, self._index.heads)
 
     def slots(self, cells: np.ndarray) -> np.ndarray:
         """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
@@ -100,7 +99,7 @@ class BlockStore:
             row, owners = row[present], owners[present]
             found_rows.append(row)
             found_owners.append(owners)
-            row = self._following.values[row]
+            row = self._following[row]
         if not found_rows:
             return np.empty(0, dtype=np.int64), owners
         return np.concatenate(found_rows).astype(np.int64), np.concatenate(found_owners)
@@ -129,22 +128,29 @@ class BlockStore:
         if not len(rows):
             return
         self._announce(rows)
-        self._rows.values[rows, COUNT] = 0.0
+        self._rows[rows, COUNT] = 0.0
         self._free = np.concatenate([self._free, rows])
 
     def _take(self, number: int) -> np.ndarray:
         """Return the numbers (number,) of rows that are free now, growing where none are."""
         reused, self._free = self._free[:number], self._free[number:]
         first, self._used = self._used, self._used + number - len(reused)
-        if self._used > len(self._rows.values):
-            for array in (self._rows, self._following, self._crossed):
-                array.reserve(self._used)
+        if self._used > len(self._rows):
+            arrays = self._rows, self._following, self._crossed
+            self._rows, self._following, self._crossed = (_longer(array, self._used) for array in arrays)
         return np.concatenate([reused, np.arange(first, self._used)])
 
     def add_crossings(self, rows: np.ndarray, beams: np.ndarray) -> None:
         """Count `beams` (n,) more crossings of the blocks at `rows` (n,), none twice."""
         self._announce(rows)
-        self._crossed.values[rows] = np.minimum(self._crossed.values[rows] + beams, MOST_CROSSINGS)
+        self._crossed[rows] = np.minimum(self._crossed[rows] + beams, MOST_CROSSINGS)
+
+
+def _longer(array: np.ndarray, length: int) -> np.ndarray:
+    """Return an array of at least `length` rows, and twice as many as `array` (n, ...), whose rows are the first."""
+    longer = np.empty((max(length, 2 * len(array)), *array.shape[1:]), dtype=array.dtype)
+    longer[: len(array)] = array
+    return longer
 
 
 @compiled()
@@ -179,13 +185,14 @@ def _unlink_released(held, slots):
 class RunningCopy:
     """The blocks as they were when it began.
 
-    The map tells which rows it is about to change; those that are not copied yet are put aside as they are.
+    The map tells which rows it is about to change; those that are not copied yet are put aside as they are. A map that
+    grows has other arrays from then on, and these stay as they are.
     """
 
-    def __init__(self, rows: LargeArray, crossed: LargeArray, used: int, resolution: float) -> None:
+    def __init__(self, rows: np.ndarray, crossed: np.ndarray, used: int, resolution: float) -> None:
         """`rows`, `crossed`: of the map, whose first `used` elements are copied. resolution: side of a cell, m."""
         self._rows, self._crossed, self._resolution = rows, crossed, resolution
-        self._copy = np.empty((used, *rows.values.shape[1:])), np.empty(used, dtype=crossed.values.dtype)
+        self._copy = np.empty((used, ROW_WIDTH)), np.empty(used, dtype=crossed.dtype)
         self._done = 0
         self._aside: List[Tuple[np.ndarray, np.ndarray, np.ndarray]] = []
 
@@ -198,13 +205,13 @@ class RunningCopy:
         """Learn that the map is about to change `rows` (n,)."""
         left = rows[(rows >= self._done) & (rows < len(self._copy[1]))]
         if len(left):
-            self._aside.append((left, self._rows.values[left], self._crossed.values[left]))
+            self._aside.append((left, self._rows[left], self._crossed[left]))
 
     def step(self) -> None:
         """Copy the next piece; the map must not change meanwhile."""
         piece = slice(self._done, min(self._done + _PIECE, len(self._copy[1])))
         for copy, array in zip(self._copy, (self._rows, self._crossed)):
-            copy[piece] = array.values[piece]
+            copy[piece] = array[piece]
         self._done = piece.stop
 
     @property
