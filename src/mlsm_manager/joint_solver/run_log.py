@@ -73,7 +73,8 @@ class PointTable:
 class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
-    sonar_in_base: (2,) m. posts: echoes of what is small. Points of scans may be forgotten; the nodes stay.
+    sonar_in_base: (2,) m. surfaces: points on surfaces. posts: echoes of what is small. Points of scans may be
+    forgotten; the nodes stay.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -81,7 +82,7 @@ class RunLog:
         self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryLog()
         self._node_times = GrowingArray()
-        self._surfaces, self.posts = PointTable(), PointTable()
+        self.surfaces, self.posts = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []
         self._forgotten = GrowingArray(kind=bool)
         self._points_and_echoes = GrowingArray(2)
@@ -89,7 +90,7 @@ class RunLog:
     @property
     def scan_count(self) -> int:
         """Number of scans so far."""
-        return self._surfaces.scan_count
+        return self.surfaces.scan_count
 
     @property
     def forgotten(self) -> np.ndarray:
@@ -104,7 +105,7 @@ class RunLog:
     @property
     def point_counts(self) -> np.ndarray:
         """(scan_count,) int, number of points on surfaces of each scan."""
-        return self._surfaces.counts
+        return self.surfaces.counts
 
     @property
     def has_plateaus(self) -> bool:
@@ -142,14 +143,14 @@ class RunLog:
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
         self._points_and_echoes.extend(np.array([[len(scan.points), sights.echo_count]]))
-        self._surfaces.append(points)
+        self.surfaces.append(points)
         self.posts.append(posts)
 
     def shorten(self, scans: int) -> None:
         """Keep the oldest `scans`, as if the others had not been."""
         if scans == self.scan_count:
             return
-        for table in (self._surfaces, self.posts, self._points_and_echoes, self._forgotten):
+        for table in (self.surfaces, self.posts, self._points_and_echoes, self._forgotten):
             table.shorten(scans)
         self.odometry.shorten(self._odometry_lengths[scans])
         del self._odometry_lengths[scans:]
@@ -159,7 +160,7 @@ class RunLog:
     def forget(self, scans: np.ndarray) -> None:
         """Forget the points of `scans` (n,) bool, those of each scan so far."""
         self.forgotten[: len(scans)] |= scans
-        self._surfaces.forget(self.forgotten)
+        self.surfaces.forget(self.forgotten)
         self.posts.forget(self.forgotten)
 
     def thin_odometry(self, scan: int) -> None:
@@ -177,22 +178,14 @@ class RunLog:
         later = RunLog(self.sonar_in_base)
         later.odometry = odometry or self.odometry
         later._node_times.extend(self.node_times[scan:])
-        later._surfaces, later.posts = self._surfaces.since(scan), self.posts.since(scan)
+        later.surfaces, later.posts = self.surfaces.since(scan), self.posts.since(scan)
         later._forgotten.extend(self.forgotten[scan:])
         later._points_and_echoes.extend(self._points_and_echoes.values[scan:])
         return later
 
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
-        return self._surfaces.rows(first, last)
-
-    def points(self, rows: np.ndarray) -> SurfacePoints:
-        """Return the points in `rows` (n,) int."""
-        return self._surfaces.points(rows)
-
-    def scans(self, rows: np.ndarray) -> np.ndarray:
-        """Return the scan (n,) int of each point in `rows`."""
-        return self._surfaces.scans(rows)
+        return self.surfaces.rows(first, last)
 
     def node_motion(self, nodes: np.ndarray) -> Motion:
         """Return what the odometry reported up to `nodes` (n,)."""

@@ -6,15 +6,18 @@ from typing import Dict, List, Mapping, Optional, Protocol, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
+from mlsm_manager.joint_solver.compiled_placement import Heard, path_rows, placed_rows
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, Layout, NormalEquations, State
+from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import PlacedPoints, placed, solved_path
+from mlsm_manager.joint_solver.placement import NO_POINTS, PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
-from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.run_log import PointTable, RunLog
 from node_support.geometry import inverse, transformed
 
+_HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
 MAP = 0
 """The submap of all scans whose place in the map is known."""
 
@@ -174,12 +177,28 @@ class Solution:
 
     def placed(self, rows: np.ndarray) -> PlacedPoints:
         """Return the surface points in `rows` (n,) int of the log in the map."""
-        return placed(self.log, self.odometry, self.state, self.log.points(rows), self.log.scans(rows))
+        return self._placed(self.log.surfaces, rows)
 
     def placed_posts(self, rows: np.ndarray) -> PlacedPoints:
         """Return the echoes of posts in `rows` (n,) int of the log's table of these."""
-        posts = self.log.posts
-        return placed(self.log, self.odometry, self.state, posts.points(rows), posts.scans(rows))
+        return self._placed(self.log.posts, rows)
+
+    def _placed(self, table: PointTable, rows: np.ndarray) -> PlacedPoints:
+        """Return points of a table in the map, from the path between the two nodes of the scan that heard each."""
+        if not len(rows):
+            return NO_POINTS
+        points, scans, log, state = table.points(rows), table.scans(rows), self.log, self.state
+        times = points.times + state.run[DELAY]
+        nodes = np.unique(np.concatenate([scans, scans + 1]))
+        known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)
+        heard = Heard(times, np.searchsorted(nodes, scans), points.ranges, points.bearings, points.normals)
+        legs = _legs(log.odometry, self.odometry, log.node_times[nodes], state.nodes[nodes])
+        knots, scale = _knots(self.odometry, known), float(state.run[RANGE_SCALE])
+        found = placed_rows(heard, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
+        return PlacedPoints(
+            scans=scans, places=found[:, 0:2], arms=found[:, 2:4], normals=found[:, 4:6], slants=points.slants,
+            qualities=points.qualities, shares=found[:, 10], by_run=found[:, 6:10].reshape(-1, 2, 2),
+        )  # fmt: skip
 
     def node_places(self, nodes: np.ndarray) -> np.ndarray:
         """Return where `nodes` (...) of the run are, (..., 2) m in map."""
@@ -200,3 +219,37 @@ class Solution:
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
         return solved_path(self.log.odometry, self.odometry, self.log.node_times, self.state.nodes, times)
+
+
+def solved_path(
+    log: OdometryLog, odometry: OdometryModel, node_times: np.ndarray, nodes: np.ndarray, times: np.ndarray
+) -> np.ndarray:
+    """Return T_map_base (m, 3) at any `times` (m,) [s]; before the first node and after the last as it goes on.
+
+    node_times: (n,) s, n > 1. nodes: (n, width).
+    """
+    if not len(times):
+        return np.empty((0, 3))
+    first, last = np.searchsorted(node_times, [times.min(), times.max()])
+    near = slice(max(min(first, len(node_times) - 1) - 1, 0), last + 1)
+    node_times, nodes = node_times[near], nodes[near]
+    known = log.between(min(times.min(), node_times[-1]), max(times.max(), node_times[0]))
+    return path_rows(times, _legs(log, odometry, node_times, nodes), _knots(odometry, known))
+
+
+def _legs(log: OdometryLog, odometry: OdometryModel, times: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Return the nodes (n, 8) as compiled loops take them; times: (n,) s. nodes: (n, width).
+
+    Between two of them the path is the model's reference path, turned and scaled by the mean of their gains, and
+    stretched to lead from one to the other. The last gain is that with which it goes on.
+    """
+    motion = log.motion(times)
+    places, reference, gain = motion.poses[:, :2] + nodes[:, :2], odometry.reference(motion), odometry.gain(nodes)
+    gain[:-1] = (gain[:-1] + gain[1:]) / 2.0
+    return np.column_stack([times, places, nodes[:, YAW], reference.real, reference.imag, gain.real, gain.imag])
+
+
+def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
+    """Return poses of the odometry (k, 4) as compiled loops take them: a reference path is even between them."""
+    reference = odometry.reference(known)
+    return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])

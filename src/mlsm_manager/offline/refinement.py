@@ -10,8 +10,7 @@ from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import solved_path
-from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.solution import Solution, solved_path
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.keyframe_map import KeyframeMap

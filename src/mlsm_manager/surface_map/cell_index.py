@@ -30,7 +30,8 @@ class CellIndex:
     """An open-addressing hash table from cell keys to block numbers.
 
     A hash and not tiles: walls cross a tile in a line and a far point needs one of its own, so that on real scans
-    tiles spend more memory on empty cells than the blocks themselves take. Doubling takes 0.1 s at a million cells.
+    tiles spend more memory on empty cells than the blocks themselves take. Doubling takes some hundredths of a second
+    at a million cells.
 
     heads: (s,) the number of the first block of the cell in each place, NO_BLOCK where there is none.
     """

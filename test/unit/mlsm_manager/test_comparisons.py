@@ -14,8 +14,9 @@ from mlsm_manager.joint_solver.compiled_comparisons import Limits, Pairs, Surfac
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
 from mlsm_manager.joint_solver.odometry_log import as_complex
-from mlsm_manager.joint_solver.placement import PlacedPoints, solved_path
+from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import solved_path
 from mlsm_manager.joint_solver.surface_points import ramp
 from mlsm_manager.joint_solver.weak_directions import discounted
 from node_support.geometry import rotated
@@ -127,7 +128,7 @@ def test_comparisons_do_not_tell_how_the_whole_map_is_turned(log, normal_deviati
 
 def placed_by_numpy(log, odometry, state, rows):
     """Return places, arms, normals and shares of points between two nodes each."""
-    points, scans = log.points(rows), log.scans(rows)
+    points, scans = log.surfaces.points(rows), log.surfaces.scans(rows)
     times = points.times + state.run[1]
     at_nodes, motion = log.node_motion(np.arange(log.scan_count + 1)), log.odometry.motion(times)
     share = (times - at_nodes.times[scans]) / np.diff(at_nodes.times)[scans]

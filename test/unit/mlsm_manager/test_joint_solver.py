@@ -12,8 +12,8 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import DIRECTION, DvlFactors
 from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.joint_solver.placement import solved_path
 from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import solved_path
 from node_support.errors import RefusedInput
 from node_support.geometry import composed
 
