@@ -67,25 +67,15 @@ class MappedBag:
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
-    odometry = OdometryFound(options.odometry, "--odometry or a parameter says so")
-    named = options.odometry not in (None, OdometryKind.AUTO)
-    if not named:
-        odometry = odometry_of(recording, options.declared is MotionSource.STANDING)
+    odometry = _odometry(recording, options)
     recording = recording.corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
     recording, scans, of_echoes = _heard(recording, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     extracting = with_cells(extracting, scans, options.fixed)
-    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)
-    replayed = _replayed(recording, scans, parameters)
-    if not named and odometry.kind is OdometryKind.HEADING and may_strafe(replayed.solver):
-        other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
-        changed = with_odometry(extracting, other.kind, options.fixed)
-        again = _replayed(recording, scans, changed)
-        if again.solver is not None and strafes(replayed.solver, again.solver):
-            odometry, parameters, replayed = other, changed, again
+    odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
     refined, refitted = None, []
     if options.refine:
@@ -107,6 +97,35 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
     return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
+
+
+def _is_named(options: Namespace) -> bool:
+    return options.odometry not in (None, OdometryKind.AUTO)
+
+
+def _odometry(recording: Recording, options: Namespace) -> OdometryFound:
+    if _is_named(options):
+        return OdometryFound(options.odometry, "--odometry or a parameter says so")
+    return odometry_of(recording, options.declared is MotionSource.STANDING)
+
+
+def _followed(
+    recording: Recording, scans: List[Scan], extracting: ReplayParameters, odometry: OdometryFound, options: Namespace
+) -> Tuple[OdometryFound, ReplayParameters, Replayed]:
+    """Return how the vehicle knows its motion, the parameters that suit that, and the replay with them.
+
+    Where scans do not go on by a compass alone, a vehicle that strafes is tried too, unless the odometry is named.
+    """
+    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
+    replayed = _replayed(recording, scans, parameters)
+    if _is_named(options) or odometry.kind is not OdometryKind.HEADING or not may_strafe(replayed.solver):
+        return odometry, parameters, replayed
+    other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
+    changed = with_odometry(extracting, other.kind, options.fixed)
+    again = _replayed(recording, scans, changed)
+    if again.solver is not None and strafes(replayed.solver, again.solver):
+        return other, changed, again
+    return odometry, parameters, replayed
 
 
 def _heard(
