@@ -1,7 +1,7 @@
-"""What the live solver knows when a scan has ended: of one scan, of whole turns of the head, and as arrays to store."""
+"""What the live solver knows when a scan has ended: of one scan, and of whole turns of the head."""
 
-from dataclasses import dataclass, field, fields, is_dataclass
-from typing import Any, Dict, List, Mapping, NamedTuple, Sequence
+from dataclasses import dataclass, field
+from typing import NamedTuple, Sequence
 
 import numpy as np
 
@@ -158,37 +158,3 @@ class Turns(NamedTuple):
         heard = np.flatnonzero(point_counts.reshape(-1, parts).any(axis=1))[-most:]
         scans = (heard[:, np.newaxis] * parts + np.arange(parts)).ravel()
         return cls.of([estimates[scan] for scan in scans], apart[scans], parts)
-
-
-def stacked(items: Sequence[Any], prefix: str = "") -> Dict[str, np.ndarray]:
-    """Return for each field its values in all `items` (n), (n, ...); the fields of a nested dataclass one by one."""
-    if not items:
-        return {}
-    arrays = {}
-    for own in fields(items[0]):
-        values = [getattr(item, own.name) for item in items]
-        if is_dataclass(values[0]):
-            arrays.update(stacked(values, f"{prefix}{own.name}."))
-        else:
-            arrays[prefix + own.name] = np.array(values)
-    return arrays
-
-
-def unstacked(kind: type, arrays: Mapping[str, np.ndarray], prefix: str = "") -> List[Any]:
-    """Return the dataclasses of type `kind` that `stacked` took; none where `arrays` has no such field.
-
-    Raises KeyError for a field that is missing, and ValueError for fields that are not equally long.
-    """
-    if not any(name.startswith(prefix) for name in arrays):
-        return []
-    columns = [_column(own.type, arrays, prefix + own.name) for own in fields(kind)]
-    if len({len(column) for column in columns}) != 1:
-        raise ValueError(f"{prefix}: {[len(column) for column in columns]} elements")
-    return [kind(*values) for values in zip(*columns)]
-
-
-def _column(kind: type, arrays: Mapping[str, np.ndarray], name: str) -> Sequence[Any]:
-    if is_dataclass(kind):
-        return unstacked(kind, arrays, f"{name}.")
-    array = arrays[name]
-    return array.tolist() if array.ndim == 1 and kind is not np.ndarray else list(array)

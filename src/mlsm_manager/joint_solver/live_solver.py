@@ -5,7 +5,7 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations, misfit_covariance, stacked, unstacked
+from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations, misfit_covariance
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_loops import Bend, ClosedLoop, confirmed, with_newest
 from mlsm_manager.joint_solver.live_window import LiveWindow, superfluous
@@ -19,6 +19,7 @@ from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Fix, Fixes, Solution, Submaps
+from mlsm_manager.joint_solver.stored_arrays import stacked, unstacked
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 

@@ -174,7 +174,7 @@ def test_a_jump_in_time_after_the_start_makes_the_place_unknown(stored):
     [
         ("run.T_map_odom", np.zeros(2)),
         ("run.solver.nodes", np.zeros((3, 5))),
-        ("run.scan_lengths", np.array([4])),
+        ("run.scan.reference_time", np.zeros(2)),
         ("run.solver.estimate.time", np.zeros(2)),
         ("run.solver.estimate.node", None),
     ],
