@@ -5,7 +5,7 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.hovering.echoes import Echoes
+from mlsm_manager.hovering.echoes import echoes_of_run
 from mlsm_manager.hovering.particle_filter import ParticleFilter, on_path
 from mlsm_manager.hovering.path_agreement import log_likelihood
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
@@ -40,7 +40,7 @@ def solved_best(live: LiveSolver) -> BatchResult:
 def strafes(ahead: LiveSolver, strafing: LiveSolver) -> bool:
     """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans."""
     times = strafing.log.node_times
-    echoes = Echoes.of_run(strafing.log, strafing.parameters)
+    echoes = echoes_of_run(strafing.log, strafing.parameters)
     one, other = (log_likelihood(echoes, run.solution.path(times)[:, :2]) for run in (ahead, strafing))
     return other > _STRAFES * one
 
@@ -55,7 +55,7 @@ def _shift_search(live: LiveSolver) -> ShiftSearch:
     def refit(path: np.ndarray) -> np.ndarray:
         return _path(live, fit_path(live, _on_path(live, path)))
 
-    echoes = Echoes.of_run(live.log, live.parameters)
+    echoes = echoes_of_run(live.log, live.parameters)
     return ShiftSearch(echoes, live.log.node_times.copy(), live.parameters.parts_per_turn, refit)
 
 

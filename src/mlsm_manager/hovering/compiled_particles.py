@@ -4,7 +4,7 @@ They are compiled, or read from the cache on disk, when this module is imported:
 ImportError without numba.
 """
 
-from typing import NamedTuple
+from typing import NamedTuple, Sequence
 
 import numpy as np
 from numba import boolean, float64, int64, types
@@ -18,8 +18,12 @@ ARM_X, ARM_Y, SHARE, WEIGHT, ACROSS_X, ACROSS_Y, ALONG_X, ALONG_Y = range(8)
 divided by the deviation in each, 1/m."""
 
 
-class Points(NamedTuple):
-    """n echoes, with the fields of Echoes."""
+class Echoes(NamedTuple):
+    """n points. nodes: (n,) those before them. arms: (n, 2) m, from the straight line between nodes to them, in map.
+
+    shares: (n,) when they were heard, 0 at the node before, 1 at the next. normals: (n, 2) in map. weights: (n,) log
+    likelihood that each adds where it lies on an earlier one. post: (n,) bool, whether it stands alone as a post does.
+    """
 
     nodes: np.ndarray
     arms: np.ndarray
@@ -27,6 +31,25 @@ class Points(NamedTuple):
     normals: np.ndarray
     weights: np.ndarray
     post: np.ndarray
+
+    @property
+    def size(self) -> int:
+        """Number of points."""
+        return len(self.nodes)
+
+    @classmethod
+    def joined(cls, parts: "Sequence[Echoes]") -> "Echoes":
+        """Return the points of all `parts`, at least one."""
+        return cls(*(np.concatenate(each) for each in zip(*parts)))
+
+    def selected(self, rows: np.ndarray) -> "Echoes":
+        """Return the points in `rows` (m,)."""
+        return Echoes(*(each[rows] for each in self))
+
+    def places(self, paths: np.ndarray, first: int) -> np.ndarray:
+        """Return where the points lie (..., n, 2) for paths (..., k, 2), whose first node is `first`."""
+        before, share = self.nodes - first, self.shares[:, np.newaxis]
+        return self.arms + (1.0 - share) * paths[..., before, :] + share * paths[..., before + 1, :]
 
 
 class Pull(NamedTuple):
@@ -44,7 +67,7 @@ class Pull(NamedTuple):
 
 
 _ROWS, _VALUES, _TABLE = int64[::1], float64[::1], float64[:, ::1]
-_POINTS = types.NamedTuple((_ROWS, _TABLE, _VALUES, _TABLE, _VALUES, boolean[::1]), Points)
+_POINTS = types.NamedTuple((_ROWS, _TABLE, _VALUES, _TABLE, _VALUES, boolean[::1]), Echoes)
 _PULL = types.NamedUniTuple(float64, 6, Pull)
 
 

@@ -1,10 +1,8 @@
 """What each part of a turn heard, to be compared along paths: the heading is known, the places are not."""
 
-from dataclasses import dataclass, fields
-from typing import Sequence
-
 import numpy as np
 
+from mlsm_manager.hovering.compiled_particles import Echoes
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -24,56 +22,23 @@ earlier one where the path is true and 1 % where it is not; in a harbour 60 % an
 _POST_POWER = 0.5  # of their qualities: weak ones are heard again nearly as often as strong ones
 
 
-@dataclass(frozen=True)
-class Echoes:
-    """n points. nodes: (n,) those before them. arms: (n, 2) m, from the straight line between nodes to them, in map.
+def echoes_of(log: RunLog, parameters: SolverParameters, scan: int) -> Echoes:
+    """Return those of a scan of the log."""
+    motion = log.node_motion(np.array([scan, scan + 1]))
+    nodes = np.zeros((log.scan_count + 1, parameters.odometry.width))
+    nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
+    solution = Solution(log, parameters, State(nodes, parameters.run_mean(log)))
+    surfaces = solution.placed(log.rows(scan, scan + 1))
+    posts = solution.placed_posts(log.posts.rows(scan, scan + 1))
+    weights = parameters.post_confidence * _POST_WEIGHT * posts.qualities**_POST_POWER
+    return Echoes.joined([_made(surfaces, _SURFACE_WEIGHT * surfaces.qualities), _made(posts, weights, True)])
 
-    shares: (n,) when they were heard, 0 at the node before, 1 at the next. normals: (n, 2) in map. weights: (n,) log
-    likelihood that each adds where it lies on an earlier one. post: (n,) bool, whether it stands alone as a post does.
-    """
 
-    nodes: np.ndarray
-    arms: np.ndarray
-    shares: np.ndarray
-    normals: np.ndarray
-    weights: np.ndarray
-    post: np.ndarray
+def echoes_of_run(log: RunLog, parameters: SolverParameters) -> Echoes:
+    """Return those of all scans of the log, at least one."""
+    return Echoes.joined([echoes_of(log, parameters, scan) for scan in range(log.scan_count)])
 
-    def __len__(self) -> int:
-        return len(self.nodes)
 
-    @classmethod
-    def of(cls, log: RunLog, parameters: SolverParameters, scan: int) -> "Echoes":
-        """Return those of a scan of the log."""
-        motion = log.node_motion(np.array([scan, scan + 1]))
-        nodes = np.zeros((log.scan_count + 1, parameters.odometry.width))
-        nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
-        solution = Solution(log, parameters, State(nodes, parameters.run_mean(log)))
-        surfaces = solution.placed(log.rows(scan, scan + 1))
-        posts = solution.placed_posts(log.posts.rows(scan, scan + 1))
-        weights = parameters.post_confidence * _POST_WEIGHT * posts.qualities**_POST_POWER
-        return cls.joined([cls._made(surfaces, _SURFACE_WEIGHT * surfaces.qualities), cls._made(posts, weights, True)])
-
-    @classmethod
-    def of_run(cls, log: RunLog, parameters: SolverParameters) -> "Echoes":
-        """Return those of all scans of the log, at least one."""
-        return cls.joined([cls.of(log, parameters, scan) for scan in range(log.scan_count)])
-
-    @classmethod
-    def _made(cls, points: PlacedPoints, weights: np.ndarray, is_post: bool = False) -> "Echoes":
-        post = np.full(len(points), is_post)
-        return cls(points.scans, points.places, points.shares, points.normals, weights, post)
-
-    @classmethod
-    def joined(cls, parts: Sequence["Echoes"]) -> "Echoes":
-        """Return the points of all `parts`, at least one."""
-        return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
-
-    def selected(self, rows: np.ndarray) -> "Echoes":
-        """Return the points in `rows` (m,)."""
-        return Echoes(*(getattr(self, field.name)[rows] for field in fields(self)))
-
-    def places(self, paths: np.ndarray, first: int) -> np.ndarray:
-        """Return where the points lie (..., n, 2) for paths (..., k, 2), whose first node is `first`."""
-        before, share = self.nodes - first, self.shares[:, np.newaxis]
-        return self.arms + (1.0 - share) * paths[..., before, :] + share * paths[..., before + 1, :]
+def _made(points: PlacedPoints, weights: np.ndarray, is_post: bool = False) -> Echoes:
+    post = np.full(len(points), is_post)
+    return Echoes(points.scans, points.places, points.shares, points.normals, weights, post)

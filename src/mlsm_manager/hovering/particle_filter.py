@@ -11,8 +11,8 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.hovering.compiled_particles import Points, Pull, log_likelihoods, moves_onto_echoes
-from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST, Echoes
+from mlsm_manager.hovering.compiled_particles import Echoes, Pull, log_likelihoods, moves_onto_echoes
+from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST, echoes_of
 from mlsm_manager.hovering.particles import Particles, drawn, led, squares_of
 from mlsm_manager.joint_solver.normal_equations import YAW
 from mlsm_manager.joint_solver.odometry_log import Motion
@@ -73,7 +73,7 @@ class ParticleFilter:
         if shapes != ((count, nodes, 2), (count, 2)) or nodes > log.scan_count + 1:
             raise ValueError(f"particles {shapes[0]}, {shapes[1]} for {log.scan_count} scans")
         scans = range(log.scan_count + 1 - nodes, log.scan_count)
-        echoes = tuple(Echoes.of(log, parameters, scan) for scan in scans)
+        echoes = tuple(echoes_of(log, parameters, scan) for scan in scans)
         return replace(self, scans=log.scan_count, echoes=echoes, particles=particles if count else None)
 
     def placed(self, log: RunLog, nodes: np.ndarray, parameters: SolverParameters, starts_known: bool) -> np.ndarray:
@@ -101,7 +101,7 @@ class ParticleFilter:
         motion = log.node_motion(np.array([scan, scan + 1]))
         duration, turn = float(motion.durations[0]), float(np.diff(motion.poses[:, 2])[0])
         before = self.particles or Particles.begun(_COUNT, motion.poses[0, :2], _START_SPEED, rng)
-        sources = Echoes.of(log, parameters, scan)
+        sources = echoes_of(log, parameters, scan)
         longest = self.remembered_turns * parameters.parts_per_turn + 1
         targets = self._targets(scan - (before.paths.shape[1] - 1))
         draw = drawn(before, duration, turn, rng)
@@ -117,7 +117,7 @@ class ParticleFilter:
         if not self.echoes:
             return None
         joined = Echoes.joined(self.echoes)
-        return replace(joined, nodes=joined.nodes - first)
+        return joined._replace(nodes=joined.nodes - first)
 
 
 def on_path(nodes: np.ndarray, path: np.ndarray, motion: Motion) -> np.ndarray:
@@ -147,7 +147,7 @@ def weighed(
 
     targets: heard before; their nodes count from the particles' first one.
     """
-    if not len(sources):
+    if not sources.size:
         return particles
     paths, speeds = particles.paths.copy(), particles.speeds.copy()
     likelihoods = np.empty(len(particles.log_weights))
@@ -188,7 +188,7 @@ def nearby_of(particles: Particles, sources: Echoes, targets: Echoes) -> Nearby:
 def likelihoods_of(particles: Particles, sources: Echoes, nearby: Nearby) -> np.ndarray:
     """Return the log likelihoods (n,) of the sources on n particles, each by what it may lie on."""
     order = np.argsort(nearby.rows, kind="stable")
-    starts = np.searchsorted(nearby.rows[order], np.arange(len(nearby.targets) + 1))
+    starts = np.searchsorted(nearby.rows[order], np.arange(nearby.targets.size + 1))
     return log_likelihoods(
         np.ascontiguousarray(particles.paths), starts, nearby.sources[order], _columns(sources),
         nearby.targets.nodes, _columns(nearby.targets), FARTHEST,
@@ -225,7 +225,6 @@ def pulls_of(particles: Particles, sources: Echoes, nearby: Nearby) -> np.ndarra
 
     Surfaces pull across themselves only.
     """
-    starts = np.searchsorted(nearby.sources, np.arange(len(sources) + 1))
-    points, others = (Points(**vars(echoes)) for echoes in (sources, nearby.targets))
+    starts = np.searchsorted(nearby.sources, np.arange(sources.size + 1))
     pull = Pull(*np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST, FADING, _FREEDOM**-2.0)
-    return moves_onto_echoes(np.ascontiguousarray(particles.paths), starts, nearby.rows, points, others, pull)
+    return moves_onto_echoes(np.ascontiguousarray(particles.paths), starts, nearby.rows, sources, nearby.targets, pull)

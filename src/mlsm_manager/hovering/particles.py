@@ -8,7 +8,7 @@ from typing import NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.hovering.echoes import Echoes
+from mlsm_manager.hovering.compiled_particles import Echoes
 
 Draw = Tuple[np.ndarray, np.ndarray]
 """Places (n, 2) [m] at the next node and speeds (n, 2) [m/s] there."""
@@ -129,10 +129,10 @@ def led(
     targets: their nodes count from the particles' first one. duration: s.
     """
     own, earlier = sources.selected(sources.post), targets.selected(targets.post)
-    if not len(own) or not len(earlier):
+    if not own.size or not earlier.size:
         return draw
     some = np.flatnonzero(rng.rand(len(particles.log_weights)) < _GUIDED)
-    chosen = rng.randint(len(own), size=len(some))
+    chosen = rng.randint(own.size, size=len(some))
     at_rest = particles.paths[some, -1] + own.arms[chosen]
     shares = np.maximum(own.shares[chosen], _LEAST_SHARE)
     speeds = (earlier.places(particles.paths[some], 0) - at_rest[:, np.newaxis]) / (duration * shares)[:, None, None]

@@ -5,7 +5,8 @@ from typing import NamedTuple, Union
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST, Echoes
+from mlsm_manager.hovering.compiled_particles import Echoes
+from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST
 
 _FARTHEST_ALONG = ALONG * FARTHEST**0.5  # m: echoes farther apart tell nothing of each other
 _SAME = 3.0  # m: an echo so near a place was heard of what stands there, or of what stands beside it
@@ -32,9 +33,9 @@ def log_likelihood(echoes: Echoes, path: np.ndarray) -> float:
 
     Each echo counts as far as it lies on one of an earlier scan, as it does for each particle of a ParticleFilter.
     """
-    if not len(echoes):
+    if not echoes.size:
         return 0.0
-    places, best = echoes.places(path, 0), np.zeros(len(echoes))
+    places, best = echoes.places(path, 0), np.zeros(echoes.size)
     near = cKDTree(places).query_pairs(_FARTHEST_ALONG, output_type="ndarray")
     later = np.where(echoes.nodes[near[:, 0]] > echoes.nodes[near[:, 1]], 0, 1)
     rows = np.arange(len(near))
@@ -67,10 +68,10 @@ def _by_scan(echoes: Echoes, pairs: _Pairs, shift: float, scans: int) -> np.ndar
     """Return how near (n, scans) each echo, shifted [m] along the axis, is to the nearest one of each earlier scan."""
     first, last = np.searchsorted(pairs.offsets[:, 0], [-shift - _FARTHEST_ALONG, -shift + _FARTHEST_ALONG])
     some = pairs.chosen(slice(first, last))
-    nearness, result = _nearness(echoes, some, shift), np.zeros(len(echoes) * scans)
+    nearness, result = _nearness(echoes, some, shift), np.zeros(echoes.size * scans)
     near = np.flatnonzero(nearness)
     np.maximum.at(result, some.sources[near] * scans + echoes.nodes[some.targets[near]], nearness[near])
-    return result.reshape(len(echoes), scans)
+    return result.reshape(echoes.size, scans)
 
 
 def _nearness(echoes: Echoes, pairs: _Pairs, shift: float) -> np.ndarray:

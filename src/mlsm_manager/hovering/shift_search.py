@@ -9,7 +9,7 @@ from typing import Callable, Iterator, List, Sequence
 
 import numpy as np
 
-from mlsm_manager.hovering.echoes import Echoes
+from mlsm_manager.hovering.compiled_particles import Echoes
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 
 _REACH, _STEP = 40.0, 1.0  # m: shifts that are weighed; a post tells to about a metre

@@ -9,7 +9,8 @@ from hypothesis import strategies as st
 from made_harbour import CANAL, along_canal, tour
 from made_models import followed
 
-from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FARTHEST, Echoes
+from mlsm_manager.hovering.compiled_particles import Echoes
+from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FARTHEST
 from mlsm_manager.hovering.particle_filter import (
     FADING,
     groups_of,
@@ -139,10 +140,10 @@ def test_particles_that_end_in_one_square_are_one_group():
 
 def test_a_surface_tells_nothing_to_one_that_faces_the_other_way():
     particles = resting(1, 3)
-    wall = replace(one_post(0, [5.0, 0.0]), post=np.array([False]))
-    behind = replace(wall, nodes=np.array([1]), normals=-wall.normals)
+    wall = one_post(0, [5.0, 0.0])._replace(post=np.array([False]))
+    behind = wall._replace(nodes=np.array([1]), normals=-wall.normals)
     assert likelihoods(particles, behind, wall) == 0.0
-    assert likelihoods(particles, replace(wall, nodes=np.array([1])), wall) == pytest.approx(3.0)
+    assert likelihoods(particles, wall._replace(nodes=np.array([1])), wall) == pytest.approx(3.0)
 
 
 def test_a_part_of_a_turn_that_heard_nothing_changes_no_weight():
@@ -263,7 +264,7 @@ def test_a_path_is_worth_what_its_scans_are_worth_one_after_the_other(seed):
 @settings(max_examples=10)
 def test_a_gain_is_what_the_shifted_path_is_worth_more(scan, length):
     # What is heard just at a node moves as that node does.
-    at_nodes = replace(HEARD, shares=np.zeros(len(HEARD)))
+    at_nodes = HEARD._replace(shares=np.zeros(HEARD.size))
     gains = shift_gains(at_nodes, TRUE, ALONG_WALL, np.array([-20.0, length, 20.0]))
     expected = log_likelihood(at_nodes, stray(scan, length)) - log_likelihood(at_nodes, TRUE)
     assert gains[scan, 1] == pytest.approx(expected)
@@ -289,7 +290,7 @@ def test_a_post_that_was_passed_unheard_is_missed():
 
 
 def test_a_post_behind_a_wall_is_not_missed():
-    behind = replace(heard(TRUE[:2]).selected(np.array([-1])), arms=np.array([[0.0, 20.0]]))
+    behind = heard(TRUE[:2]).selected(np.array([-1]))._replace(arms=np.array([[0.0, 20.0]]))
     near = HEARD.selected(np.flatnonzero(~HEARD.post & (HEARD.nodes > 0)))
     assert MissedPosts(Echoes.joined([near, behind]), 1).cost(TRUE) == 0.0
 
