@@ -1,5 +1,7 @@
 // All that the page knows of one run: the newest of each thing, and how it was at earlier times.
 
+const LEAST_SPAN = 24;  // levels, three doublings: where all cells are alike, all are strong
+
 export class Model {
   constructor() {
     this.run = "";
@@ -74,7 +76,8 @@ export class Model {
       const counts = new Uint32Array(256);
       let total = 0;
       for (const { level } of this.tiles.values()) for (const one of level) { counts[one] += 1; total += 1; }
-      this.range = [quantile(counts, 0.05 * total), quantile(counts, 0.9 * total)];
+      const high = quantile(counts, 0.9 * total);
+      this.range = [Math.min(quantile(counts, 0.05 * total), high - LEAST_SPAN), high];
       this.rangeOf = this.tilesVersion;
     }
     return this.range;

@@ -44,7 +44,7 @@ class MapTiles:
         corners = np.floor(points / cell)
         inside = (np.abs(corners) < _FARTHEST_TILE * SIDE).all(axis=1)
         corners, points, counts = corners[inside].astype(np.int64), points[inside], counts[inside]
-        keys, owner = np.unique(_key(corners), return_inverse=True)
+        keys, owner = np.unique(_keys(corners), return_inverse=True)
         total = np.bincount(owner, counts, len(keys))
         means = np.column_stack([np.bincount(owner, counts * axis, len(keys)) / total for axis in points.T])
         self._remember(keys, time)
@@ -60,13 +60,13 @@ class MapTiles:
         self._keys, self._born = keys, born
 
     def _tell(self, keys: np.ndarray, means: np.ndarray, total: np.ndarray, cell: float) -> None:
-        cells = np.column_stack([keys // (2 * _SHIFT), keys % (2 * _SHIFT)]) - _SHIFT
-        tiles, owner = np.unique(cells // SIDE, axis=0, return_inverse=True)
-        order = np.argsort(owner.ravel(), kind="stable")
-        ends = np.cumsum(np.bincount(owner.ravel(), minlength=len(tiles)))
+        cells = _cells(keys)
+        tiles, owner = np.unique(_keys(cells // SIDE), return_inverse=True)
+        order = np.argsort(owner, kind="stable")
+        ends = np.cumsum(np.bincount(owner, minlength=len(tiles)))
         columns = _columns(cells, means, total, cell, self._born)
         told: Dict[Tuple[int, int], bytes] = {}
-        for (x, y), part in zip(tiles.tolist(), np.split(order, ends[:-1]) if len(tiles) else ()):
+        for (x, y), part in zip(_cells(tiles).tolist(), np.split(order, ends[:-1])):
             told[x, y] = tile_bytes(x, y, TileColumns(*columns[:, part]))
         for x, y in self._shown - set(told):
             self._put((x, y), tile_bytes(x, y, None))
@@ -75,8 +75,14 @@ class MapTiles:
         self._shown = set(told)
 
 
-def _key(cells: np.ndarray) -> np.ndarray:
+def _keys(cells: np.ndarray) -> np.ndarray:
+    """Return one number (n,) for each pair (n, 2) of numbers."""
     return (cells[:, 0] + _SHIFT) * (2 * _SHIFT) + cells[:, 1] + _SHIFT
+
+
+def _cells(keys: np.ndarray) -> np.ndarray:
+    """Return the pairs (n, 2) that `_keys` made numbers of."""
+    return np.column_stack([keys // (2 * _SHIFT), keys % (2 * _SHIFT)]) - _SHIFT
 
 
 def _columns(cells: np.ndarray, means: np.ndarray, total: np.ndarray, cell: float, born: np.ndarray) -> np.ndarray:

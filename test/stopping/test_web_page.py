@@ -1,0 +1,179 @@
+"""The page in a real browser, with a real master and mlsm_core: it draws, follows, marks, and comes back by itself."""
+
+import json
+import shutil
+import subprocess
+import sys
+import time
+from urllib.request import urlopen
+
+import pytest
+from stopwatch import ROOT, START_TIMEOUT, free_port
+from test_master_restart import Master
+
+from mlsm_manager.surface_map.map_file import read_map
+
+webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+from selenium.webdriver.chrome.options import Options  # noqa: E402
+from selenium.webdriver.chrome.service import Service  # noqa: E402
+
+OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--window-size=1000,700")
+BACK = 10.0  # s from the end of a cut until all is there again
+# The darkest blue (0 to 255) that is drawn within a metre of a point of the map.
+DARKEST = """
+const {map} = page, [x, y] = map.toScreen(arguments[0]), half = Math.ceil(map.scale);
+const {data} = map.context.getImageData((x - half) * map.ratio, (y - half) * map.ratio, 2 * half, 2 * half);
+return data.filter((_, i) => i % 4 === 2).reduce((least, one) => Math.min(least, one), 255);
+"""
+WALL, WATER = [0.0, 12.0], [8.0, 5.0]
+
+
+class Site:
+    """A master, the nodes, and a browser that looks; what ends is started again as roslaunch would do it."""
+
+    def __init__(self, browser, folder):
+        self.browser, self.port, self.folder = browser, free_port(), folder
+        self.master = Master(folder)
+        self.environment = {**self.master.environment, "ROS_HOME": str(folder)}
+        self.nodes = {}
+        self.start_nodes()
+
+    def start_nodes(self):
+        self.start("mlsm_core", "nodes/mlsm_core", "_sonar_delay_deviation:=0.0", "_autosave_period:=0.0")
+        self.start("feeder", "test/stopping/web_page_feeder.py")
+        self.start_page()
+
+    def start_page(self):
+        self.start("web_page", "nodes/web_page", f"_port:={self.port}")
+
+    def start(self, name, program, *arguments):
+        command = [sys.executable, str(ROOT / program), f"__name:={name}", *arguments]
+        self.nodes[name] = subprocess.Popen(command, env=self.environment, stdout=subprocess.DEVNULL)
+
+    def kill(self, *names):
+        for name in names:
+            self.nodes[name].kill()
+            self.nodes.pop(name).wait()
+
+    def run(self, script, *arguments):
+        return self.browser.execute_script(script, *arguments)
+
+    def wait(self, condition, seconds=START_TIMEOUT):
+        """Wait until an expression of the page is true."""
+        end = time.monotonic() + seconds
+        while not self.run(f"return Boolean({condition})"):
+            assert time.monotonic() < end, f"{condition}: not within {seconds:g} s"
+            time.sleep(0.05)
+
+    def errors(self):
+        """Return what the console says, but for links that are refused while there is no server."""
+        said = [entry["message"] for entry in self.browser.get_log("browser")]
+        return [line for line in said if "WebSocket connection to" not in line]
+
+    def hosts(self):
+        events = [json.loads(entry["message"])["message"] for entry in self.browser.get_log("performance")]
+        urls = [one["params"]["request"]["url"] for one in events if one["method"] == "Network.requestWillBeSent"]
+        return {url.split("/")[2] for url in urls if not url.startswith("data:")}
+
+
+@pytest.fixture(scope="module")
+def browser():
+    program, driver = (shutil.which(name) for name in ("chromium", "chromedriver"))
+    if program is None or driver is None:
+        pytest.skip("chromium and chromedriver are not installed")
+    options = Options()
+    for option in OPTIONS:
+        options.add_argument(option)
+    options.binary_location = program
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
+    opened = webdriver.Chrome(service=Service(driver), options=options)
+    yield opened
+    opened.quit()
+
+
+@pytest.fixture(scope="module")
+def site(browser, tmp_path_factory):
+    """Return what runs, with the page open as soon as it is served."""
+    made = Site(browser, tmp_path_factory.mktemp("site"))
+    end = time.monotonic() + START_TIMEOUT
+    while True:
+        try:
+            urlopen(f"http://127.0.0.1:{made.port}/", timeout=5).close()
+            break
+        except OSError:
+            assert time.monotonic() < end, "the page is not served"
+            time.sleep(0.1)
+    browser.get(f"http://127.0.0.1:{made.port}/?theme=light")
+    yield made
+    made.kill(*list(made.nodes))
+    made.master.stop()
+
+
+def test_1_the_map_the_sonar_and_the_position_are_drawn(site):
+    site.wait("page.model.tiles.size && page.model.fixes.length && page.sonar.beams.size > 20")
+    site.wait("page.model.now.waiting === ''")
+    site.run("document.getElementById('overlay').click(); document.getElementById('whole').click()")
+    site.wait("!page.map.isDirty")
+    assert site.run(DARKEST, WALL) < 150 < 220 < site.run(DARKEST, WATER)
+    assert site.run("return document.querySelector('#position span').textContent").startswith("position ")
+    assert site.run("return document.getElementById('depth').textContent") == "2.0 m"
+    assert site.run("return document.getElementById('heading').textContent") == "090°"
+
+
+def test_2_the_map_follows_the_vehicle(site):
+    site.run("document.getElementById('follow').click()")
+    start = site.run("return page.map.centre[0]")
+    site.wait(f"page.map.centre[0] > {start} + 0.5")
+    assert site.run("return Math.hypot(page.map.centre[0] - page.model.place[0], page.map.centre[1])") < 0.5
+
+
+def test_3_the_past_is_shown_until_live_is_pressed(site):
+    site.run("const one = document.getElementById('time'); one.value = 0; one.oninput()")
+    assert site.run("return [page.map.time, page.map.shownPlace()[0] < page.model.place[0]]") == [0, True]
+    site.run("document.getElementById('live').click()")
+    assert site.run("return page.map.time") is None
+
+
+def test_4_a_mark_lands_in_the_maps_file_and_in_geojson(site):
+    site.run("""
+    document.getElementById('marking').click();
+    page.map.onTouch([3, -4]);
+    document.getElementById('name').value = '<b>block</b> ⚓';
+    document.getElementById('naming').requestSubmit();
+    """)
+    site.wait("page.model.marks.length")
+    site.wait("document.querySelector('#marks li button').textContent === '<b>block</b> ⚓'")
+    with urlopen(f"http://127.0.0.1:{site.port}/marks.geojson", timeout=20) as answer:
+        (feature,) = json.load(answer)["features"]
+    assert feature["geometry"]["coordinates"] == [3.0, -4.0]
+    command = ["rosservice", "call", "/mlsm_core/save_map", "{name: marked, overwrite: true}"]
+    subprocess.run(command, env=site.environment, check=True, stdout=subprocess.DEVNULL)
+    (mark,) = read_map(site.folder / "maps/marked.mlsm").marks
+    assert (mark.name, mark.x, mark.y) == ("<b>block</b> ⚓", 3.0, -4.0)
+
+
+def test_5_no_errors_and_no_request_to_another_host(site):
+    assert site.errors() == []
+    assert site.hosts() == {f"127.0.0.1:{site.port}"}
+
+
+def test_6_a_cut_link_is_told_and_all_is_there_again_after_it(site):
+    site.kill("web_page")
+    site.wait("document.getElementById('notice').textContent.startsWith('no connection since ')")
+    assert site.run("return page.model.tiles.size") > 0
+    site.start_page()
+    site.wait("!page.connection.isCut")
+    site.wait("page.model.revision && page.model.tiles.size && page.model.marks.length", BACK)
+    site.wait("page.model.now.waiting === ''", BACK)
+
+
+def test_7_it_survives_a_restarted_master(site):
+    before = site.run("return page.model.run")
+    site.master.stop()
+    site.master.start()
+    # The node says that the new master does not know it, and ends; roslaunch starts it again.
+    assert site.nodes.pop("web_page").wait(START_TIMEOUT) == 1
+    site.kill("mlsm_core", "feeder")
+    site.start_nodes()
+    site.wait(f"page.model.run !== '{before}' && page.model.tiles.size && page.model.now.waiting === ''")
+    assert site.errors() == []
