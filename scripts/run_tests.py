@@ -90,6 +90,7 @@ def steps() -> List[Step]:
         _pytest("documentation", "test/documentation", load=Load.SPARE),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."], load=Load.SPARE),
         _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),
+        _pytest("web page", "test/stopping/test_web_page.py", load=Load.SHARED),
         _pytest("installation", "test/installation", load=Load.SHARED),
         *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"), key=_by_length)),
     ]
