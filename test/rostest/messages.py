@@ -18,7 +18,7 @@ WALL = bytes([3] * 20 + [120] * 3 + [3] * 27)
 
 def publisher(topic: str, kind: type, listeners: int = 1) -> rospy.Publisher:
     """Return a publisher that so many nodes are connected to."""
-    made = rospy.Publisher(topic, kind, queue_size=1000)
+    made = rospy.Publisher(topic, kind, queue_size=1000, tcp_nodelay=True)
     wait_for_publisher_links(made, listeners)
     return made
 
