@@ -155,12 +155,13 @@ def leave_results(watch: Watch, seconds: float, output: Path) -> None:
         raise DemoError(answer.message)
     blocks = read_map(output / "map.mlsm").shown
     outlines = load_sdf(ROOT / "worlds/basin.sdf").world.outlines()
+    # No line leads from one outline to the next.
+    lines = np.concatenate([np.append(np.asarray(one)[:, :2], [[np.nan, np.nan]], axis=0) for one in outlines])
+    walls = Trajectory("walls as they are", "#1f5fa8", np.zeros(len(lines)), lines)
     poses = np.array(watch.path)
     path = Trajectory("the vehicle's path", "#2a9d4a", poses[:, 0], poses[:, 1:])
-    draw_map(
-        output / "map.png", f"The basin as {watch.number('mlsm_core', 'clouds in')} scans show it", blocks, outlines,
-        [path],
-    )  # fmt: skip
+    title = f"The basin as {watch.number('mlsm_core', 'clouds in')} scans show it"
+    draw_map(output / "map.png", title, blocks, [walls, path])
     write_whole(output / "summary.json", (json.dumps(summary(watch, seconds), indent=2) + "\n").encode())
 
 

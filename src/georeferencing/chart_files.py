@@ -1,42 +1,65 @@
-"""The path on the chart: GeoJSON (RFC 7946), KML (OGC 07-147r2) and a table."""
+"""Paths and marks on the chart: GeoJSON (RFC 7946) and KML (OGC 07-147r2)."""
 
 import json
-from pathlib import Path
+from dataclasses import dataclass
+from typing import Any, Dict, List, Sequence
 from xml.sax.saxutils import escape
 
 import numpy as np
 
 from georeferencing.origin import Origin
-from node_support.files import write_whole
+from node_support.marks import Mark
 
-CHART_FILES = ("path.geojson", "path.kml", "path.csv")
 _DIGITS = 8  # of degrees: a millimetre
 
 
-def write_chart(folder: Path, name: str, origin: Origin, times: np.ndarray, path: np.ndarray) -> None:
-    """Write a path (m, >= 2) x y [m] at `times` (m,) s, each file whole or not at all; raises OSError."""
-    degrees = np.round(origin.degrees(path), _DIGITS)
-    longitude_first = degrees[:, ::-1]
-    write_whole(folder / "path.geojson", _geojson(name, times, longitude_first))
-    write_whole(folder / "path.kml", _kml(name, longitude_first))
-    rows = np.column_stack([times, degrees])
-    text = "time,latitude,longitude\n" + "%.6f,%.8f,%.8f\n" * len(rows) % tuple(rows.ravel().tolist())
-    write_whole(folder / "path.csv", text.encode("ascii"))
+@dataclass(frozen=True)
+class ChartedPath:
+    """times: (m,) s. points: (m, >= 2) x y [m] in map."""
+
+    name: str
+    times: np.ndarray
+    points: np.ndarray
 
 
-def _geojson(name: str, times: np.ndarray, longitude_first: np.ndarray) -> bytes:
-    feature = {
-        "type": "Feature",
-        "properties": {"name": name, "times": np.round(times, 3).tolist()},
-        "geometry": {"type": "LineString", "coordinates": longitude_first.tolist()},
-    }
-    return (json.dumps({"type": "FeatureCollection", "features": [feature]}) + "\n").encode()
+def geojson(origin: Origin, path: ChartedPath, marks: Sequence[Mark] = ()) -> bytes:
+    """Return a collection of features: the path as a line with its times, and marks as points."""
+    properties = {"name": path.name, "times": np.round(path.times, 3).tolist()}
+    features = [_feature("LineString", _longitude_first(origin, path.points), properties)]
+    for mark, place in zip(marks, _longitude_first(origin, _places(marks))):
+        features.append(_feature("Point", place, {"name": mark.name}))
+    return (json.dumps({"type": "FeatureCollection", "features": features}) + "\n").encode()
 
 
-def _kml(name: str, longitude_first: np.ndarray) -> bytes:
-    points = " ".join(f"{longitude:.8f},{latitude:.8f},0" for longitude, latitude in longitude_first.tolist())
+def kml(origin: Origin, path: ChartedPath, marks: Sequence[Mark] = ()) -> bytes:
+    """Return the same as placemarks."""
+    line = _coordinates(_longitude_first(origin, path.points))
+    placemarks = [_placemark(path.name, f"<LineString><tessellate>1</tessellate>{line}</LineString>")]
+    for mark, place in zip(marks, _longitude_first(origin, _places(marks))):
+        placemarks.append(_placemark(mark.name, f"<Point>{_coordinates([place])}</Point>"))
     return (
-        '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document><Placemark>'
-        f"<name>{escape(name)}</name><LineString><tessellate>1</tessellate><coordinates>{points}</coordinates>"
-        "</LineString></Placemark></Document></kml>\n"
+        '<?xml version="1.0" encoding="UTF-8"?>\n<kml xmlns="http://www.opengis.net/kml/2.2"><Document>'
+        f"{''.join(placemarks)}</Document></kml>\n"
     ).encode()
+
+
+def _places(marks: Sequence[Mark]) -> np.ndarray:
+    return np.array([(mark.x, mark.y) for mark in marks]).reshape(-1, 2)
+
+
+def _longitude_first(origin: Origin, points: np.ndarray) -> List[List[float]]:
+    return np.round(origin.degrees(points)[:, ::-1], _DIGITS).tolist()
+
+
+def _feature(kind: str, coordinates: Any, properties: Dict[str, Any]) -> Dict[str, Any]:
+    geometry = {"type": kind, "coordinates": coordinates}
+    return {"type": "Feature", "properties": properties, "geometry": geometry}
+
+
+def _coordinates(places: List[List[float]]) -> str:
+    text = " ".join(f"{longitude:.8f},{latitude:.8f},0" for longitude, latitude in places)
+    return f"<coordinates>{text}</coordinates>"
+
+
+def _placemark(name: str, geometry: str) -> str:
+    return f"<Placemark><name>{escape(name)}</name>{geometry}</Placemark>"

@@ -1,8 +1,7 @@
-"""Latitude and longitude of points of the map (WGS 84, by way of earth-centred coordinates)."""
+"""Where the map lies on the Earth, and latitude and longitude of its points (WGS 84)."""
 
-import math
-import re
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -10,52 +9,92 @@ from node_support.errors import RefusedInput
 from node_support.geometry import rotated
 
 EAST_DEG = 90.0
-_SEMI_MAJOR = 6378137.0  # m
-_FLATTENING = 1.0 / 298.257223563
-_ECCENTRICITY_SQUARED = _FLATTENING * (2.0 - _FLATTENING)
-_ROUNDS = 5  # of the latitude's iteration: each brings it two digits nearer, at sea level more
-_NUMBER = r"([-+]?\d+(?:\.\d*)?)"
-_FORMAT = re.compile(rf"\s*{_NUMBER}\s*,\s*{_NUMBER}\s*(?:,\s*azimuth\s+{_NUMBER}\s*)?")
+STORED = "origin"
+"""Name of the array in which map files keep an origin."""
 
 
 @dataclass(frozen=True)
 class Origin:
-    """Where the map's origin is, and where its x axis points: degrees clockwise from north, 90 for east (REP-103)."""
+    """Where the map's origin is, and where its x axis points: degrees clockwise from north, 90 for east (REP-103).
+
+    covariance: (3, 3) of what is told: east and north of the origin [m], yaw of the x axis from east [rad].
+    """
 
     latitude_deg: float
     longitude_deg: float
     azimuth_deg: float = EAST_DEG
+    covariance: np.ndarray = field(default_factory=lambda: np.zeros((3, 3)), compare=False)
+
+    def __post_init__(self) -> None:
+        """Raise RefusedInput for a place that no chart shows."""
+        numbers = self.latitude_deg, self.longitude_deg, self.azimuth_deg
+        if not (np.isfinite(numbers).all() and abs(self.latitude_deg) <= 89.0 and abs(self.longitude_deg) <= 180.0):
+            must = "latitude must be -89 to 89, longitude -180 to 180"
+            raise RefusedInput("origins refused", f"{self.latitude_deg:g}, {self.longitude_deg:g}: {must}")
 
     @classmethod
-    def parsed(cls, text: str) -> "Origin":
-        """Return the origin that "41.2, 3.1, azimuth 12" gives; the azimuth may be missing. Raises RefusedInput."""
-        found = _FORMAT.fullmatch(text)
-        if not found:
-            raise RefusedInput("origins refused", f"{text!r}: must be as '41.2, 3.1' or '41.2, 3.1, azimuth 12'")
-        numbers = [float(number) for number in found.groups() if number is not None]
-        origin = cls(*numbers)
-        if abs(origin.latitude_deg) > 89.0 or abs(origin.longitude_deg) > 180.0:
-            raise RefusedInput("origins refused", f"{text!r}: latitude must be -89 to 89, longitude -180 to 180")
-        return origin
+    def of_array(cls, stored: np.ndarray) -> "Origin":
+        """Return the origin that `array` gave. Raises RefusedInput for any other array."""
+        if np.shape(stored) != (12,) or not np.isfinite(stored).all():
+            raise RefusedInput("origins refused", f"a map file holds {stored!r} for its origin")
+        return cls(*(float(number) for number in stored[:3]), np.reshape(stored[3:], (3, 3)))
+
+    @property
+    def array(self) -> np.ndarray:
+        """(12,), as a map file keeps it."""
+        numbers = self.latitude_deg, self.longitude_deg, self.azimuth_deg
+        return np.concatenate([numbers, self.covariance.ravel()])
+
+    @property
+    def yaw(self) -> float:
+        """Heading of the x axis, counter-clockwise from east, rad."""
+        return float(np.radians(EAST_DEG - self.azimuth_deg))
+
+    @property
+    def plane(self) -> str:
+        """The PROJ string of metres east and north of the origin: distances and directions from it are exact."""
+        return f"+proj=aeqd +lat_0={self.latitude_deg!r} +lon_0={self.longitude_deg!r} +datum=WGS84 +units=m"
+
+    @property
+    def utm(self) -> str:
+        """The EPSG code of the zone of UTM in which the origin lies, such as EPSG:32631."""
+        zone = int((self.longitude_deg + 180.0) // 6.0) % 60 + 1
+        return f"EPSG:{(32700 if self.latitude_deg < 0.0 else 32600) + zone}"
 
     def degrees(self, points: np.ndarray) -> np.ndarray:
         """Return latitude and longitude (n, 2), deg, of points (n, >= 2) x y [m] of the map."""
-        turn = math.radians(EAST_DEG - self.azimuth_deg)
-        east, north = rotated(np.asarray(points, dtype=np.float64)[:, :2], np.array(turn)).T
-        latitude, longitude = math.radians(self.latitude_deg), math.radians(self.longitude_deg)
-        sine, cosine = math.sin(latitude), math.cos(latitude)
-        normal = _SEMI_MAJOR / math.sqrt(1.0 - _ECCENTRICITY_SQUARED * sine**2)
-        # Earth-centred, turned so that x lies in the origin's meridian, y to its east.
-        x = normal * cosine - sine * north
-        z = normal * (1.0 - _ECCENTRICITY_SQUARED) * sine + cosine * north
-        return np.degrees(np.column_stack([_latitude(np.hypot(x, east), z), longitude + np.arctan2(east, x)]))
+        east, north = self._east_north(points).T
+        longitude, latitude = _projection(self.plane)(east, north, inverse=True)
+        return np.column_stack([latitude, longitude])
+
+    def points(self, degrees: np.ndarray) -> np.ndarray:
+        """Return the points (n, 2) x y [m] of the map at latitudes and longitudes (n, 2), deg."""
+        latitude, longitude = np.asarray(degrees, dtype=np.float64).T
+        east_north = np.column_stack(_projection(self.plane)(longitude, latitude))
+        return rotated(east_north, np.array(-self.yaw))
+
+    def covariances(self, points: np.ndarray) -> np.ndarray:
+        """Return how well the places of points (n, >= 2) of the map are known: (n, 2, 2) m^2, east and north."""
+        east, north = self._east_north(points).T
+        jacobian = np.zeros((len(east), 2, 3))
+        jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+        jacobian[:, :, 2] = np.column_stack([-north, east])
+        return jacobian @ self.covariance @ jacobian.transpose(0, 2, 1)
+
+    def _east_north(self, points: np.ndarray) -> np.ndarray:
+        return rotated(np.asarray(points, dtype=np.float64)[:, :2], np.array(self.yaw))
+
+    def __str__(self) -> str:
+        deviation = np.sqrt(np.trace(self.covariance[:2, :2]))
+        text = f"{self.latitude_deg:.7f}, {self.longitude_deg:.7f}, azimuth {self.azimuth_deg:.2f}"
+        turn = np.degrees(np.sqrt(self.covariance[2, 2]))
+        return f"{text} (deviations {deviation:.2f} m and {turn:.2f} degrees)" if self.covariance.any() else text
 
 
-def _latitude(distance: np.ndarray, z: np.ndarray) -> np.ndarray:
-    """Return the geodetic latitude (n,) rad of points at `distance` from the axis and z above the equator, m."""
-    found = np.arctan2(z, distance * (1.0 - _ECCENTRICITY_SQUARED))
-    for _ in range(_ROUNDS):
-        sine = np.sin(found)
-        normal = _SEMI_MAJOR / np.sqrt(1.0 - _ECCENTRICITY_SQUARED * sine**2)
-        found = np.arctan2(z + _ECCENTRICITY_SQUARED * normal * sine, distance)
-    return found
+def _projection(text: str) -> Any:
+    # A mapping node without an origin shall not wait for PROJ.
+    try:
+        from pyproj import Proj
+    except ImportError:
+        raise RefusedInput("origins refused", "needs pyproj; install it with: apt install python3-pyproj") from None
+    return Proj(text)

@@ -11,7 +11,7 @@ from typing import Callable, Dict, List
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.export.formats import ENDINGS, ExportOptions, export
+from mlsm_manager.surface_map.export.formats import ENDINGS, GEOTIFF, ExportOptions, export
 from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
 from mlsm_manager.surface_map.map_file import StoredMap, read_map
 from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged
@@ -54,6 +54,7 @@ def info_lines(path: Path, stored: StoredMap) -> List[str]:
     lines += [f"  {layer.value}: {_layer_line(blocks)}" for layer, blocks in stored.layers.items()]
     lines += [f"  mark: {mark.name!r} at {mark.x:.1f}, {mark.y:.1f} m" for mark in stored.marks]
     lines += [f"  calibration: {name} = {value}" for name, value in sorted(stored.calibration.items())]
+    lines += [] if stored.origin is None else [f"  origin: {stored.origin}"]
     lines += [f"  with {name} {'x'.join(map(str, array.shape))}" for name, array in sorted(stored.arrays.items())]
     return lines
 
@@ -83,7 +84,9 @@ def _view(options: Namespace) -> List[str]:
 
 def _export(options: Namespace) -> List[str]:
     low, high = options.slice
-    export(read_map(options.map), options.out, ExportOptions(low, high, ColorBy(options.color.upper())))
+    if options.crs and options.out.suffix != GEOTIFF:
+        raise ValueError(f"--crs {options.crs}: {options.out} must end with {GEOTIFF}")
+    export(read_map(options.map), options.out, ExportOptions(low, high, ColorBy(options.color.upper()), options.crs))
     return [f"{options.out} written"]
 
 
@@ -147,6 +150,10 @@ def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     export_parser.add_argument(
         "--slice", type=float, nargs=2, default=(-np.inf, np.inf), metavar=("LOW", "HIGH"),
         help="heights between which a .pgm shows what is occupied [m] (default: all)",
+    )  # fmt: skip
+    export_parser.add_argument(
+        "--crs", default="", metavar="EPSG:CODE",
+        help="coordinates of a .tif, of a map that knows where it lies (default: its zone of UTM)",
     )  # fmt: skip
     crop = commands.add_parser("crop", parents=[one_map, out], help="keep what lies in a box")
     for option, corner in (("--low", "lower"), ("--high", "upper")):

@@ -205,6 +205,11 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(
                 topics.SET_MARK, "visualization_msgs/Marker", "a place to name by the marker's text, or to delete"
             ),
+            _subscribes(
+                topics.SATELLITE_FIXES,
+                "sensor_msgs/NavSatFix",
+                "where satellites have the vehicle at the surface; with `origin: fixes`",
+            ),
             _subscribes("tf", "", "`odom -> base_link`: dead reckoning"),
             _publishes(
                 topics.MAP_MARKERS,
@@ -230,6 +235,12 @@ NODES: Dict[str, NodeDescription] = {
                 topics.POSE_NOW,
                 "geometry_msgs/PoseWithCovarianceStamped",
                 "each second, also between fixes: the position now, with the covariance that it has by now",
+            ),
+            _publishes(
+                topics.CHART_POSITION,
+                "sensor_msgs/NavSatFix",
+                "the same in latitude and longitude where `origin` or a map file tells where the map lies; its status "
+                "is no fix while the position is not good",
             ),
             _publishes(
                 topics.STATUS_MARKERS,

@@ -49,3 +49,5 @@ MAVROS_ODOMETRY = "mavros/odometry/out"  # Odometry: what MAVROS sends to the au
 MAVROS_POSE = "mavros/vision_pose/pose_cov"  # PoseWithCovarianceStamped: the same as VISION_POSITION_ESTIMATE
 MATCHED_SCAN = "MLSM/scan"  # PointCloud2: the newest scan where matching puts it, accepted or not
 MATCHED_PATH = "MLSM/path"  # Path: the vehicle in the map at all matches
+SATELLITE_FIXES = "fix"  # NavSatFix: where a receiver of satellites has the vehicle, at the surface
+CHART_POSITION = "MLSM/navsat"  # NavSatFix: the vehicle on the Earth now, each second

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A tour that is broken five times: mlsm_core goes on, names what happened, and tells a deviation that covers it."""
+"""A tour on the chart, broken five times: mlsm_core goes on, names what happened, and tells how uncertain it is."""
 
 import unittest
 from typing import List
@@ -10,8 +10,10 @@ from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped
 from graph import Diagnostics, Inbox, run
 from messages import place, publisher, transform
 from rosgraph_msgs.msg import Clock
+from sensor_msgs.msg import NavSatFix, NavSatStatus
 from tf2_msgs.msg import TFMessage
 
+from georeferencing.origin import Origin
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.geometry import composed, inverse, transformed
 from sonar_processing.cloud import Cloud
@@ -22,6 +24,7 @@ TURN, STEP = 16.0, 1.0  # s
 SIDES = [((-12, 12), (14, 12)), ((14, 12), (14, -10)), ((14, -10), (-12, -10)), ((-12, -10), (-12, 12))]
 WALLS = np.vstack([np.linspace(*ends, 40, endpoint=False) for ends in np.array(SIDES, dtype=float)])
 HOUR = 3600.0
+ORIGIN = Origin(41.2, 3.1)
 COVERS = 2.5  # deviations
 LEAST = 0.3  # m: what echoes of half a metre tell
 
@@ -39,8 +42,10 @@ class Trust(unittest.TestCase):
         cls.status, cls.diagnostics = Inbox("/MLSM/status", PositionStatus), Diagnostics()
         cls.clock, cls.tf = publisher("/clock", Clock), publisher("/tf", TFMessage, 2)
         cls.echoes = publisher("/sonar/scan/echoes", StampedIntensityCloud)
+        cls.charted = Inbox("/MLSM/navsat", NavSatFix)
+        cls.satellites = publisher("/fix", NavSatFix)
         cls.seen = publisher("/initialpose", PoseWithCovarianceStamped)
-        for inbox in (cls.fixes, cls.now, cls.corrections, cls.status):
+        for inbox in (cls.fixes, cls.now, cls.corrections, cls.status, cls.charted):
             inbox.wait_for_link()
         cls.send_odometry()
         for _ in range(2):
@@ -48,6 +53,22 @@ class Trust(unittest.TestCase):
         cls.fixes.wait_for_number(1)
         for _ in range(4):
             cls.turn_of_the_head()
+
+    def test_0_fixes_of_satellites_put_the_vehicle_on_the_chart(self) -> None:
+        for is_late in (False, True):
+            x, y, _ = truth(self.seconds)
+            fix = NavSatFix(latitude=ORIGIN.degrees([[x, y]])[0, 0], longitude=ORIGIN.degrees([[x, y]])[0, 1])
+            fix.header.stamp = rospy.Time.from_sec(self.stamp())
+            fix.status.status = NavSatStatus.STATUS_NO_FIX if is_late else NavSatStatus.STATUS_FIX
+            fix.latitude += 1.0 * is_late
+            self.satellites.publish(fix)
+        self.diagnostics.wait_for("mlsm_core", "satellite fixes without a position", 1)
+        self.turn_of_the_head()
+        told = self.charted.wait_for(lambda one: one.header.stamp.to_sec() > self.stamp() - 2.0 * STEP)
+        off = ORIGIN.points([[told.latitude, told.longitude]])[0] - truth(self.seconds)[:2]
+        # The receiver did not tell its accuracy: 3 m in each axis, and three degrees of the compass.
+        self.assertLess(np.hypot(*off), 1.5)
+        self.assertTrue(8.0 < told.position_covariance[0] < 25.0, told.position_covariance)
 
     def test_1_a_jump_of_the_odometry_is_left_out_and_named(self) -> None:
         type(self).offset = np.array([30.0, 5.0, 0.0])
@@ -80,7 +101,7 @@ class Trust(unittest.TestCase):
         pose.pose.pose.orientation.z, pose.pose.pose.orientation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
         pose.pose.covariance = np.diag([0.25, 0.25, 0.01, 0.01, 0.01, 0.07]).ravel().tolist()
         self.seen.publish(pose)
-        self.status.wait_for(lambda found: found.text == "no position yet")
+        self.status.wait_for(lambda found: found.text.startswith("no position yet"))
         self.assert_goes_on()
 
     def test_6_a_sonar_that_falls_silent_is_named_while_the_position_grows_uncertain(self) -> None:

@@ -8,6 +8,7 @@ from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from georeferencing.origin import STORED, Origin
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.continuous_input import continuous_cloud, continuous_scan
 from mlsm_manager.localisation.estimator import Estimator
@@ -86,6 +87,8 @@ class Localiser:
         self._newest: Optional[Scan] = None
         self._search = PlaceSearch()
         self._resumed_at: Optional[StoredPlace] = None
+        self.origin: Optional[Origin] = None
+        """Where the map lies on the Earth, where that is known."""
         self.use(settings)
 
     def use(self, settings: LocaliserSettings) -> None:
@@ -374,6 +377,8 @@ class Localiser:
             keyframes = self.estimator.keyframes if run and not self.steps else {}
             correction = self.last_correction
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
+        if self.origin is not None:
+            arrays[STORED] = self.origin.array
         layers = {layer: finished(copy, self._lock) for layer, copy in copies.items()}
         return StoredMap(frame, layers, calibration, made, arrays, run)
 
@@ -384,9 +389,11 @@ class Localiser:
         searched everywhere too when three scans do not match there; otherwise it is searched everywhere from the start.
         Raises ValueError, and keeps the present map, for other resolutions than those of the parameters.
         """
+        origin = stored.origin
         with self._lock:
             reason = self.estimator.restore(stored.layers, stored.arrays if same_odometry else {})
             self._changes += 1
+            self.origin = origin
             self._forget_scans()
             self._search.lose()
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
@@ -400,6 +407,7 @@ class Localiser:
         with self._lock:
             count = self.block_count
             self._changes += 1
+            self.origin = None
             self.estimator.clear()
             self._forget_scans()
             self._search.forget()

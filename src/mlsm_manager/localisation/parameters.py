@@ -6,6 +6,7 @@ from typing import Any, Dict, Optional, Sequence
 
 import numpy as np
 
+from georeferencing.asked import AskedOrigin
 from mlsm_manager.joint_solver.parameters import JointSolverParameters, SolverParameters
 from mlsm_manager.localisation.estimator import Estimator, MapSettings
 from mlsm_manager.localisation.joint import Assumed, Joint
@@ -19,6 +20,7 @@ from mlsm_manager.scan_matching.scan import Matcher
 from mlsm_manager.surface_map.export.pictures import ColorBy
 from mlsm_manager.surface_map.free_space import Carver, CarvingParameters
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
+from node_support.errors import RefusedInput
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_processing.beams.parameters import beam_width_parameter
@@ -220,6 +222,14 @@ class MlsmNodeParameters(ParameterSet):
         "", "name of a map in map_directory to start with; the vehicle is searched in it", tunable=False,
         may_be_empty=True,
     )  # fmt: skip
+    origin: str = parameter(
+        "",
+        "where the origin of a new map lies: '41.2, 3.1, azimuth 12' (of its x axis, clockwise from north; 90 where "
+        "none is given), or 'fixes': as satellites tell on the topic fix; 'fixes, azimuth unknown' without a compass, "
+        "'fixes, magnetic' and '41.2, 3.1, magnetic' where the compass knows no declination",
+        tunable=False,
+        may_be_empty=True,
+    )
     autosave_period: float = parameter(
         10.0, "a changed map is saved this often, so that a node that is killed goes on in it; 0: never", unit="s",
         low=0.0, high=86400.0, tunable=False,
@@ -238,8 +248,17 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
                 f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
             )
+        try:
+            self.asked_origin  # noqa: B018 - validated by reading it
+        except RefusedInput as refused:
+            raise ParameterError(f"origin = {refused}") from None
         if self.map_frame == self.odom_frame:
             raise ParameterError(f"map_frame = {self.map_frame!r}: must differ from odom_frame")
+
+    @property
+    def asked_origin(self) -> Optional[AskedOrigin]:
+        """What is said of where the map lies; None where nothing is."""
+        return AskedOrigin.parsed(self.origin) if self.origin else None
 
     @property
     def matches_from_start(self) -> bool:

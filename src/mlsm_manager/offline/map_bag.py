@@ -7,11 +7,11 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, Dict, List
 
-from georeferencing.chart_files import write_chart
-from georeferencing.origin import Origin
+from georeferencing.asked import AskedOrigin
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.charts import with_origin, write_charts
 from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.mcap_file import write_mcap
 from mlsm_manager.offline.recording import read_recording
@@ -73,7 +73,7 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     for note in recording.notes:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
     make_folder(options.out)
-    mapped = mapped_bag(recording, options)
+    mapped = with_origin(mapped_bag(recording, options), options)
     _write_results(mapped, options)
     errors = errors_of(mapped.run, mapped.recording)
     summary = summary_of(mapped, errors, time.monotonic() - start)
@@ -90,8 +90,7 @@ def _write_results(mapped: MappedBag, options: Namespace) -> None:
     write_run(options.out, mapped.title, mapped.run, mapped.recording)
     for number, session in enumerate(mapped.sessions, start=2):
         write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
-    if options.origin is not None:
-        write_chart(options.out, mapped.title, options.origin, mapped.run.times, mapped.run.best)
+    write_charts(options.out, mapped)
     live = live_text(mapped.parameters, options.odom_frame, options.base_frame, options.chain)
     write_whole(options.out / "live.yaml", live.encode())
 
@@ -157,8 +156,9 @@ def _parser() -> CommandLine:
     )
     parser.add_argument(
         "--origin", type=_origin, metavar="PLACE",
-        help="write the path for charts: where the map's origin is and its x axis points, in degrees, clockwise from "
-        'north, 90 where it is left out: "41.2, 3.1, azimuth 12"',
+        help="write map and path for charts: where the map's origin is and its x axis points, clockwise from north: "
+        '"41.2, 3.1, azimuth 12", 90 where none is given; "fixes": as satellites tell in the recording, "fixes, '
+        'azimuth unknown" without a compass; "fixes, magnetic" and "41.2, 3.1, magnetic": it knows no declination',
     )  # fmt: skip
     parser.add_argument("--set", nargs="+", action="extend", default=[], metavar="KEY=VALUE", help="any parameter")
     add_reading_arguments(parser)
@@ -168,9 +168,9 @@ def _parser() -> CommandLine:
     return parser
 
 
-def _origin(text: str) -> Origin:
+def _origin(text: str) -> AskedOrigin:
     try:
-        return Origin.parsed(text)
+        return AskedOrigin.parsed(text)
     except RefusedInput as refused:
         raise argparse.ArgumentTypeError(str(refused)) from refused
 

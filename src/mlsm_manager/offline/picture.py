@@ -8,20 +8,21 @@ from typing import Optional, Sequence
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
-from matplotlib.patches import PathPatch
-from matplotlib.path import Path as Outline
+from matplotlib.ticker import MaxNLocator
 
+from georeferencing.origin import Origin
+from mlsm_manager.report.compass_rose import north, north_label, scale_bar
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.report.mission import Uncertainty
-from mlsm_manager.surface_map.blocks import Blocks, BlockType
+from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.ridges import counts, ridges
 from node_support.files import write_whole
 
-_COLORS = {BlockType.HORIZONTAL: "#b3362b", BlockType.VERTICAL: "#e0a526"}
+_WALL, _POINTS, _INK, _GRATICULE = "#8c2318", "#fcc3ab", "#333333", "#5b7fa6"
 _DOUBT_COLOR = "#cc3377"
 _MOST_ELLIPSES = 40
-_CORNERS = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [0.0, 0.0]])
-_EDGE = 1.2  # points: two pixels around each cell
 _LINE_STYLES = ("-", "--", ":", "-.")
 
 
@@ -29,28 +30,28 @@ def draw_map(
     file: Path,
     title: str,
     blocks: Blocks,
-    outlines: Sequence[np.ndarray],
     paths: Sequence[Trajectory],
     best: Optional[Trajectory] = None,
     uncertainty: Optional[Uncertainty] = None,
+    origin: Optional[Origin] = None,
 ) -> None:
-    """Write a PNG of the blocks (cells to scale), known outlines [(k, 2) m], paths, and how certain the best one is."""
+    """Write a PNG of the blocks, paths, and how certain the best one is; with an origin on a graticule."""
     figure = Figure(figsize=(14, 8), dpi=110)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(1, 1, 1)
-    for index, outline in enumerate(outlines):
-        label = "walls as they are" if index == 0 else None
-        axes.plot(*np.asarray(outline).T, color="#1f5fa8", linewidth=1.0, label=label, zorder=4)
-    _draw_blocks(axes, blocks)
+    if len(blocks):
+        _draw_blocks(axes, blocks)
     for path, style in zip(paths, cycle(_LINE_STYLES)):
         axes.plot(*path.poses[:, :2].T, style, color=path.color, linewidth=1.6, label=path.name, zorder=5)
     if best is not None and uncertainty is not None:
         _draw_uncertainty(axes, best, uncertainty)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
-    axes.grid(True, color="#dddddd", linewidth=0.5, zorder=0)
-    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncol=5, frameon=False)
     axes.autoscale_view()
+    if origin is not None:
+        _draw_graticule(axes, origin)
+    _draw_scale(axes, origin)
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.08), ncol=6, frameon=False)
     figure.tight_layout()
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
@@ -66,21 +67,48 @@ def _draw_uncertainty(axes: Axes, path: Trajectory, uncertainty: Uncertainty) ->
 
 
 def _draw_blocks(axes: Axes, blocks: Blocks) -> None:
-    for kind, color in _COLORS.items():
-        if not np.any(blocks.type == kind):
-            continue
-        centers = blocks.centers[blocks.type == kind]
-        squares = _squares(centers, blocks.resolution)
-        # add_patch would look at each corner by itself for the limits, which takes longer than all the rest.
-        # Edges of a width in points keep small cells of large water visible.
-        axes.add_artist(PathPatch(squares, facecolor=color, edgecolor=color, linewidth=_EDGE, zorder=2 + int(kind)))
-        axes.update_datalim(squares.vertices)
-        label = f"{len(centers)} {kind.name.lower()} blocks"
-        axes.plot([], [], "s", color=color, label=label)
+    """Draw the points faintly, and lines where they form a surface."""
+    numbers, low, side = counts(blocks)
+    (left, bottom), (right, top) = low * side, (low + numbers.shape[::-1]) * side
+    shades = np.ma.masked_equal(np.log1p(numbers), 0.0)
+    axes.imshow(
+        shades, origin="lower", extent=(left, right, bottom, top), cmap="Reds", vmin=-0.5 * shades.max(),
+        vmax=5.0 * shades.max(), interpolation="nearest", zorder=2,
+    )  # fmt: skip
+    axes.add_collection(LineCollection(ridges(blocks), colors=_WALL, linewidths=1.8, zorder=3))
+    axes.plot([], [], "s", color=_POINTS, label="points")
+    axes.plot([], [], color=_WALL, label="surfaces")
 
 
-def _squares(centers: np.ndarray, side: float) -> Outline:
-    """Return squares around centers (n, 2), n > 0, as one outline: drawn at once, they take a tenth of the time."""
-    corners = centers[:, np.newaxis] + side * (_CORNERS - 0.5)
-    codes = np.tile([Outline.MOVETO, Outline.LINETO, Outline.LINETO, Outline.LINETO, Outline.CLOSEPOLY], len(centers))
-    return Outline(corners.reshape(-1, 2), codes)
+def _draw_scale(axes: Axes, origin: Optional[Origin]) -> None:
+    """Draw a scale bar, and an arrow to the north."""
+    (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    bar = scale_bar(right - left)
+    start, height = left + 0.03 * (right - left), bottom + 0.03 * (top - bottom)
+    axes.plot([start, start + bar], [height, height], color=_INK, linewidth=4.0, solid_capstyle="butt", zorder=7)
+    above = (start + bar / 2.0, height)
+    axes.annotate(f"{bar:g} m", above, (0, 5), textcoords="offset points", ha="center", color=_INK)
+    arrow = {"arrowstyle": "-|>", "color": _INK, "linewidth": 2.0}
+    axes.annotate(
+        north_label(origin), (0.95, 0.9), -38.0 * north(origin), xycoords="axes fraction", textcoords="offset points",
+        arrowprops=arrow, ha="center", va="center", color=_INK, zorder=7,
+    )  # fmt: skip
+
+
+def _draw_graticule(axes: Axes, origin: Origin) -> None:
+    """Draw lines of latitude and longitude, with their degrees where they begin."""
+    limits = np.array([axes.get_xlim(), axes.get_ylim()])
+    degrees = origin.degrees(np.stack(np.meshgrid(*limits), axis=-1).reshape(-1, 2))
+    low, high = degrees.min(axis=0), degrees.max(axis=0)
+    rim = 0.03 * np.ptp(limits, axis=1)
+    for axis, letters in enumerate(("SN", "WE")):
+        for value in MaxNLocator(6).tick_values(low[axis], high[axis]):
+            ends = np.array([low, high])
+            ends[:, axis] = value
+            line = origin.points(np.linspace(*ends, 200))
+            axes.plot(*line.T, color=_GRATICULE, linewidth=0.6, zorder=1)
+            inside = line[((line > limits[:, 0]) & (line < limits[:, 1] - rim)).all(axis=1)]
+            text = f"{abs(value):.5f}\u00b0 {letters[int(value >= 0.0)]}"
+            if len(inside):
+                axes.annotate(text, inside[0], (3, 3), textcoords="offset points", color=_GRATICULE, fontsize=8)
+    axes.set(xlim=limits[0], ylim=limits[1])

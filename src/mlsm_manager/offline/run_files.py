@@ -7,6 +7,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 
 import numpy as np
 
+from georeferencing.origin import Origin
 from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
@@ -61,7 +62,7 @@ def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
 
     write_map(folder / "map.mlsm", run.stored)
     write_ply(folder / "map.ply", run.blocks)
-    write_trajectory(folder / "trajectory.csv", run.times, run.poses)
+    write_trajectory(folder / "trajectory.csv", run.times, run.poses, run.stored.origin)
     for tum, poses in run.poses.items():
         _write_tum(folder / f"{tum}.tum", run.times, poses)
     if len(recording.soundings):
@@ -71,7 +72,8 @@ def write_run(folder: Path, name: str, run: Run, recording: Recording) -> None:
         level = np.pad(recording.truth.positions, ((0, 0), (0, 1)), mode="constant")
         _write_tum(folder / "truth.tum", recording.truth.times, level)
     known, uncertainty = trajectories_of(run, recording), None if run.trust is None else run.trust.uncertainty
-    draw_map(folder / PICTURE, name, run.blocks, [], [*known, *run.further], known[-1], uncertainty)
+    paths = [*known, *run.further]
+    draw_map(folder / PICTURE, name, run.blocks, paths, known[-1], uncertainty, run.stored.origin)
 
 
 def write_summary(folder: Path, summary: Dict[str, Any]) -> None:
@@ -86,17 +88,24 @@ def errors_of(run: Run, recording: Recording) -> Dict[str, Dict[str, float]]:
     return {name: position_error(run.times, poses, recording.truth) for name, poses in run.poses.items()}
 
 
-def write_trajectory(path: Path, times: np.ndarray, poses: Mapping[str, np.ndarray]) -> None:
+def write_trajectory(
+    path: Path, times: np.ndarray, poses: Mapping[str, np.ndarray], origin: Optional[Origin] = None
+) -> None:
     """Write the table of trajectories (m, 3) at `times` (m,): time [s], then x y [m] and yaw [rad] of each.
 
-    It is written whole or not at all; raises OSError.
+    With an origin latitude and longitude [deg] of the last one follow. It is written whole or not at all; raises
+    OSError.
     """
     header = ["time"] + [f"{_COLUMNS[name]}_{axis}" for name in poses for axis in ("x", "y", "yaw")]
     columns: List[np.ndarray] = [times[:, np.newaxis]]
     for own in poses.values():
         columns += [own[:, :2], wrapped(own[:, 2:])]
+    kinds = ["%.6f"] + ["%.4f"] * (len(header) - 1)
+    if origin is not None:
+        header, kinds = [*header, "latitude", "longitude"], [*kinds, "%.8f", "%.8f"]
+        columns.append(origin.degrees(own))
     rows = np.concatenate(columns, axis=1)
-    line = ",".join(["%.6f"] + ["%.4f"] * (rows.shape[1] - 1)) + "\n"
+    line = ",".join(kinds) + "\n"
     # All lines at once: that takes half the time of one after the other.
     text = ",".join(header) + "\n" + line * len(rows) % tuple(rows.ravel().tolist())
     write_whole(path, text.encode("ascii"))

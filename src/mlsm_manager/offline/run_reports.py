@@ -1,20 +1,23 @@
 """What map_bag says of a run: summary.json, its last lines on the terminal, and report.html."""
 
 from argparse import Namespace
+from datetime import datetime, timezone
 from typing import Any, Dict, List
 
 import numpy as np
 
-from georeferencing.chart_files import CHART_FILES
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
+from mlsm_manager.offline.charts import CHART_FILES
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
-from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, trajectories_of
+from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, positions_at, trajectories_of
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.headline import WITHIN, is_told
 from mlsm_manager.self_check.verdict import counted
 from node_support.geometry import composed, inverse, transformed
 
+_FIRST_YEAR = 1990  # of recordings
 _MOST_LOOPS = 5  # loops that are printed; summary.json has all
 
 
@@ -55,11 +58,21 @@ def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
     lines += [f"found again after a silence of the sonar at {line}" for line in summary.get("found_again", [])]
     if "loops" in summary:
         lines += [f"loop: {line}" for line in summary["loops"]["found"][:_MOST_LOOPS]]
+    if "origin" in summary:
+        lines.append(_origin_line(summary["origin"]))
     if "trust" in summary:
         lines.append(summary["trust"])
     files = ["map.mlsm", "map.ply", "map.png", "trajectory.csv", "*.tum", "live.yaml", "summary.json"]
     files += [name for name in (REPORT, MCAP, *CHART_FILES) if (options.out / name).exists()]
     return [*lines, f"in {options.out}: {' '.join(files)}"]
+
+
+def _origin_line(origin: Dict[str, Any]) -> str:
+    place = "origin: {latitude:.7f}, {longitude:.7f}, azimuth {azimuth:.2f}".format(**origin)
+    if not origin["fixes"]:
+        return place
+    told = "; deviations {deviation:.2f} m and {azimuth_deviation:.2f} degrees, by {fixes} fixes, {outliers} left out"
+    return place + told.format(**origin) + (f"; {origin['note']}" if origin["note"] else "")
 
 
 def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Mission:
@@ -78,20 +91,52 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
         uncertainty=None if findings is None else findings.trust.uncertainty,
         errors=errors,
         further=run.further,
+        origin=run.stored.origin,
+        is_doubtful=findings is not None and any(not cause.is_mended for cause in findings.trust.causes),
     )
 
 
 def _facts(mapped: MappedBag) -> Dict[str, str]:
     recording, run, odometry = mapped.recording, mapped.run, mapped.odometry
     length, counts = float(np.hypot(*np.diff(run.best[:, :2], axis=0).T).sum()), run.counts
+    origin = run.stored.origin
     return {
+        "date": _date(recording.beams[0].beam.stamp_ns * 1e-9),
+        "place": "not told; N? is north if headings count from east" if origin is None else str(origin),
+        "depth": _depth(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])),
+        "accuracy": _accuracy(mapped),
+        "distance travelled": f"{length:.0f} m",
         "duration": f"{recording.seconds / 60.0:.1f} minutes",
         "odometry": f"{odometry.name}, because {odometry.reason}",
-        "way": f"{length:.0f} m",
         "beams": f"{len(recording.beams)}, and {recording.unplaced} that could not be placed",
         "scans": f"{counts['scans']}: {counts['matched']} matched, {counts['rejected']} rejected",
         "map": f"{counted(counts['blocks'], 'block')}, cells of {run.blocks.resolution:g} m",
     }
+
+
+def _date(time: float) -> str:
+    """Return the day and minute; a clock that was never set, or a simulated one, counts from 1970."""
+    begin = datetime.fromtimestamp(time, timezone.utc)
+    return begin.strftime("%Y-%m-%d %H:%M UTC") if begin.year >= _FIRST_YEAR else "not recorded"
+
+
+def _depth(heights: np.ndarray) -> str:
+    """Return between which depths nearly all beams were taken; heights: (n,) m, of the sonar."""
+    shallow, deep = -np.percentile(heights, [95.0, 5.0]) + 0.0
+    return f"{shallow:.1f} to {deep:.1f} m" if np.ptp(heights) > 0.0 else "not recorded"
+
+
+def _accuracy(mapped: MappedBag) -> str:
+    """Return within what the position is known with 95 % along the whole path, in the map and on the Earth."""
+    run, trust, origin = mapped.run, mapped.run.trust, mapped.run.stored.origin
+    if trust is None or not is_told(trust.verdicts, trust.matched):
+        return "nothing can be said of it"
+    told = f"within {WITHIN * trust.deviations.max():.1f} m in the map"
+    if origin is None or not origin.covariance.any():
+        return told
+    places = positions_at(run.times, run.best, trust.times)
+    both = np.trace(trust.covariances + origin.covariances(places), axis1=1, axis2=2)
+    return f"{told}, within {WITHIN * np.sqrt(both.max()):.1f} m on the Earth"
 
 
 def _scan_records(mapped: MappedBag) -> List[ScanRecord]:

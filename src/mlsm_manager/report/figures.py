@@ -2,14 +2,15 @@
 
 import base64
 from io import BytesIO
-from typing import Tuple
+from typing import Optional
 
 import numpy as np
 import plotly.graph_objects as go
 from PIL import Image
 
+from mlsm_manager.report.compass_rose import north, north_label, scale_bar
 from mlsm_manager.report.mission import Mission, Path, Uncertainty
-from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.ridges import counts, ridges
 
 SCAN_TRACE = "scan at the chosen time"
 VEHICLE_TRACE = "vehicle at the chosen time"
@@ -20,44 +21,60 @@ _DOUBT = "#cc3377"
 _SCAN = "#e07b00"
 _LEAST_EXTENT = 0.08  # of the longest side: keeps a flat map from being a line
 _FULL_VIEW = 2.0  # plotly's unit of length: the longest side then fills the view
-_MOST_PIXELS = 4000  # of a side: more makes browsers slow; beyond it several cells share a pixel
-_COLOR = (150, 40, 30)
-_FAINTEST = 0.35  # opacity of a cell with one point: still seen on white
+_WALL, _POINTS = "#8c2318", (150, 40, 30)
+_FAINTEST, _STRONGEST = 0.12, 0.35  # opacity of cells with one and with many points, behind the walls
+_INK = "#333333"
 
 
 def map_from_above(mission: Mission) -> go.Figure:
     """Return the map with all paths; the last two traces are filled by the slider."""
     figure = go.Figure()
     if len(mission.blocks):
-        url, (left, bottom), (right, top) = _map_image(mission.blocks)
-        figure.add_layout_image(
-            source=url, xref="x", yref="y", x=left, y=top, sizex=right - left, sizey=top - bottom,
-            sizing="stretch", layer="below",
-        )  # fmt: skip
-        _add_line(figure, [left, right], [bottom, top], "", "rgba(0,0,0,0)", hidden=True)
+        _add_map(figure, mission)
     for path in [*mission.paths, *mission.further]:
         shown = thinned(path)
         _add_line(figure, shown.poses[:, 0], shown.poses[:, 1], path.name, path.color)
     if mission.uncertainty is not None:
         _add_uncertainty(figure, mission.best, mission.uncertainty)
-    figure.add_trace(go.Scattergl(x=[], y=[], mode="markers", name=SCAN_TRACE, marker={"color": _SCAN, "size": 4}))
+    figure.add_trace(go.Scatter(x=[], y=[], mode="markers", name=SCAN_TRACE, marker={"color": _SCAN, "size": 4}))
     figure.add_trace(
         go.Scatter(
             x=[], y=[], mode="markers", name=VEHICLE_TRACE,
             marker={"color": _SCAN, "size": 12, "symbol": "circle-open", "line": {"width": 3}},
         )
     )  # fmt: skip
-    figure.update_xaxes(title="x [m]")
-    figure.update_yaxes(title="y [m]", scaleanchor="x")
-    return _laid_out(figure, 650)
+    figure.update_xaxes(title="x [m]", showgrid=False, zeroline=False, ticks="outside")
+    figure.update_yaxes(title="y [m]", showgrid=False, zeroline=False, ticks="outside", scaleanchor="x")
+    return _laid_out(figure, None).update_layout(margin={"r": 50})
+
+
+def _add_map(figure: go.Figure, mission: Mission) -> None:
+    """Add the map's points faintly, its surfaces as lines, and what tells scale and north."""
+    numbers, low, side = counts(mission.blocks)
+    (left, bottom), (right, top) = low * side, (low + numbers.shape[::-1]) * side
+    figure.add_layout_image(
+        source=_data_url(_drawn(numbers[::-1])), xref="x", yref="y", x=left, y=top, sizex=right - left,
+        sizey=top - bottom, sizing="stretch", layer="below",
+    )  # fmt: skip
+    lines = np.pad(ridges(mission.blocks), ((0, 0), (0, 1), (0, 0)), mode="constant", constant_values=np.nan)
+    _add_line(figure, *lines.reshape(-1, 2).T.astype(np.float32), "surfaces", _WALL)
+    _add_line(figure, np.array([left, right]), np.array([bottom, top]), "", "rgba(0,0,0,0)", hidden=True)
+    bar = scale_bar(right - left)
+    figure.add_shape(type="line", x0=left, x1=left + bar, y0=bottom, y1=bottom, line={"color": _INK, "width": 4})
+    font, ahead = {"color": _INK, "size": 13}, north(mission.origin)
+    figure.add_annotation(x=left + bar / 2.0, y=bottom, text=f"{bar:g} m", yanchor="bottom", showarrow=False, font=font)
+    figure.add_annotation(
+        text=north_label(mission.origin), xref="paper", yref="paper", x=1.0, y=0.97, xshift=14, ax=-46.0 * ahead[0],
+        ay=46.0 * ahead[1], arrowhead=2, arrowwidth=2.5, arrowcolor=_INK, showarrow=True, font=font,
+    )  # fmt: skip
 
 
 def map_in_3d(mission: Mission) -> go.Figure:
-    """Return the blocks as points at their means, and the best path at their median height."""
+    """Return the blocks, which are not flat, as points at their means, and the best path at their median height."""
     step = max(1, -(-len(mission.blocks) // _MOST_BLOCKS))
     blocks = mission.blocks.take(np.arange(0, len(mission.blocks), step))
     mean = blocks.mean.astype(np.float32)
-    figure = go.Figure(_blocks_in_3d(blocks, mean, "map" if step == 1 else f"map, one block of {step}"))
+    figure = go.Figure(_blocks_in_3d(mean, "map" if step == 1 else f"map, one block of {step}"))
     path = thinned(mission.best)
     height = np.full(len(path.times), float(np.median(mean[:, 2])) if len(mean) else 0.0, dtype=np.float32)
     figure.add_trace(
@@ -76,13 +93,12 @@ def map_in_3d(mission: Mission) -> go.Figure:
     return _laid_out(figure, 600)
 
 
-def _blocks_in_3d(blocks: Blocks, mean: np.ndarray, name: str) -> go.Scatter3d:
-    """Return blocks at their means (n, 4), in the colour of their height or, in a flat map, of their points' number."""
-    flat = not len(mean) or np.ptp(mean[:, 2]) < blocks.resolution
-    shade, legend = (np.log10(blocks.count), "points, log10") if flat else (mean[:, 2], "z [m]")
+def _blocks_in_3d(mean: np.ndarray, name: str) -> go.Scatter3d:
+    """Return blocks at their means (n, 4), in the colour of their height."""
+    bar = {"title": "z [m]", "thickness": 14, "len": 0.6}
     return go.Scatter3d(
         x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
-        marker={"size": 1.5, "color": shade.astype(np.float32), "colorscale": "Turbo", "colorbar": {"title": legend}},
+        marker={"size": 1.5, "color": mean[:, 2], "colorscale": "Turbo", "colorbar": bar},
     )  # fmt: skip
 
 
@@ -144,34 +160,20 @@ def _add_line(
     )
 
 
-def _laid_out(figure: go.Figure, height: int) -> go.Figure:
+def _laid_out(figure: go.Figure, height: Optional[int]) -> go.Figure:
+    """Return the figure in the page's style; without a height it fills what holds it."""
     return figure.update_layout(
         template="plotly_white", height=height, margin={"l": 60, "r": 20, "t": 20, "b": 50},
-        legend={"orientation": "h", "y": -0.15},
+        legend={"orientation": "h", "y": -0.12 if height is None else -0.25, "yanchor": "top"},
     )  # fmt: skip
-
-
-def _map_image(blocks: Blocks) -> Tuple[str, np.ndarray, np.ndarray]:
-    """Return a PNG as a data URL of a map that has at least one block, and x y [m] of its lower left and upper right
-    corner; a pixel is a cell, and cells with more points are darker.
-    """
-    cells = blocks.cells
-    first = cells.min(axis=0)
-    side = -(-int((cells.max(axis=0) - first).max() + 1) // _MOST_PIXELS)
-    pixels = (cells - first) // side
-    width, height = pixels.max(axis=0) + 1
-    points = np.zeros((height, width))
-    np.add.at(points, (height - 1 - pixels[:, 1], pixels[:, 0]), blocks.count)
-    low = first * blocks.resolution
-    return _data_url(_drawn(points)), low, low + np.array([width, height]) * side * blocks.resolution
 
 
 def _drawn(points: np.ndarray) -> Image.Image:
     """Return a picture of numbers of points (h, w), transparent where there are none."""
     image = np.empty((*points.shape, 4), dtype=np.uint8)
-    image[..., :3] = _COLOR
+    image[..., :3] = _POINTS
     share = np.log1p(points) / max(np.log1p(np.percentile(points[points > 0], 95)), 1e-9)
-    opacity = np.clip(_FAINTEST + (1.0 - _FAINTEST) * share, 0.0, 1.0)
+    opacity = _FAINTEST + (_STRONGEST - _FAINTEST) * np.minimum(share, 1.0)
     image[..., 3] = np.where(points > 0, 255.0 * opacity, 0.0)
     return Image.fromarray(image, "RGBA")
 

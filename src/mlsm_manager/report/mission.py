@@ -5,6 +5,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
+from georeferencing.origin import Origin
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 
@@ -76,7 +77,8 @@ class Mission:
     title: names of the recordings. headline: whether the run can be trusted. paths: the first is the odometry, the last
     one the best. scans: oldest first, at least one. verdicts: of all checks; none where none was made.
     calibration: name -> (value, deviation). facts: name -> value, for the head of the page. parameters: name -> value.
-    further: ways of further recordings, which are shown in the map only.
+    further: ways of further recordings, which are shown in the map only. origin: where the map lies, if that is known.
+    is_doubtful: whether something is wrong by other signs than the checks.
     """
 
     title: str
@@ -91,6 +93,8 @@ class Mission:
     uncertainty: Optional[Uncertainty] = None
     errors: Dict[str, Dict[str, float]] = field(default_factory=dict)
     further: Sequence[Path] = ()
+    origin: Optional[Origin] = None
+    is_doubtful: bool = False
 
     @property
     def best(self) -> Path:

@@ -22,7 +22,7 @@ from mlsm_manager.report.figures import (
     sensor_health,
 )
 from mlsm_manager.report.mission import Mission
-from mlsm_manager.report.page_template import PAGE
+from mlsm_manager.report.page_template import PAGE, SOLID
 from mlsm_manager.self_check.verdict import Answer, Verdict
 from node_support.files import write_whole
 
@@ -77,6 +77,7 @@ _QUANTITIES = {
         "to the right of what the odometry says",
     ),
 }  # fmt: skip
+_CHECK_HEAD = ("", "question", "what was found", "")
 _LIGHT_COLORS = {Light.GREEN: "#2e8540", Light.AMBER: "#e0a526", Light.RED: "#c0392b", Light.GREY: "#999999"}
 
 
@@ -88,7 +89,7 @@ def write_report(path: Path, mission: Mission) -> None:
 def report_page(mission: Mission) -> str:
     """Return the page; it needs no other file and no network."""
     lights = [light_of(verdict) for verdict in mission.verdicts]
-    of_run = light_of_run(lights)
+    of_run = Light.RED if mission.is_doubtful else light_of_run(lights)
     checks = [(_lamp(light), escape(verdict.question or verdict.name), escape(sentence(verdict)), light.value)
               for verdict, light in zip(mission.verdicts, lights)]  # fmt: skip
     return Template(PAGE).substitute(
@@ -96,10 +97,10 @@ def report_page(mission: Mission) -> str:
         plotly=get_plotlyjs(),
         summary=f"{_lamp(of_run)} {escape(mission.headline)}",
         facts=_table(("", ""), _words(mission.facts)),
-        checks=_table(("", "question", "what was found", ""), checks) if checks else "<p>No checks were made.</p>",
+        checks=_table(_CHECK_HEAD, checks, "checks") if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
         above=_figure(map_from_above(mission), "above"),
-        solid=_figure(map_in_3d(mission), "solid"),
+        solid="" if mission.blocks.is_flat else SOLID.replace("$figure", _figure(map_in_3d(mission), "solid")),
         correction=_figure(correction_over_time(mission), "correction"),
         health=_figure(sensor_health(mission), "health"),
         calibration=_calibration(mission),
@@ -113,7 +114,8 @@ def report_page(mission: Mission) -> str:
 
 
 def _figure(figure: Figure, identity: str) -> str:
-    return figure.to_html(include_plotlyjs=False, full_html=False, div_id=identity, config={"displaylogo": False})
+    config = {"displaylogo": False, "responsive": True}
+    return figure.to_html(include_plotlyjs=False, full_html=False, div_id=identity, config=config)
 
 
 def _lamp(light: Light) -> str:
@@ -149,11 +151,11 @@ def _words(values: Mapping[str, object]) -> List[Tuple[str, str]]:
     return [(escape(name), escape(str(value))) for name, value in values.items()]
 
 
-def _table(head: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
+def _table(head: Sequence[str], rows: Iterable[Sequence[str]], style: str = "") -> str:
     """Return a table of cells that are HTML already."""
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
-    return f"<table><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>"
+    return f'<table class="{style}"><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>'
 
 
 def light_of(verdict: Verdict) -> Light:

@@ -8,28 +8,45 @@ PAGE = """<!DOCTYPE html>
 <link rel="icon" href="data:,">
 <title>$title</title>
 <style>
-body { font-family: system-ui, sans-serif; margin: 1.5em auto; max-width: 1200px; padding: 0 1em; color: #222; }
-h1 { font-size: 1.5em; } h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ddd; }
+body { font-family: system-ui, sans-serif; margin: 0.8em auto; max-width: 1360px; padding: 0 1em; color: #222; }
+h1 { font-size: 1.5em; margin: 0.3em 0; overflow-wrap: anywhere; }
+h2 { font-size: 1.15em; margin-top: 2em; border-bottom: 1px solid #ddd; }
 table { border-collapse: collapse; margin: 0.5em 0; } th { text-align: left; }
 td, th { padding: 0.15em 1em 0.15em 0; vertical-align: top; }
 td { font-variant-numeric: tabular-nums; }
 .lamp { display: inline-block; width: 0.9em; height: 0.9em; border-radius: 50%; vertical-align: -0.1em; }
-.summary { font-size: 1.2em; }
+.summary { font-size: 1.2em; margin: 0.3em 0; }
+.head { display: grid; grid-template-columns: minmax(0, 1fr) 21em; gap: 1.5em; }
+.above { height: min(74vh, 700px); } .above > div { height: 100%; }
 #time { width: 100%; }
 #above image { image-rendering: pixelated; }
+.printed { display: none; max-width: 100%; }
+@media (max-width: 800px) {
+  .head { display: block; } .above { height: 105vw; }
+  .checks thead { display: none; } .checks td { display: inline; padding: 0 0.4em 0 0; }
+  .checks td:nth-child(2) { font-weight: 600; } .checks td:nth-child(3) { display: block; margin: 0 0 0.9em 1.3em; }
+  .checks td:nth-child(4) { display: none; }
+}
+@media print {
+  .head { display: block; } .above { height: auto; } .turning, .slider, .modebar-container { display: none; }
+  .printed { display: block; } h2 { break-after: avoid; } tr, .plotly-graph-div { break-inside: avoid; }
+}
 </style>
 <script>$plotly</script>
 </head>
 <body>
 <h1>$title</h1>
 <p class="summary">$summary</p>
-$facts
-$errors
-<h2>Map and path from above</h2>
-<p><label for="time">Scan:</label> <output id="told"></output></p>
+<div class="head">
+<div>
+<div class="above">$above</div>
+<div class="slider">
+<label for="time">Scan:</label> <output id="told"></output>
 <input id="time" type="range" min="0" max="$last_scan" value="0" step="1">
-$above
-<h2>Map in 3-D</h2>
+</div>
+</div>
+<div>$facts $errors</div>
+</div>
 $solid
 <h2>Odometry and correction</h2>
 $correction
@@ -68,10 +85,31 @@ $health
     Plotly.restyle(plot, {x: [x, [scan.vehicle[0]]], y: [y, [scan.vehicle[1]]]},
       [traceNamed("$scan_trace"), traceNamed("$vehicle_trace")]);
   }
+  // Browsers print no WebGL: a picture of the 3-D view stands in its place.
+  function picture() {
+    var solid = document.getElementById("solid"), printed = document.querySelector(".printed");
+    if (!solid) return;
+    var farther = Math.max(1, 1.1 * solid.clientHeight / solid.clientWidth), eye = solid.layout.scene.camera.eye;
+    Plotly.relayout(solid, {"scene.camera.eye": {x: farther * eye.x, y: farther * eye.y, z: farther * eye.z}}).then(
+      function () { return Plotly.toImage(solid, {format: "png", width: 1000, height: 600}); }).then(
+      function (url) { printed.src = url; });
+  }
+  // Figures do not shrink to the paper by themselves.
+  function sized(change) {
+    document.querySelectorAll(".plotly-graph-div").forEach(function (one) { Plotly.relayout(one, change); });
+  }
+  window.addEventListener("beforeprint", function () { sized({autosize: false, width: 690}); });
+  window.addEventListener("afterprint", function () { sized({autosize: true, width: null}); });
   slider.addEventListener("input", show);
   window.addEventListener("load", show);
+  window.addEventListener("load", picture);
 })();
 </script>
 </body>
 </html>
+"""
+
+SOLID = """<h2>Map in 3-D</h2>
+<div class="turning">$figure</div>
+<img class="printed" alt="The map in 3-D">
 """

@@ -20,6 +20,7 @@ from mlsm_manager.localisation.updates import (
     report_turn,
     report_verdicts,
 )
+from mlsm_manager.ros.chart_position import ChartPosition
 from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform, planar_pose
 from mlsm_manager.ros.map_marks import MapMarks
 from mlsm_manager.ros.map_publisher import MapPublisher
@@ -67,7 +68,12 @@ class MlsmCore:
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
-        self.status = StatusTeller(self._localiser, self._odometry, self._transform, parameters.map_frame, self.health)
+        chart = ChartPosition(
+            parameters.asked_origin, self._localiser, self._odometry, parameters.base_frame, self.health
+        )
+        self.status = StatusTeller(
+            self._localiser, self._odometry, self._transform, chart, parameters.map_frame, self.health
+        )
         # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
         found = guarded(self.health, self._publish_found)
         self._services = MapServices(namespace, self._localiser, parameters, marks, self._after_replacing, found)

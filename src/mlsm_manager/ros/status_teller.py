@@ -11,6 +11,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state, report_place
 from mlsm_manager.localisation.updates import report_causes
+from mlsm_manager.ros.chart_position import ChartPosition
 from mlsm_manager.ros.fix_publisher import MapTransform, pose_covariance
 from mlsm_manager.ros.odometry_track import OdometryTrack, planar
 from mlsm_manager.self_check.verdict import Verdict
@@ -49,7 +50,8 @@ class StatusTeller:
     """
 
     def __init__(
-        self, localiser: Localiser, odometry: OdometryTrack, transform: MapTransform, map_frame: str, health: Health
+        self, localiser: Localiser, odometry: OdometryTrack, transform: MapTransform, chart: ChartPosition,
+        map_frame: str, health: Health,
     ) -> None:  # fmt: skip
         self.verdicts: Sequence[Verdict] = ()
         """What the run says of itself."""
@@ -57,6 +59,7 @@ class StatusTeller:
         self.stages_before: Sequence[Health] = ()
         """Of the same process, whose inputs must come too."""
         self._localiser, self._odometry, self._transform = localiser, odometry, transform
+        self._chart = chart
         self._health, self._map_frame = health, map_frame
         self._status = rospy.Publisher(topics.POSITION_STATUS, PositionStatus, queue_size=10, latch=True)
         self._pose = rospy.Publisher(topics.POSE_NOW, PoseWithCovarianceStamped, queue_size=2)
@@ -111,6 +114,7 @@ class StatusTeller:
             told = PoseWithCovarianceStamped(header=status.header)
             told.pose.pose, told.pose.covariance = pose_from_matrix(T_map_base), pose_covariance(place.covariance)
             self._pose.publish(told)
+            self._chart.tell(place, planar(T_map_base), state)
         if self._markers.get_num_connections():
             made = _Maker(self._map_frame, T_map_base[:3, 3], self._letter or _MOST)
             self._markers.publish(MarkerArray(status_markers(made, status, T_map_base[:2, 0])))

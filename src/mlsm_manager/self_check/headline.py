@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Answer, Verdict, counted
 
-_WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
+WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
 FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds
 
 
@@ -23,7 +23,7 @@ def headline(
     """
     by_answer = {answer: [one for one in verdicts if one.answer is answer] for answer in Answer}
     doubtful, missing = by_answer[Answer.DOUBTFUL], by_answer[Answer.NOT_MEASURED]
-    within = f"position within {_WITHIN * deviation:.1f} m"
+    within = f"position within {WITHIN * deviation:.1f} m"
     wrong = [cause.line(begin) for cause in causes if not cause.is_mended]
     mended = "".join(f"; mended: {cause.line(begin)}" for cause in causes if cause.is_mended)
     if wrong or doubtful:
@@ -39,3 +39,9 @@ def headline(
         fine = f"{count} of {len(verdicts)} checks are fine, NOT MEASURED: {names}"
         return f"trust: {fine}; {within} if these are fine too{mended}"
     return f"trust: all {len(verdicts)} checks are fine, nothing contradicts: {within}{mended}"
+
+
+def is_told(verdicts: Sequence[Verdict], matched: int) -> bool:
+    """Return whether the checks of a run say anything of the position."""
+    answers = {verdict.answer for verdict in verdicts}
+    return Answer.DOUBTFUL in answers or (Answer.FINE in answers and matched >= FEWEST_MATCHED)

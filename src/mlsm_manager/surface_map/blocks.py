@@ -101,6 +101,11 @@ class Blocks:
         """(n, 2) x y of each block's cell centre, m."""
         return (self.cells + 0.5) * self.resolution
 
+    @property
+    def is_flat(self) -> bool:
+        """Whether heights tell nothing: all points are within one cell's side in z, as where a sonar scans level."""
+        return not len(self) or float(self.height.max() - self.bottom.min()) < self.resolution
+
     def take(self, chosen: np.ndarray) -> "Blocks":
         """Return the blocks at `chosen`, a mask (n,) or indices (k,)."""
         return Blocks(self.rows[chosen], self.resolution, self.crossed[chosen])

@@ -9,10 +9,11 @@ bytes.
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Any, Dict, Mapping, Sequence
+from typing import Any, Dict, Mapping, Optional, Sequence
 
 import numpy as np
 
+from georeferencing.origin import STORED, Origin
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks
 from mlsm_manager.surface_map.cell_index import cell_keys
@@ -68,6 +69,11 @@ class StoredMap:
     def __len__(self) -> int:
         """Return the number of blocks that are occupied."""
         return sum(len(blocks) for layer, blocks in self.layers.items() if layer is not Layer.FREE)
+
+    @property
+    def origin(self) -> Optional[Origin]:
+        """Where the map lies on the Earth; None where that is not known. Raises RefusedInput for a damaged one."""
+        return Origin.of_array(self.arrays[STORED]) if STORED in self.arrays else None
 
     @property
     def shown(self) -> Blocks:

@@ -6,10 +6,11 @@ Sources: common.xml of MAVLink (ATTITUDE, LOCAL_POSITION_NED, VFR_HUD); ArduPilo
 from collections import Counter
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Dict, Iterator, List, NamedTuple, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
+from georeferencing.fixes import UNKNOWN_DEVIATION, Fix
 from node_support.geometry import pose_matrix, quaternion_of
 from recordings.bags.bag import RecordingError
 from recordings.motion.frame_tree import FrameTree
@@ -37,7 +38,7 @@ _POSITIONS = {
     "NKF1": _Fields(("PN", "PE", "PD"), core="C"),
 }
 _DEPTHS = {"VFR_HUD": _Fields(("alt",), -1.0), "CTUN": _Fields(("Alt",), -1.0)}
-_FIXES = ("GPS_RAW_INT", "GPS")
+_FIXES, _FIX_3D = ("GPS_RAW_INT", "GPS"), 3
 _KINDS = {**_ATTITUDES, **_POSITIONS, **_DEPTHS}
 
 
@@ -75,9 +76,22 @@ def motion_of_autopilot(path: Path, names: MotionNames) -> Motion:
     track = PoseTrack.sorted_from(np.round(times * 1e9).astype(np.int64), places, turns).turned_up()
     source = MotionSource.HEADING if kind in _DEPTHS or not kind else MotionSource.POSES
     known = f", positions of {kind}" if source is MotionSource.POSES else f", depth of {kind}" if kind else ""
-    unused = f"; {fixes} GPS fixes are not used" if fixes else ""
+    unused = f"; {fixes} GPS fixes, for map_bag --origin fixes" if fixes else ""
     note = f"{source.value} from {path.name}: {len(track)} attitudes{known}{unused}"
     return Motion(linked(FrameTree(), replace(names, z_is_down=False), track), source, [note])
+
+
+def fixes_of_autopilot(path: Path) -> List[Fix]:
+    """Return the fixes of satellites in a log, three-dimensional ones only. Raises RecordingError."""
+    fixes = []
+    for message in _messages(path, _FIXES):
+        if getattr(message, "fix_type", getattr(message, "Status", 0)) < _FIX_3D:
+            continue
+        degrees = (message.lat * 1e-7, message.lon * 1e-7) if hasattr(message, "lat") else (message.Lat, message.Lng)
+        # A receiver that does not tell its accuracy [mm] sends 0, or has no such field.
+        deviation = getattr(message, "h_acc", 0) * 1e-3 or UNKNOWN_DEVIATION
+        fixes.append(Fix(message._timestamp, *degrees, (deviation, deviation)))
+    return sorted(fixes)
 
 
 def _places(rows: Dict[str, _Rows], times: np.ndarray) -> Tuple[str, np.ndarray]:
@@ -99,10 +113,10 @@ def _rows(path: Path) -> Tuple[Dict[str, _Rows], int]:
     """Return the messages of the vehicle with most attitudes by type, and how many GPS fixes there are."""
     vehicles: Dict[int, Dict[str, _Rows]] = {}
     fixes = 0
-    for message in _messages(path):
+    for message in _messages(path, (*_KINDS, *_FIXES)):
         kind = message.get_type()
         if kind in _FIXES:
-            fixes += getattr(message, "fix_type", getattr(message, "Status", 0)) >= 3
+            fixes += getattr(message, "fix_type", getattr(message, "Status", 0)) >= _FIX_3D
             continue
         fields = _KINDS[kind]
         values = [fields.factor * getattr(message, name, np.nan) for name in fields.names]
@@ -116,8 +130,8 @@ def _rows(path: Path) -> Tuple[Dict[str, _Rows], int]:
     return (vehicles[counts.most_common(1)[0][0]] if vehicles else {}), fixes
 
 
-def _messages(path: Path) -> Iterator[Any]:
-    """Yield the messages that are read here. Raises RecordingError."""
+def _messages(path: Path, kinds: Sequence[str]) -> Iterator[Any]:
+    """Yield the messages of some types. Raises RecordingError."""
     try:
         from pymavlink import mavutil
     except ImportError:
@@ -129,10 +143,9 @@ def _messages(path: Path) -> Iterator[Any]:
         raise RecordingError(f"{path}: {error.strerror or error}") from None
     except Exception as error:  # pymavlink raises almost anything for a damaged index
         raise RecordingError(f"{path}: not a log of an autopilot, or damaged: {error}") from None
-    wanted = [*_KINDS, *_FIXES]
     try:
         while True:
-            message = log.recv_match(type=wanted)
+            message = log.recv_match(type=list(kinds))
             if message is None:
                 return
             yield message

@@ -1,5 +1,6 @@
 """The ROS side of web_page: beams, fixes, map and diagnostics in; marks out; the rest goes to browsers."""
 
+import time
 from typing import List, Optional
 
 import numpy as np
@@ -9,6 +10,7 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
+from georeferencing.asked import AskedOrigin
 from georeferencing.marks import marks_geojson
 from georeferencing.origin import EAST_DEG, Origin
 from node_support import topics
@@ -153,6 +155,7 @@ class WebPage:
 
 def _origin(parameters: WebPageParameters) -> Optional[Origin]:
     try:
-        return Origin.parsed(parameters.origin) if parameters.origin else None
+        asked = AskedOrigin.parsed(parameters.origin) if parameters.origin else None
+        return None if asked is None or asked.place is None else asked.origin(time.time())
     except RefusedInput as refused:
         raise ParameterError(f"origin = {refused}") from None

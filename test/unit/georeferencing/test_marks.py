@@ -13,7 +13,7 @@ BLOCK = Mark('mooring "block" ⚓', 100.0, 0.0, -3.0)
 
 
 def test_with_an_origin_marks_have_longitude_and_latitude():
-    file = json.loads(marks_geojson([BLOCK], Origin.parsed("41.0, 3.0")))
+    file = json.loads(marks_geojson([BLOCK], Origin(41.0, 3.0)))
     longitude, latitude = file["features"][0]["geometry"]["coordinates"]
     assert latitude == pytest.approx(41.0, abs=1e-5)
     # 100 m east; a degree has 84 km there.
@@ -29,7 +29,7 @@ def test_without_an_origin_they_are_in_metres_and_the_file_says_so():
 
 
 def test_no_marks_are_a_file_too():
-    assert json.loads(marks_geojson([], Origin.parsed("41.0, 3.0")))["features"] == []
+    assert json.loads(marks_geojson([], Origin(41.0, 3.0)))["features"] == []
 
 
 def test_a_name_stands_for_one_place():

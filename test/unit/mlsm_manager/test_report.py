@@ -103,5 +103,6 @@ class TestPage:
     def test_a_map_of_300000_blocks_stays_below_15_megabytes(self, page_of):
         assert len(page_of(mission(block_count=300_000, scans=300)).encode()) < MOST_BYTES
 
-    def test_a_map_without_blocks_makes_a_page(self, page_of):
-        assert "Map in 3-D" in page_of(mission(block_count=0))
+    @pytest.mark.parametrize(("block_count", "has_height"), [(1000, True), (1, False), (0, False)])
+    def test_only_a_map_with_height_is_shown_in_3d(self, page_of, block_count, has_height):
+        assert ("Map in 3-D" in page_of(mission(block_count=block_count))) is has_height

@@ -10,6 +10,10 @@ import pytest
 from made_harbour import SONAR_IN_BASE, tour, with_wild_odometry
 from made_maps import blocks_of
 
+from georeferencing.asked import AskedOrigin
+from georeferencing.origin import STORED as STORED_ORIGIN
+from georeferencing.origin import Origin
+from mlsm_manager.offline.charts import origin_of_fixes
 from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth, scans_of
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, replay
@@ -18,8 +22,11 @@ from mlsm_manager.offline.run_files import Run, errors_of, position_error, write
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.verdict import Answer, Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
+from node_support.errors import RefusedInput
 from node_support.geometry import composed, matrices
 from recordings.bags.bag import RecordingError
+from recordings.bags.bag_writer import BagWriter
+from recordings.satellite_fixes import satellite_fixes
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
@@ -37,6 +44,45 @@ def test_the_table_has_time_and_pose_of_every_trajectory(tmp_path):
     header, first = (tmp_path / "trajectory.csv").read_text().splitlines()[:2]
     assert header == "time,odometry_x,odometry_y,odometry_yaw,corrected_x,corrected_y,corrected_yaw"
     np.testing.assert_allclose(np.array(first.split(","), dtype=float), [0, 0, 0, -2.2832, 0, 0.5, -2.2832])
+
+
+def test_with_an_origin_the_table_has_latitude_and_longitude_of_the_best_trajectory(tmp_path):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    origin = Origin(41.2, 3.1)
+    write_trajectory(tmp_path / "trajectory.csv", RUN.times, RUN.poses, origin)
+    header, *rows = (tmp_path / "trajectory.csv").read_text().splitlines()
+    assert header.endswith("corrected_yaw,latitude,longitude")
+    table = np.array([row.split(",") for row in rows], dtype=float)
+    np.testing.assert_allclose(table[:, -2:], origin.degrees(RUN.best), atol=1e-8)
+
+
+def test_a_map_on_the_chart_has_a_graticule_in_its_picture(tmp_path):
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    stored = replace(STORED, arrays={STORED_ORIGIN: Origin(41.2, 3.1, 60.0).array})
+    write_run(tmp_path, "a bag", replace(RUN, stored=stored), Recording([], 0, TRACK, None))
+    picture = matplotlib.image.imread(str(tmp_path / "map.png"))[..., :3]
+    assert np.isclose(picture, matplotlib.colors.to_rgb("#5b7fa6"), atol=0.02).all(axis=2).any()
+    assert read_map(tmp_path / "map.mlsm").origin == Origin(41.2, 3.1, 60.0)
+
+
+def test_fixes_in_a_bag_put_a_run_on_the_chart(tmp_path):
+    """A fix of after the run, and one of a receiver that has none, do not count."""
+    pytest.importorskip("pyproj", reason="pyproj is not installed")
+    truth = Origin(41.2, 3.1)
+    with BagWriter(tmp_path / "dive.bag") as bag:
+        for time, status in ((0, 0), (1, 0), (2, 0), (3, -1), (9, 0)):
+            message = bag.make("sensor_msgs/NavSatFix")
+            message.header.stamp = bag.time(time * 10**9)
+            message.status.status = status
+            ((message.latitude, message.longitude),) = truth.degrees([[float(time), 0.0]])
+            bag.write("/gps/fix", message, time * 10**9)
+    fixes = satellite_fixes(tmp_path / "dive.bag")
+    assert [fix.time for fix in fixes] == [0.0, 1.0, 2.0, 9.0]
+    found = origin_of_fixes(RUN, fixes, AskedOrigin(None))
+    np.testing.assert_allclose(truth.points(found.origin.degrees([[0.0, 0.5]])), [[0.0, 0.0]], atol=0.01)
+    assert (found.used, found.outliers) == (3, 0)
+    with pytest.raises(RefusedInput, match="1 fixes of satellites, none while the odometry is known"):
+        origin_of_fixes(RUN, fixes[-1:], AskedOrigin(None))
 
 
 def test_map_table_and_picture_are_written(tmp_path):

@@ -7,9 +7,10 @@ import numpy as np
 import pytest
 from made_recordings import wandering
 
+from georeferencing.fixes import UNKNOWN_DEVIATION, Fix
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
-from recordings.motion.autopilot_log import is_autopilot_log, motion_of_autopilot
+from recordings.motion.autopilot_log import fixes_of_autopilot, is_autopilot_log, motion_of_autopilot
 from recordings.motion.clock_offset import clock_offset
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
@@ -53,6 +54,9 @@ def telemetry(path, positions):
                 ours.attitude_encode(0, 0.0, 0.0, yaw, 0.0, 0.0, 0.0).pack(ours),
                 ours.local_position_ned_encode(0, *map(float, place), 0.0, 0.0, 0.0).pack(ours),
                 ours.vfr_hud_encode(0.0, 0.0, 0, 0, -float(place[2]), 0.0).pack(ours),
+                ours.gps_raw_int_encode(
+                    0, 3 if second < 2 else 1, 412000000 + second, -31000000, 0, 100, 100, 0, 0, 8, h_acc=1500 * second
+                ).pack(ours),
             ]
             messages += [other.attitude_encode(0, 0.0, 0.0, 3.0, 0.0, 0.0, 0.0).pack(other)] * (second == 5)
             for message in messages:
@@ -67,6 +71,9 @@ def test_telemetry_holds_poses_or_where_positions_stay_a_heading_and_a_depth(tmp
     telemetry(path, np.column_stack([north, 2.0 * north, np.full(20, 3.0)]))
     motion = motion_of_autopilot(path, MotionNames())
     assert motion.source is source
+    first, second = fixes_of_autopilot(path)
+    assert second == Fix(START + 1, pytest.approx(41.2000001, abs=1e-9), pytest.approx(-3.1), (1.5, 1.5))
+    assert first.deviations == (UNKNOWN_DEVIATION, UNKNOWN_DEVIATION)
     track = motion.tree.tracks[("odom", "base_link")]
     np.testing.assert_array_equal(track.stamps_ns, (START + np.arange(20)) * 10**9)
     np.testing.assert_allclose(track.translations, np.column_stack([north, -2.0 * north, np.full(20, -3.0)]), atol=1e-5)

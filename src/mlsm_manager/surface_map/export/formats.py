@@ -1,24 +1,21 @@
 """Maps in the formats of other programs: the ending of a file's name says which."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Callable, Dict
+from typing import Callable, Dict, Optional
 
 import numpy as np
 
+from georeferencing.origin import Origin
 from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.export.charts import write_geotiff
 from mlsm_manager.surface_map.export.octomap import write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, write_picture
-from mlsm_manager.surface_map.export.rasters import (
-    elevation,
-    occupancy,
-    write_ascii_grid,
-    write_geotiff,
-    write_map_server,
-)
+from mlsm_manager.surface_map.export.rasters import elevation, occupancy, write_ascii_grid, write_map_server
 from mlsm_manager.surface_map.map_file import ENDING, ExportError, Layer, StoredMap, write_map
 from node_support.files import whole_file, write_whole
 
+GEOTIFF = ".tif"
 _PLY_TYPES = {"f8": "double", "u4": "uint", "u1": "uchar"}
 
 
@@ -72,11 +69,15 @@ def write_pcd(path: Path, blocks: Blocks) -> None:
 
 @dataclass(frozen=True)
 class ExportOptions:
-    """low, high: m, of the slice that a 2-D occupancy grid shows. color_by: of a picture."""
+    """low, high: m, of the slice that a 2-D occupancy grid shows. color_by: of a picture. crs: of a GeoTIFF, such as
+    EPSG:25831; the one that suits where it is empty. origin: where the map lies, where that is known.
+    """
 
     low: float = -np.inf
     high: float = np.inf
     color_by: ColorBy = ColorBy.HEIGHT
+    crs: str = ""
+    origin: Optional[Origin] = None
 
 
 _Writer = Callable[[Path, Blocks, Blocks, ExportOptions], None]
@@ -88,7 +89,7 @@ _WRITERS: Dict[str, _Writer] = {
     ".pgm": lambda path, blocks, free, options: write_map_server(
         path, occupancy(blocks, free, options.low, options.high)
     ),
-    ".tif": lambda path, blocks, free, options: write_geotiff(path, elevation(blocks)),
+    GEOTIFF: lambda path, blocks, free, options: write_geotiff(path, blocks, options.origin, options.crs),
     ".asc": lambda path, blocks, free, options: write_ascii_grid(path, elevation(blocks)),
     ".png": lambda path, blocks, free, options: write_picture(path, blocks, free, options.color_by),
 }
@@ -110,4 +111,4 @@ def export(stored: StoredMap, path: Path, options: ExportOptions) -> None:
         raise ExportError("the map has no blocks")
     blocks = stored.shown
     free = stored.layers.get(Layer.FREE, Blocks.none(blocks.resolution))
-    _WRITERS[path.suffix](path, blocks, free, options)
+    _WRITERS[path.suffix](path, blocks, free, replace(options, origin=stored.origin))

@@ -39,6 +39,13 @@ class ColorBy(Enum):
     HEIGHT = "HEIGHT"
     STRENGTH = "STRENGTH"
     AGE = "AGE"
+    COUNT = "COUNT"
+
+
+_MEANINGS = {
+    ColorBy.HEIGHT: "highest point [m]", ColorBy.STRENGTH: "strength", ColorBy.AGE: "beams since it was heard",
+    ColorBy.COUNT: "points",
+}  # fmt: skip
 
 
 def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -> np.ndarray:
@@ -61,7 +68,10 @@ def color_limits(blocks: Blocks, by: ColorBy) -> Limits:
 
 
 def _values(blocks: Blocks, by: ColorBy) -> np.ndarray:
-    return {ColorBy.HEIGHT: blocks.height, ColorBy.STRENGTH: blocks.mean[:, 3], ColorBy.AGE: blocks.crossed}[by]
+    return {
+        ColorBy.HEIGHT: blocks.height, ColorBy.STRENGTH: blocks.mean[:, 3], ColorBy.AGE: blocks.crossed,
+        ColorBy.COUNT: blocks.count,
+    }[by]  # fmt: skip
 
 
 def ramp(shares: np.ndarray) -> np.ndarray:
@@ -71,11 +81,19 @@ def ramp(shares: np.ndarray) -> np.ndarray:
 
 
 def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = ColorBy.HEIGHT) -> None:
-    """Write a PNG of the highest block of each cell on what is free, north up; raises ExportError and OSError."""
+    """Write a PNG of the highest block of each cell on what is free, y up, with what its colours mean.
+
+    Where the map is flat, its heights are rounding, and the number of points is shown instead. Raises ExportError and
+    OSError.
+    """
     # matplotlib takes half a second and 40 MB: only who draws a picture shall pay for it.
     from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LinearSegmentedColormap, Normalize
     from matplotlib.figure import Figure
 
+    if color_by is ColorBy.HEIGHT and blocks.is_flat:
+        color_by = ColorBy.COUNT
     pixels, origin, resolution = _pixels(blocks, free, color_by)
     rows, columns = pixels.shape[:2]
     extent = (origin[0], origin[0] + columns * resolution, origin[1], origin[1] + rows * resolution)
@@ -84,6 +102,11 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = 
     axes = figure.add_subplot(1, 1, 1)
     axes.imshow(pixels, origin="lower", extent=extent, interpolation="nearest")
     axes.set(xlabel="x [m]", ylabel="y [m]")
+    if color_by is not ColorBy.TYPE:
+        colors = LinearSegmentedColormap.from_list("turbo", _RAMP)
+        shown = ScalarMappable(Normalize(*color_limits(blocks, color_by)), colors)
+        shown.set_array(np.empty(0))
+        figure.colorbar(shown, ax=axes, label=_MEANINGS[color_by], shrink=0.6)
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
     write_whole(path, picture.getvalue())

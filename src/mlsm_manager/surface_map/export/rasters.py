@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from io import BytesIO
 from pathlib import Path
-from typing import Any, Tuple
+from typing import Tuple
 
 import numpy as np
 import yaml
@@ -19,10 +19,6 @@ _GREY = {FREE: 254, UNKNOWN: 205, OCCUPIED: 0}
 """What map_server (trinary mode) takes for free, unknown and occupied given `_THRESHOLDS`."""
 _THRESHOLDS = {"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196}
 _NO_DATA = -9999.0
-_PIXEL_SCALE, _TIE_POINT, _GEO_KEYS, _GDAL_NO_DATA = 33550, 33922, 34735, 42113
-_DOUBLE, _SHORT, _ASCII = 12, 3, 2
-_LOCAL_GRID = (1, 1, 0, 2, 1024, 0, 1, 32767, 1025, 0, 1, 1)
-"""GeoTIFF 1.0: version; model type user-defined, for the map's frame is tied to no place; a pixel is an area."""
 
 
 @dataclass(frozen=True)
@@ -98,25 +94,3 @@ def write_ascii_grid(path: Path, raster: Raster) -> None:
     text = BytesIO()
     np.savetxt(text, np.where(np.isnan(raster.values), _NO_DATA, raster.values)[::-1], fmt="%.4f")
     write_whole(path, "\n".join(lines).encode("ascii") + b"\n" + text.getvalue())
-
-
-def write_geotiff(path: Path, raster: Raster) -> None:
-    """Write a raster as a GeoTIFF of float32 in a local grid, metres, with NaN for no data; raises OSError."""
-    # Pillow is for this format only: a mapping node shall not wait for it.
-    from PIL import Image
-    from PIL.TiffImagePlugin import ImageFileDirectory_v2
-
-    tags = ImageFileDirectory_v2()
-    upper = raster.origin[1] + raster.values.shape[0] * raster.resolution
-    _set(tags, _PIXEL_SCALE, _DOUBLE, (raster.resolution, raster.resolution, 0.0))
-    _set(tags, _TIE_POINT, _DOUBLE, (0.0, 0.0, 0.0, float(raster.origin[0]), float(upper), 0.0))
-    _set(tags, _GEO_KEYS, _SHORT, _LOCAL_GRID)
-    _set(tags, _GDAL_NO_DATA, _ASCII, "nan")
-    data = BytesIO()
-    Image.fromarray(raster.values[::-1].astype(np.float32)).save(data, format="TIFF", tiffinfo=tags)
-    write_whole(path, data.getvalue())
-
-
-def _set(tags: Any, tag: int, kind: int, value: object) -> None:
-    tags[tag] = value
-    tags.tagtype[tag] = kind

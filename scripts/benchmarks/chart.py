@@ -1,0 +1,89 @@
+"""How far a path on the chart is from the truth: the marina, whose DGPS stands in for a receiver at the surface.
+
+The map is made without it. Then the fixes of some minutes alone say where the map lies, and all of them how far the
+path on the chart is off. The first row is the path as `map_bag --truth` compares it, which begins where the truth does.
+"""
+
+from typing import List, Tuple
+
+import numpy as np
+
+from benchmarks.harness import Row, benchmark_parser, missing_row, print_table, recorded
+from georeferencing.asked import AskedOrigin
+from georeferencing.fixes import Fix
+from georeferencing.origin import Origin
+from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.charts import origin_of_fixes
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.recording import Truth, read_recording
+from mlsm_manager.offline.run_files import position_error, positions_at
+from node_support.geometry import rotated
+
+_RECORDING = "marina_first.bag"
+_PLACE = Origin(42.2, 3.1)  # where the truth's zero is put: the bag does not tell, and errors do not depend on it
+_DEVIATION = 1.0  # m, that the receiver states: a DGPS on a buoy, which the vehicle tows
+_MINUTE = 60.0
+_WANTED = 0.5  # m more than the unreferenced path has
+_WITHIN = -2.0 * np.log(0.05)  # squared distance in deviations that holds 95 % in a plane
+
+
+def rows(mapped: MappedBag) -> List[Row]:
+    """Return the rows of a run with a truth, for which no fix was used."""
+    run, truth = mapped.run, mapped.recording.truth
+    unreferenced = position_error(run.times, run.best, truth)
+    wanted = f"<= {unreferenced['mean'] + _WANTED:.2f} m mean"
+    since, until = truth.times - truth.times[0], truth.times[-1] - truth.times
+    first, last = since <= _MINUTE, until <= _MINUTE
+    everything = np.ones(len(truth.times), dtype=bool)
+    found = [("unreferenced", "mean {mean:.2f} m, max {max:.2f} m".format(**unreferenced), "")]
+    for what, chosen, asked in (
+        ("fixes of the first minute", first, "fixes"),
+        ("first and last minute", first | last, "fixes"),
+        ("first and last minute, no compass", first | last, "fixes, azimuth unknown"),
+        ("all fixes", everything, "fixes"),
+    ):
+        found.append((what, _figures(mapped, truth, chosen, AskedOrigin.parsed(asked)), wanted))
+    return found
+
+
+def _figures(mapped: MappedBag, truth: Truth, chosen: np.ndarray, asked: AskedOrigin) -> str:
+    run = mapped.run
+    places = _PLACE.degrees(truth.positions)
+    fixes = [Fix(time, *place, (_DEVIATION, _DEVIATION)) for time, place in zip(truth.times[chosen], places[chosen])]
+    found = origin_of_fixes(run, fixes, asked)
+    errors, covariances = _errors(mapped, truth, found.origin)
+    distances = np.hypot(*errors.T)
+    squares = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors)
+    stated = np.sqrt(np.trace(covariances, axis1=1, axis2=2).mean())
+    azimuth = f"azimuth {found.origin.azimuth_deg:.2f} +- {np.degrees(np.sqrt(found.origin.covariance[2, 2])):.2f}"
+    return (
+        f"mean {distances.mean():.2f} m, max {distances.max():.2f} m; stated {stated:.2f} m, "
+        f"{100.0 * np.mean(squares <= _WITHIN):.0f} % within 95 %, NEES {squares.mean() / 2.0:.2f}; {azimuth}; "
+        f"{found.used} fixes, {found.outliers} left out"
+    )
+
+
+def _errors(mapped: MappedBag, truth: Truth, origin: Origin) -> Tuple[np.ndarray, np.ndarray]:
+    """Return how far (n, 2) the path on the chart lies from the truth, east and north [m], with stated covariances."""
+    run, trust = mapped.run, mapped.run.trust
+    known = (truth.times >= run.times[0]) & (truth.times <= run.times[-1])
+    times = truth.times[known]
+    path = positions_at(run.times, run.best, times)
+    errors = _PLACE.points(origin.degrees(path)) - truth.positions[known]
+    of_path = np.empty((len(times), 2, 2))
+    for row in range(2):
+        for column in range(2):
+            of_path[:, row, column] = np.interp(times, trust.times, trust.covariances[:, row, column])
+    turn = np.array([rotated(axis, np.array(origin.yaw)) for axis in np.eye(2)]).T
+    return errors, turn @ of_path @ turn.T + origin.covariances(path)
+
+
+def main() -> None:
+    """Print the table."""
+    benchmark_parser("chart", __doc__).parse_args()
+    bag = recorded(_RECORDING)
+    if not bag.exists():
+        print_table([missing_row(_RECORDING)])
+        return
+    options = map_bag_arguments([str(bag), "--out", "unused", "--refine", "--truth", "/ground_truth"])
+    print_table(rows(mapped_bag(read_recording(bag, options.request), options)))

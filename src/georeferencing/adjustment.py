@@ -1,0 +1,128 @@
+"""Where fixes put the map: offset and azimuth by weighted least squares, with what the compass or a map file knows.
+
+The errors of a receiver last for minutes, so that many fixes of one minute tell little more than one; those of the path
+grow as in a random walk. Both are in the covariance of how far fixes and path lie apart.
+"""
+
+from typing import NamedTuple, Tuple
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from georeferencing.fixes import PlacedFixes
+from georeferencing.origin import EAST_DEG, Origin
+from node_support.geometry import rotated, wrapped
+
+COMPASS_DEVIATION = np.radians(3.0)  # of a compass that was calibrated, with how well it is mounted
+_NOT_KNOWN = np.pi  # rad, deviation of an azimuth of which nothing is known
+_NOWHERE = 1e12  # m^2, variance of a place of which nothing is known
+_CORRELATION_TIME = 100.0  # s, of a receiver's errors at the surface: reflections and the air change within minutes
+_LASTING = 0.9  # of their variance; the rest differs from fix to fix
+_MOST_FIXES = 300  # more of the same minutes tell nothing more
+_ROUNDS = 15
+_MIDDLE, _FARTHEST = 1.386, 13.8  # squared distance in deviations that 50 % and 0.1 % exceed, in two axes
+_STARTS = np.radians(np.arange(-180.0, 180.0, 30.0))
+_CONTRADICTS = 3.0  # deviations
+
+
+class Adjusted(NamedTuple):
+    """origin: with its covariance. used: number of fixes. outliers: number of those that lie apart from the others.
+    note: what else is to be said, empty where there is nothing.
+    """
+
+    origin: Origin
+    used: int
+    outliers: int
+    note: str = ""
+
+
+def of_compass(fixes: PlacedFixes, azimuth_deg: float, deviation: float = COMPASS_DEVIATION) -> Origin:
+    """Return what is known without fixes (n > 0) where a compass tells the azimuth of the x axis: a guess of the place.
+
+    deviation: of the azimuth, rad; infinite where nothing tells it.
+    """
+    turned = Origin(*fixes.degrees[0], azimuth_deg)
+    place = turned.degrees(-fixes.places[:1])[0]
+    return Origin(*place, azimuth_deg, np.diag([_NOWHERE, _NOWHERE, min(deviation, _NOT_KNOWN) ** 2]))
+
+
+def adjusted(fixes: PlacedFixes, known: Origin) -> Adjusted:
+    """Return where fixes (n > 0) put the map, of which something is known before, with its covariance.
+
+    Where they contradict its azimuth, it is left out and the note says so.
+    """
+    found = _adjusted(fixes, known)
+    free = _adjusted(fixes, of_compass(fixes, known.azimuth_deg, _NOT_KNOWN))
+    turn = abs(wrapped(free.origin.yaw - known.yaw))
+    if turn**2 <= _CONTRADICTS**2 * (free.origin.covariance[2, 2] + known.covariance[2, 2]):
+        return found
+    azimuths = f"azimuth {free.origin.azimuth_deg:.0f}, not {known.azimuth_deg:.0f}"
+    return free._replace(note=f"the fixes put the x axis at {azimuths}; they count")
+
+
+def _adjusted(fixes: PlacedFixes, known: Origin) -> Adjusted:
+    """Solve for east and north of the map's origin [m] and yaw in the plane of the known place."""
+    there = Origin(known.latitude_deg, known.longitude_deg).points(fixes.degrees)
+    starts = [known.yaw] if known.covariance[2, 2] < _NOT_KNOWN**2 else _STARTS
+    tried = [_robust(fixes, there, start, known.covariance[2, 2]) for start in starts]
+    _, pose, squares = min(tried, key=lambda one: one[0])
+    # A receiver whose fixes scatter more than it says is believed as much less.
+    scale = max(float(np.median(squares)) / _MIDDLE, 1.0)
+    inliers = np.flatnonzero(squares <= _FARTHEST * scale)
+    chosen = inliers[np.unique(np.linspace(0, len(inliers) - 1, _MOST_FIXES).astype(int))]
+    pose, covariance = _least_squares(fixes.take(chosen), there[chosen], pose, scale, known)
+    place = Origin(known.latitude_deg, known.longitude_deg).degrees(pose[np.newaxis, :2])[0]
+    azimuth = float(EAST_DEG - np.degrees(wrapped(pose[2])))
+    return Adjusted(Origin(*place, azimuth, covariance), len(inliers), len(fixes) - len(inliers))
+
+
+def _robust(fixes: PlacedFixes, there: np.ndarray, yaw: float, variance: float) -> Tuple[float, np.ndarray, np.ndarray]:
+    """Return cost, pose (3,) and squared distances (n,) in deviations of a fit in which jumps hardly count.
+
+    yaw: rad, that is expected with a variance.
+    """
+    variances = fixes.deviations**2 + fixes.variances[:, np.newaxis]
+    pose = np.append(np.median(there - rotated(fixes.places, np.array(yaw)), axis=0), yaw)
+    for _ in range(_ROUNDS):
+        residuals, jacobian = _residuals(fixes, there, pose)
+        squares = (residuals**2 / variances).sum(axis=1)
+        weights = 1.0 / (1.0 + squares / _FARTHEST)[:, np.newaxis] / variances
+        information = np.einsum("nak,na,nal->kl", jacobian, weights, jacobian)
+        pull = np.einsum("nak,na,na->k", jacobian, weights, residuals)
+        information[2, 2] += 1.0 / variance
+        pull[2] += (yaw - pose[2]) / variance
+        pose = pose + np.linalg.solve(information, pull)
+    squares = (_residuals(fixes, there, pose)[0] ** 2 / variances).sum(axis=1)
+    return float(np.log1p(squares / _FARTHEST).sum()), pose, squares
+
+
+def _least_squares(
+    fixes: PlacedFixes, there: np.ndarray, pose: np.ndarray, scale: float, known: Origin
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return pose (3,) and covariance (3, 3) with the errors' correlation and what is known before."""
+    apart = np.abs(fixes.times[:, np.newaxis] - fixes.times)
+    lasting = _LASTING * np.exp(-apart / _CORRELATION_TIME) + (1.0 - _LASTING) * np.eye(len(fixes))
+    grown = np.maximum.accumulate(fixes.variances)
+    walked = np.minimum(grown[:, np.newaxis], grown)
+    factors = [cho_factor(scale * np.outer(axis, axis) * lasting + walked) for axis in fixes.deviations.T]
+    before, expected = np.linalg.inv(known.covariance), np.array([0.0, 0.0, known.yaw])
+    for _ in range(_ROUNDS):
+        residuals, jacobian = _residuals(fixes, there, pose)
+        ahead = expected - pose
+        ahead[2] = wrapped(ahead[2])
+        information, pull = before.copy(), before @ ahead
+        for axis, factor in enumerate(factors):
+            weighted = cho_solve(factor, jacobian[:, axis])
+            information += jacobian[:, axis].T @ weighted
+            pull += weighted.T @ residuals[:, axis]
+        pose = pose + np.linalg.solve(information, pull)
+    return pose, np.linalg.inv(information)
+
+
+def _residuals(fixes: PlacedFixes, there: np.ndarray, pose: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return how far (n, 2) the fixes lie from the path, east and north [m], and its jacobian (n, 2, 3) by the pose."""
+    turned = rotated(fixes.places, pose[2])
+    jacobian = np.zeros((len(fixes), 2, 3))
+    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
+    jacobian[:, 0, 2], jacobian[:, 1, 2] = -turned[:, 1], turned[:, 0]
+    return there - pose[:2] - turned, jacobian

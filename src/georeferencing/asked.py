@@ -1,0 +1,60 @@
+"""What a user says of where the map lies: a place and an azimuth, or that satellites tell it."""
+
+import re
+from dataclasses import dataclass
+from typing import Optional, Tuple
+
+import numpy as np
+
+from georeferencing.adjustment import COMPASS_DEVIATION, of_compass
+from georeferencing.declination import declination_deg
+from georeferencing.fixes import PlacedFixes
+from georeferencing.origin import EAST_DEG, Origin
+from node_support.errors import RefusedInput
+
+_NUMBER = r"([-+]?\d+(?:\.\d*)?)"
+_AZIMUTH = rf"(?:azimuth\s+(?:{_NUMBER}|(unknown))|(magnetic))"
+_FORMAT = re.compile(rf"\s*(?:fixes|{_NUMBER}\s*,\s*{_NUMBER})\s*(?:,\s*{_AZIMUTH}\s*)?")
+_HOW = (
+    "must be as '41.2, 3.1', '41.2, 3.1, azimuth 12', '41.2, 3.1, magnetic', 'fixes', 'fixes, azimuth 12', "
+    "'fixes, azimuth unknown' or 'fixes, magnetic'"
+)
+
+
+@dataclass(frozen=True)
+class AskedOrigin:
+    """place: latitude and longitude of the map's origin, deg; None: fixes tell it.
+
+    azimuth_deg: of the x axis. is_magnetic: it counts from where the compass points. is_known: False where nothing but
+    fixes tells it.
+    """
+
+    place: Optional[Tuple[float, float]]
+    azimuth_deg: float = EAST_DEG
+    is_magnetic: bool = False
+    is_known: bool = True
+
+    @classmethod
+    def parsed(cls, text: str) -> "AskedOrigin":
+        """Return what "41.2, 3.1, azimuth 12" or "fixes, magnetic" asks for. Raises RefusedInput."""
+        found = _FORMAT.fullmatch(text)
+        latitude, longitude, azimuth, unknown, magnetic = found.groups() if found else (None,) * 5
+        place = None if latitude is None else (float(latitude), float(longitude))
+        if not found or (place and unknown):
+            raise RefusedInput("origins refused", f"{text!r}: {_HOW}")
+        asked = cls(place, float(azimuth or EAST_DEG), bool(magnetic), not unknown)
+        if place is not None:
+            Origin(*place, asked.azimuth_deg)
+        return asked
+
+    def origin(self, time: float) -> Origin:
+        """Return the origin at the place, on a day given by `time` [s since 1970]. Raises RefusedInput."""
+        return Origin(*self.place, self._azimuth_deg(*self.place, time))
+
+    def before(self, fixes: PlacedFixes) -> Origin:
+        """Return what is known without fixes (n > 0) where they tell the place. Raises RefusedInput."""
+        azimuth = self._azimuth_deg(*fixes.degrees[0], float(fixes.times[0]))
+        return of_compass(fixes, azimuth, COMPASS_DEVIATION if self.is_known else np.inf)
+
+    def _azimuth_deg(self, latitude: float, longitude: float, time: float) -> float:
+        return self.azimuth_deg + (declination_deg(latitude, longitude, time) if self.is_magnetic else 0.0)
