@@ -16,7 +16,7 @@ from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.causes import with_odometry_mended
 from mlsm_manager.offline.findings import Findings, Trust
 from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
-from mlsm_manager.offline.refinement import Refined, refine, refitted_verdicts
+from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
@@ -79,11 +79,12 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     _tell_of_refused(replayed, options)
     refined, refitted = None, []
     if options.refine:
-        with _bar(None, "", "refine"):
-            refined = refine(recording.track, replayed.scans, replayed.hypotheses, parameters.map_settings())
+        with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
+            settings = parameters.map_settings()
+            refined = refine(recording.track, replayed.scans, replayed.hypotheses, settings, bar.update)
     if options.check:
-        with _bar(None, "", "check"):
-            refitted = refitted_verdicts(refined.solution, refined.batch)
+        with _bar(REFITS, "fit", "check") as bar:
+            refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     of_motion = [] if refined is None or of_echoes else refined.motion.causes
@@ -175,7 +176,7 @@ def _tell_of_refused(replayed: Replayed, options: Namespace) -> None:
         raise RecordingError(f"{options.bags[0]}: not one of {sum(replayed.refused.values())} scans could be used")
 
 
-def _bar(total: Optional[int], unit: str, name: str) -> tqdm:
+def _bar(total: int, unit: str, name: str) -> tqdm:
     return tqdm(total=total, unit=unit, desc=f"{name:9}", disable=None)
 
 

@@ -1,7 +1,7 @@
 """Fits a whole run after it is over, draws its map anew, and fits again to see whether the path depends on settings."""
 
 from dataclasses import dataclass, replace
-from typing import List, Mapping, Sequence
+from typing import Callable, List, Mapping, Sequence
 
 import numpy as np
 
@@ -47,15 +47,33 @@ class Refined:
         return self.motion.run
 
 
-def refine(track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings: MapSettings) -> Refined:
+Done = Callable[[], object]
+"""Called after each part of a long work."""
+REFITS = 5
+"""Parts of `refitted_verdicts`."""
+
+
+def parts_of_refining(hypotheses: Hypotheses) -> int:
+    """Return how often `refine` says that a part is done: the fit of each odometry, loops, faults, the map."""
+    return len(hypotheses.solvers) + 3
+
+
+def refine(
+    track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings: MapSettings, done: Done = lambda: None
+) -> Refined:
     """Return the run of all `scans` that the solvers have taken, fitted at once; live runs are where fits begin.
 
     Of several odometries the likelier one is believed from then on.
     """
-    best = hypotheses.believed([fitted(solver) for solver in hypotheses.solvers])
-    solver = hypotheses.shown
+    fits = []
+    for solver in hypotheses.solvers:
+        fits.append(fitted(solver))
+        done()
+    best, solver = hypotheses.believed(fits), hypotheses.shown
     closing = with_loops_closed(solver, best)
+    done()
     motion = motion_findings(solver.solution.with_state(closing.batch.state), closing.batch, track)
+    done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in scans:
         surfaces.add(MapCloud.of_scan(motion.placed(scan, track)))
@@ -63,6 +81,7 @@ def refine(track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings
     whole, batch = OdometryLog.of(motion.track), motion.fit
     poses = solved_path(whole, solver.odometry, batch.node_times, batch.state.nodes, track.times)
     layers = {Layer.SHOWN: surfaces.map.blocks, Layer.FREE: surfaces.free.blocks}
+    done()
     return Refined(poses, layers, closing, motion.with_course(Track(track.times, poses)))
 
 
@@ -72,8 +91,13 @@ _MANY_SCANS = 40  # in a group, from which on it is made smaller
 _TURNS = 1.0  # of the direction in which the second start lies beside the path, along the whole run
 
 
-def refitted_verdicts(run: Solution, batch: BatchResult) -> List[Verdict]:
+def refitted_verdicts(run: Solution, batch: BatchResult, done: Done = lambda: None) -> List[Verdict]:
     """Return what further fits of a run say of `batch`, its fit with its own settings."""
+
+    def refitted(other: Solution) -> State:
+        state = fit_of(other).state
+        done()
+        return state
 
     def path(state: State) -> np.ndarray:
         return run.with_state(state).node_places(np.arange(len(state.nodes)))
@@ -81,8 +105,8 @@ def refitted_verdicts(run: Solution, batch: BatchResult) -> List[Verdict]:
     deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
     start = displaced(batch.state, deviations, run.parameters.cut)
     fitted_with = [replace(run, parameters=one, state=batch.state) for one in other_settings(run.parameters)]
-    paths = np.stack([path(state) for state in (batch.state, *(fit_of(one).state for one in fitted_with))])
-    again = [path(state) for state in (batch.state, start, fit_of(run.with_state(start)).state)]
+    paths = np.stack([path(state) for state in (batch.state, *(refitted(one) for one in fitted_with))])
+    again = [path(state) for state in (batch.state, start, refitted(run.with_state(start)))]
     return [settings_agree(batch.node_times, paths, deviations), starts_agree(batch.node_times, *again)]
 
 

@@ -1,7 +1,12 @@
 """map_bag as it is run: bags in, files, figures and one-line errors out."""
 
+import os
+import pty
+import re
 import subprocess
 import sys
+import threading
+from contextlib import suppress
 from importlib.util import find_spec
 
 import numpy as np
@@ -30,10 +35,13 @@ FILES = {
 CHECKED = ("--truth", "/ground_truth", "--refine", "--check", "--odometry", "dvl")
 
 
+def command_for(folder):
+    return [sys.executable, str(ROOT / "nodes/map_bag"), str(BASIN), "--out", str(folder), *CHECKED]
+
+
 def mapped(folder):
     """Map in a process of its own, as users do: where arrays lie in memory decides about the last bits of sums."""
-    command = [sys.executable, str(ROOT / "nodes/map_bag"), str(BASIN), "--out", str(folder), *CHECKED]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = subprocess.run(command_for(folder), capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
     return folder
 
@@ -47,10 +55,36 @@ def test_a_simulated_bag_gives_all_files(basin):
     assert {path.name for path in basin.iterdir()} == FILES
 
 
-def test_the_same_command_writes_the_same_bytes(basin, tmp_path):
-    again = mapped(tmp_path / "again")
+@pytest.fixture(scope="module")
+def on_a_screen(tmp_path_factory):
+    """Map once more, as a person sees it; return the folder and what the screen showed."""
+    folder, (screen, terminal) = tmp_path_factory.mktemp("again"), pty.openpty()
+    shown = []
+    reader = threading.Thread(target=_read, args=(screen, shown), daemon=True)
+    reader.start()
+    status = subprocess.run(command_for(folder), stdout=subprocess.DEVNULL, stderr=terminal, check=False).returncode
+    os.close(terminal)
+    reader.join()
+    assert status == 0, b"".join(shown)
+    return folder, b"".join(shown).decode()
+
+
+def _read(screen, shown):
+    """Read until the last program that had the terminal has closed it, which is an error."""
+    with suppress(OSError):
+        while True:
+            shown.append(os.read(screen, 4096))
+
+
+def test_the_same_command_writes_the_same_bytes(basin, on_a_screen):
     for name in FILES - {"summary.json"}:
-        assert (basin / name).read_bytes() == (again / name).read_bytes(), name
+        assert (basin / name).read_bytes() == (on_a_screen[0] / name).read_bytes(), name
+
+
+@pytest.mark.parametrize("bar", ["match", "refine", "check"])
+def test_each_bar_reaches_its_total(on_a_screen, bar):
+    last = [line for line in re.split(r"[\r\n]+", on_a_screen[1]) if line.startswith(bar)][-1]
+    assert re.search(r"100%.* (\d+)/\1 ", last), last
 
 
 def test_the_summary_has_the_promised_keys(basin):
