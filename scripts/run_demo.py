@@ -50,6 +50,11 @@ class Graph:
         with log.open("wb") as output:
             self._process = subprocess.Popen(command, stdout=output, stderr=output, start_new_session=True)
 
+    @property
+    def pid(self) -> int:
+        """Of roslaunch."""
+        return self._process.pid
+
     def check(self) -> None:
         """Raise DemoError when roslaunch has ended."""
         if self._process.poll() is not None:

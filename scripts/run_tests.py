@@ -92,6 +92,7 @@ def steps() -> List[Step]:
         _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),
         _pytest("web page", "test/stopping/test_web_page.py", load=Load.SHARED),
         _pytest("installation", "test/installation", load=Load.SHARED),
+        _pytest("soak", "test/soak", load=Load.SHARED),
         *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"), key=_by_length)),
     ]
 

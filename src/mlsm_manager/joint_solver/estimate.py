@@ -1,7 +1,7 @@
 """What the live solver knows when a scan has ended: of one scan, and of whole turns of the head."""
 
 from dataclasses import dataclass, field
-from typing import NamedTuple, Sequence
+from typing import NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -152,9 +152,14 @@ class Turns(NamedTuple):
 
     @classmethod
     def with_echoes(
-        cls, estimates: Sequence[LiveEstimate], apart: np.ndarray, parts: int, point_counts: np.ndarray, most: int
-    ) -> "Turns":
-        """Return the newest `most` turns in which surfaces were heard; point_counts: (n parts,) of the scans."""
+        cls, estimates: Sequence[Optional[LiveEstimate]], apart: np.ndarray, parts: int, point_counts: np.ndarray,
+        most: int,
+    ) -> "Turns":  # fmt: skip
+        """Return the newest `most` turns in which surfaces were heard; point_counts: (n parts,) of the scans.
+
+        Turns whose estimates are forgotten are left out.
+        """
         heard = np.flatnonzero(point_counts.reshape(-1, parts).any(axis=1))[-most:]
+        heard = heard[[estimates[turn * parts] is not None for turn in heard]]
         scans = (heard[:, np.newaxis] * parts + np.arange(parts)).ravel()
         return cls.of([estimates[scan] for scan in scans], apart[scans], parts)

@@ -38,7 +38,7 @@ class LiveSolver:
     """Takes one scan at a time; the cost of a scan does not grow with the length of the run.
 
     log: the scans, which solvers with other odometries may share. estimates: one per scan of the log, None for old
-    ones. state: the unknowns as they are known now.
+    ones but the first turn's. state: the unknowns as they are known now.
     submaps: which scans are compared with each other. search: what came of the search for the newest scans in the map
     after scans that heard nothing; None where none was needed. closed: the loop that was closed with the newest scan.
     """
@@ -68,6 +68,7 @@ class LiveSolver:
         self._may_bend = known is None
         self._loops: Tuple[Loop, ...] = ()
         self._by_parts = parameters.node_search
+        self._forgotten_until = 0
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
@@ -197,7 +198,8 @@ class LiveSolver:
             self.submaps.shorten(scans)
             text = f"the scan that ends at {self.log.node_times[-1]:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
-        self.estimates[: self._old_scans] = [None] * self._old_scans
+        old = range(self._parts, self._old_scans)
+        self.estimates[self._parts : self._parts + len(old)] = [None] * len(old)
         return self.estimates[-1]
 
     @property
@@ -229,18 +231,19 @@ class LiveSolver:
 
     @property
     def _old_scans(self) -> int:
-        """How many scans of the log are so old that they are to be forgotten now: many at once, else none."""
-        old = self.log.scan_count - self.parameters.kept_scans * self._parts
-        return old if old > 0 and old % _FORGOTTEN_AT_ONCE == 0 else 0
+        """How many scans of the log are so old that they are forgotten, many at once; none of before a silence."""
+        kept = max(self.parameters.kept_scans * self._parts, silent_scans(self.log) + 2 * self._parts)
+        return max(self.log.scan_count - kept, 0) // _FORGOTTEN_AT_ONCE * _FORGOTTEN_AT_ONCE
 
     def _forget_old(self) -> None:
         """Forget what no later scan needs."""
         old = self._old_scans
-        if not old:
+        if old <= self._forgotten_until:
             return
-        groups = np.array([max(old - _FORGOTTEN_AT_ONCE, 0), old]) // self.parameters.group_scans
+        groups = np.array([self._forgotten_until, old]) // self.parameters.group_scans
         self.log.forget(superfluous(self.solution, *groups))
         self.log.thin_odometry(old)
+        self._forgotten_until = old
 
     def _start_at(self, fix: Fix) -> None:
         """Put the newest node where its scan was found."""

@@ -73,21 +73,23 @@ def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> Fro
     return FrozenMap(points, per_point, numbers, importance[numbers], solution.state.run.copy())
 
 
-_BESIDE = 3.0
+_BESIDE = 5.0
 """m between the places of groups that hear the same."""
+_ENOUGH_BESIDE = 0.25
+"""Of the groups that a scan is compared with: so many that hear the same hold the map."""
 
 
 def superfluous(solution: Solution, first: int, last: int) -> np.ndarray:
-    """Return which scans (scan_count,) bool of groups `first` to before `last` no later scan will be compared with.
+    """Return which scans (scan_count,) bool of groups `first` to before `last` no later scan has to be compared with.
 
-    So many older groups lie beside each of these that it is never among the nearest.
+    Enough older groups lie beside each of these, and have drifted less.
     """
-    scans, parameters = solution.parameters.group_scans, solution.parameters
+    scans, most = solution.parameters.group_scans, _ENOUGH_BESIDE * solution.parameters.frozen_groups
     middles = np.arange(last) * scans + scans // 2
     places, kept = solution.node_places(middles), ~solution.log.forgotten[middles]
     for group in range(first, last):
         older = places[:group][kept[:group]] - places[group]
-        kept[group] &= np.count_nonzero(np.hypot(*older.T) < _BESIDE) < parameters.frozen_groups
+        kept[group] &= np.count_nonzero(np.hypot(*older.T) < _BESIDE) < most
     result = np.zeros(solution.log.scan_count, dtype=bool)
     result[: last * scans] = np.repeat(~kept, scans)
     return result

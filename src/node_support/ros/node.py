@@ -15,10 +15,12 @@ import rospy
 from diagnostic_updater import DiagnosticStatusWrapper, Updater
 
 from node_support.health import Health
+from node_support.memory import give_back, hold_little
 from node_support.parameters import ParameterError
 from node_support.ros.callbacks import every
 
 DIAGNOSTICS_PERIOD = 1.0  # s: as often as diagnostic aggregators expect it
+MEMORY_PERIOD = 10.0  # s: giving memory back takes some milliseconds
 MASTER_PERIOD = 2.0  # s: soon enough for a respawn, seldom enough to cost nothing
 _ENOUGH = 2  # answers of the master in a row: the first one may come while the node itself registers
 _SUCCESS = 1  # status of the XML-RPC interface of ROS; others mean that the node is unknown
@@ -51,6 +53,7 @@ def run(name: str, make_node: Callable[[], Node]) -> NoReturn:
     ParameterError, StartError and the loss of its registration at the master end it with one line and status 1.
     """
     interrupt = _Interrupt()
+    hold_little()
     try:
         status = _run(name, make_node, interrupt)
     except (KeyboardInterrupt, rospy.ROSInterruptException):
@@ -63,6 +66,7 @@ def _run(name: str, make_node: Callable[[], Node], interrupt: "_Interrupt") -> i
     try:
         node = make_node()
         publish_diagnostics(node.healths)
+        every(MEMORY_PERIOD, give_back, node.healths[0])
     except (ParameterError, StartError) as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         return 1

@@ -57,9 +57,12 @@ def test_old_odometry_is_kept_once_in_a_second():
     np.testing.assert_array_equal(log.odometry.at(later), whole.odometry.at(later))
 
 
-def standing(groups, forgotten=()):
-    """Return a run of a vehicle that hears the same in so many groups of scans; those `forgotten` are."""
-    parameters = solver_parameters(scans_per_group=1, frozen_scans=3)
+def standing(groups, forgotten=(), compared=12):
+    """Return a run of a vehicle that hears the same in so many groups of scans; those `forgotten` are.
+
+    compared: with so many groups each scan is, and a quarter of them is enough beside each other.
+    """
+    parameters = solver_parameters(scans_per_group=1, frozen_scans=compared)
     scans = tour(groups).scans
     log = logged(scans)
     nodes = np.zeros((groups + 1, parameters.odometry.width))
@@ -83,7 +86,7 @@ def test_groups_elsewhere_are_kept():
 
 
 def test_forgotten_groups_are_none_of_the_nearest():
-    np.testing.assert_array_equal(nearest_groups(standing(6, forgotten=[0, 1]), 6, np.zeros(2)).numbers, [2, 3, 4])
+    np.testing.assert_array_equal(nearest_groups(standing(6, [0, 1], compared=3), 6, np.zeros(2)).numbers, [2, 3, 4])
 
 
 def round_and_round(times):
@@ -108,6 +111,30 @@ def test_a_run_that_forgets_is_followed_as_one_that_does_not(forgetful):
     assert solver.estimates[20] is None
     newest = solver.estimates[-1]
     assert np.hypot(*(newest.T_map_base - made.truth.at(newest.time))[:2]) < 0.3
+
+
+def session_of(scans, parameters):
+    session = JointSession.begun(parameters, SONAR_IN_BASE, np.zeros(3), None, np.empty((0, 2)))
+    for scan in scans:
+        session.add(scan)
+    return session
+
+
+def test_a_run_that_forgets_is_judged_as_one_that_does_not(forgetful):
+    scans = tour(42, path=round_and_round).scans
+    whole = [verdict.name for verdict in session_of(scans[:20], forgetful).verdicts()]
+    session = session_of(scans, forgetful)
+    assert session.solver.estimates[10] is None
+    assert [verdict.name for verdict in session.verdicts()] == whole
+
+
+def test_a_run_goes_on_after_a_silence_that_is_longer_than_what_it_keeps(forgetful):
+    made = tour(58, path=round_and_round)
+    silent = [scan.without_points(scan.reference_time) for scan in made.scans[12:56]]
+    session = session_of([*made.scans[:12], *silent, *made.scans[56:]], forgetful)
+    newest = session.solver.estimates[-1]
+    assert np.hypot(*(newest.T_map_base - made.truth.at(newest.time))[:2]) < 0.5
+    assert {verdict.name for verdict in session.verdicts()}
 
 
 def test_scans_are_kept_for_storing_only_as_many_as_are_stored(monkeypatch):

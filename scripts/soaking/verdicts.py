@@ -1,0 +1,129 @@
+"""What a long run took, and whether that is what a mission can afford."""
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import Dict, List, NamedTuple, Sequence
+
+import numpy as np
+
+from soaking.listening import COUNTED, Listener
+from soaking.processes import Held
+
+_SETTLED = 1.0  # h, after which nothing may grow
+_MOST_GROWTH = 1.0  # MB/h
+_MOST_MEMORY = 400.0  # MB of a process
+_MORE_FILES, _MORE_THREADS = 3, 2  # that come and go
+_MORE_WAITING = 120  # beams: a scan
+_MOST_LINES = 60  # of one cause in an hour
+_MOST_DISK = 250.0  # MB of logs and saved maps
+_FEWEST = 10  # samples that tell a growth
+
+
+@dataclass(frozen=True)
+class Sample:
+    """The graph at one time. hours: simulated ones. wall: s. waiting: beams on their way. disk: MB written."""
+
+    hours: float
+    wall: float
+    held: Dict[str, Held]
+    waiting: int
+    disk: float
+    blocks: int
+
+    def tell(self, first: "Sample", has_heading: bool = False) -> None:
+        """Print it as a line of a table, below a heading."""
+        if has_heading:
+            print(f"{'h':>6} {'x real':>6} {'blocks':>6} {'disk':>6}  MB of {', '.join(sorted(self.held))}")
+        speed = 3600.0 * (self.hours - first.hours) / max(self.wall - first.wall, 1e-9)
+        memory = " ".join(f"{self.held[name].memory:6.1f}" for name in sorted(self.held))
+        print(f"{self.hours:6.2f} {speed:6.1f} {self.blocks:6d} {self.disk:6.1f}  {memory}", flush=True)
+
+
+class JudgedRow(NamedTuple):
+    """What was measured, the figure, what is wanted, and whether it holds."""
+
+    what: str
+    measured: str
+    wanted: str
+    holds: bool
+
+
+def rows(samples: Sequence[Sample], listener: Listener) -> List[JudgedRow]:
+    """Return what the samples of a run and a listener tell."""
+    settled = [one for one in samples if one.hours >= _SETTLED]
+    result = []
+    for name in sorted(samples[-1].held):
+        result += _of_process(name, samples, [one for one in settled if name in one.held])
+    halves = samples[: len(samples) // 2], samples[len(samples) // 2 :]
+    waiting = [float(np.median([one.waiting for one in half])) for half in halves]
+    disk = samples[-1].disk
+    return [
+        *result,
+        JudgedRow(
+            "beams on their way, first and second half",
+            " and ".join(f"{one:.0f}" for one in waiting),
+            f"<= {_MORE_WAITING} more",
+            waiting[1] - waiting[0] <= _MORE_WAITING,
+        ),
+        JudgedRow("logs and maps on disk", f"{disk:.1f} MB", f"<= {_MOST_DISK:.0f} MB", disk <= _MOST_DISK),
+        *_of_log(listener),
+        *_of_diagnostics(listener),
+        *_of_fixes(listener),
+    ]
+
+
+def _of_process(name: str, samples: Sequence[Sample], settled: Sequence[Sample]) -> List[JudgedRow]:
+    memory = samples[-1].held[name].memory
+    result = [JudgedRow(f"{name}: memory", f"{memory:.0f} MB", f"<= {_MOST_MEMORY:.0f} MB", memory <= _MOST_MEMORY)]
+    if len(settled) < _FEWEST:
+        return result
+    hours = np.array([one.hours for one in settled])
+    growth = float(np.polyfit(hours, [one.held[name].memory for one in settled], 1)[0])
+    grown = [
+        getattr(settled[-1].held[name], each) - getattr(settled[0].held[name], each) for each in ("files", "threads")
+    ]
+    return [
+        *result,
+        JudgedRow(f"{name}: growth", f"{growth:+.2f} MB/h", f"<= {_MOST_GROWTH:g} MB/h", growth <= _MOST_GROWTH),
+        JudgedRow(f"{name}: more files", f"{grown[0]:+d}", f"<= {_MORE_FILES}", grown[0] <= _MORE_FILES),
+        JudgedRow(f"{name}: more threads", f"{grown[1]:+d}", f"<= {_MORE_THREADS}", grown[1] <= _MORE_THREADS),
+    ]
+
+
+def _of_log(listener: Listener) -> List[JudgedRow]:
+    """Return how many lines each cause had in the hour in which it had most."""
+    per_hour = Counter((line, int(hours)) for hours, line in listener.lines)
+    most: Dict[str, int] = {}
+    for (line, _), count in per_hour.items():
+        most[line] = max(count, most.get(line, 0))
+    return [
+        JudgedRow(f"log lines in an hour: {line[:60]}", f"{count}", f"<= {_MOST_LINES}", count <= _MOST_LINES)
+        for line, count in sorted(most.items(), key=lambda each: -each[1])
+    ]
+
+
+def _of_diagnostics(listener: Listener) -> List[JudgedRow]:
+    """Return what nodes count beside what the listener counted, and what they complained of."""
+    sent, heard = (listener.value(*each) for each in (("sonar_simulator", "beams out"), ("sonar_to_cloud", "beams in")))
+    result = [JudgedRow("sonar_to_cloud: beams in", f"{heard}", f"{sent}, as sonar_simulator sent", sent == heard)]
+    for topic, counters in COUNTED.items():
+        heard = listener.counts[topic]
+        for stage, counter in counters:
+            told = listener.value(stage, counter)
+            result.append(JudgedRow(f"{stage}: {counter}", f"{told}", f"{heard}, as on {topic}", told == heard))
+    complaints = [
+        JudgedRow(f"/diagnostics: {text[:60]}", f"{count} s", "not more than the log", True)
+        for text, count in listener.complaints()
+    ]
+    return [*result, *complaints]
+
+
+def _of_fixes(listener: Listener) -> List[JudgedRow]:
+    """Return how far fixes were from the truth, and how far they said at most."""
+    errors = np.array(listener.errors).reshape(-1, 3)
+    if not len(errors):
+        return [JudgedRow("fixes", "0", "some", False)]
+    last = errors[errors[:, 0] > errors[-1, 0] - 1.0]
+    within = float(np.mean(last[:, 1] <= 3.0 * last[:, 2]))
+    figures = f"{last[:, 1].mean():.2f} m, {last[:, 1].max():.2f} m at most; told {last[:, 2].mean():.2f} m"
+    return [JudgedRow("error of the last hour's fixes", figures, "within three deviations told", within >= 0.95)]
